@@ -86,9 +86,9 @@ def run_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="nep-studio run",
         description=_(
-            "Run a behaviour without a window. Exit codes: 0 finished; 1 a block failed or a robot did "
-            "not stop; 2 the file can't be run; 3 one of its robots is missing; 4 a real robot would "
-            "move and is not allowed to; 130 stopped by Ctrl+C."
+            "Run a behaviour without a window. Exit codes: 0 finished; 1 a block failed or a robot "
+            "didn't stop; 2 the file can't be run; 3 one of its robots is missing; 4 a real robot "
+            "would move and isn't allowed to; 130 stopped by Ctrl+C."
         ),
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=_("the behaviour"))

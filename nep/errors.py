@@ -130,8 +130,8 @@ class NoServerError(WaitTimeoutError):
             step = _("start it, or check the address '{address}'").format(address=address)
         elif service in self.known:
             step = _(
-                "its server can't be reached; programs of the original NEP accept calls from their own "
-                "computer only"
+                "the server can't be reached; programs of the original NEP accept calls only from their "
+                "own computer"
             )
         elif near is not None:
             step = _("did you mean '{near}'?").format(near=near)
@@ -158,11 +158,11 @@ class ParameterError(NepError, ValueError):
         self.value = value
         self.reason = reason
         super().__init__(
-            _("the parameter '{name}' cannot be {value}; {reason}").format(
+            _("the parameter '{name}' can't be {value}: {reason}").format(
                 name=name, value=value, reason=reason
             )
             if value
-            else _("the parameter '{name}': {reason}").format(name=name, reason=reason)
+            else _("can't use the parameter '{name}': {reason}").format(name=name, reason=reason)
         )
 
 
@@ -203,7 +203,7 @@ class BadKeyError(NepError, ValueError):
         self.key = key
         self.reason = reason
         super().__init__(
-            _("'{key}' is not a valid key; {reason}").format(key=escaped(shortened(key, 200)), reason=reason)
+            _("'{key}' isn't a valid key: {reason}").format(key=escaped(shortened(key, 200)), reason=reason)
         )
 
 
@@ -219,7 +219,7 @@ class BadValueError(NepError, ValueError):
         self.key = key
         self.reason = reason
         super().__init__(
-            _("'{key}' cannot have this value; {reason}").format(
+            _("'{key}' can't have this value: {reason}").format(
                 key=escaped(shortened(key, 200)), reason=reason
             )
         )
@@ -299,7 +299,7 @@ class BadTopicError(NepError, ValueError):
         self.topic = topic
         self.reason = reason
         super().__init__(
-            _("'{topic}' is not a valid topic name; {reason}").format(
+            _("'{topic}' isn't a valid topic name: {reason}").format(
                 topic=escaped(shortened(topic, 200)), reason=reason
             )
         )
@@ -317,7 +317,7 @@ class BadNameError(NepError, ValueError):
         self.name = name
         self.reason = reason
         super().__init__(
-            _("'{name}' is not a valid node name; {reason}").format(
+            _("'{name}' isn't a valid node name: {reason}").format(
                 name=escaped(shortened(name, 200)), reason=reason
             )
         )
@@ -352,7 +352,7 @@ class BackendUnavailableError(NepError):
     def __init__(self, name: str, needs: str) -> None:
         self.name = name
         self.needs = needs
-        super().__init__(_("the back end '{name}' is not installed; {needs}").format(name=name, needs=needs))
+        super().__init__(_("the back end '{name}' isn't installed; {needs}").format(name=name, needs=needs))
 
 
 class PluginsMissingError(NepError):
@@ -425,7 +425,7 @@ class AddressInUseError(NepError):
         if not is_own:
             super().__init__(
                 _(
-                    "'{address}' is not an address of this computer; use one of its addresses, or '127.0.0.1'"
+                    "'{address}' isn't an address of this computer; use one of its addresses, or '127.0.0.1'"
                 ).format(address=address)
             )
             return
@@ -483,7 +483,7 @@ class EncodeError(NepError, ValueError):
         self.place = place
         self.reason = reason
         super().__init__(
-            _("cannot encode a '{kind}' as '{codec}'; {reason}").format(kind=kind, codec=codec, reason=reason)
+            _("can't encode a '{kind}' as '{codec}': {reason}").format(kind=kind, codec=codec, reason=reason)
         )
 
 
@@ -501,7 +501,7 @@ class DecodeError(NepError, ValueError):
         self.size_bytes = size_bytes
         self.reason = reason = escaped(shortened(reason, _MAX_REASON_LENGTH))  # may quote untrusted input
         super().__init__(
-            _("cannot decode {size_bytes} bytes as '{codec}'; {reason}").format(
+            _("can't decode {size_bytes} bytes as '{codec}': {reason}").format(
                 size_bytes=size_bytes, codec=codec, reason=reason
             )
         )
@@ -531,7 +531,7 @@ class RecordingError(NepError):
         self.path = path
         self.reason = reason
         super().__init__(
-            _("cannot use the recording '{path}'; {reason}").format(path=escaped(path), reason=reason)
+            _("can't use the recording '{path}': {reason}").format(path=escaped(path), reason=reason)
         )
 
 
@@ -548,7 +548,7 @@ class RecordingsUnavailableError(NepError):
 
     def __init__(self, needs: str) -> None:
         self.needs = needs
-        super().__init__(_("recordings need packages that are not installed; {needs}").format(needs=needs))
+        super().__init__(_("recordings need packages that aren't installed; {needs}").format(needs=needs))
 
 
 class WrongTypeError(TypeError, ValueError):

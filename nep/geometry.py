@@ -117,7 +117,7 @@ class Quaternion:
         length = math.hypot(self.x, self.y, self.z, self.w)
         if not 0.0 < length < math.inf:
             raise ValueError(
-                _("'{given}' is not a rotation; its length must be finite and greater than 0").format(
+                _("'{given}' isn't a rotation; its length must be finite and greater than 0").format(
                     given=self
                 )
             )

@@ -241,7 +241,7 @@ def test_dev_environment_satisfies_studio_but_not_the_reverse(folder: Path) -> N
 
 def test_failed_installation_is_retried(folder: Path) -> None:
     failing = replace(fake_pip(FakeSystem()), do=lambda command, environ, log: 1)
-    with pytest.raises(dev.Trouble, match="packages could not be installed"):
+    with pytest.raises(dev.Trouble, match="packages couldn't be installed"):
         dev.make_environment(failing, folder, "dev")
     assert not dev.is_fresh(folder, "dev")
 

@@ -136,7 +136,7 @@ def test_robot_plug_in_is_described_driven_and_offered_as_blocks(write: Write, m
             state, output = "", None
             while state not in {"succeeded", "failed"}:
                 arrived, answer = answers.listen(timeout_s=30.0)
-                assert arrived, "the robot did not reply"
+                assert arrived, "the robot didn't reply"
                 state, output = answer["state"], answer["output"]
             assert (state, output) == ("succeeded", {"blinked": 2})
         finally:

@@ -226,7 +226,7 @@ class SessionAlarms:
             self._pending_send = None
             asked.done(
                 False,
-                _("not sent: {robots} is not allowed to move").format(
+                _("not sent: {robots} isn't allowed to move").format(
                     robots=format_list(asked.question.names)
                 ),
             )
@@ -315,7 +315,7 @@ class SessionAlarms:
     def _play_sound(self, _event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
         speaker = self._session.voices.speaker
         if speaker is None:
-            done(False, _("sound is not available"))
+            done(False, _("sound isn't available"))
             return
         speaker.play(SOUND, VOLUME)
         done(True, _("sound"))
@@ -329,7 +329,7 @@ class SessionAlarms:
     def _run(self, _event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         why_not = _("no window is open") if self.run_behaviour is None else self.run_behaviour(action.name)
         if why_not:
-            done(False, _("“{name}” was not run: {reason}").format(name=action.name, reason=why_not))
+            done(False, _("“{name}” wasn't run: {reason}").format(name=action.name, reason=why_not))
         else:
             done(True, _("ran “{name}”").format(name=action.name))
 
@@ -399,7 +399,7 @@ class SessionAlarms:
         self._is_newer = kept.is_newer
         if kept.problem:
             some = kept.value is not None
-            title = _("Some alarms could not be read.") if some else _("The alarms could not be read.")
+            title = _("Some alarms couldn't be read.") if some else _("The alarms couldn't be read.")
             self._session.alerts.raise_alert(
                 "alarms:file", "warn", title, kept.problem, button=_("Show the alarms"), action=SHOW
             )

@@ -576,7 +576,7 @@ class Session:
             self.alerts.raise_alert(
                 "master",
                 "warn",
-                _("The master disappeared; starting a new one."),
+                _("Lost the connection to the master; starting a new one."),
                 _("Connected programs keep running; new ones can't join until it is back."),
                 button=_(OPEN_DOCTOR_LABEL),
                 action="help.doctor",

@@ -107,9 +107,9 @@ def description_topic_problem(robot: Robot, topic: str) -> str | None:
     home = topic_of(robot.name, "description")
     if topic == home and robot.topics.description == home:
         return None
-    return _("{topic} announces {robot}, which may only be announced on {home}; it is ignored").format(
-        topic=topic, robot=robot.name, home=home
-    )
+    return _(
+        "{topic} announces {robot}, which can only be announced on {home}; the announcement is ignored"
+    ).format(topic=topic, robot=robot.name, home=home)
 
 
 def reserved_topics(robot: Robot) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from nep.text import bounded_str
 
 COMMANDS, ANSWERS, EVENTS = RIZE_COMMAND_TOPIC, "action_state", "rize_event"
 _STATES = {"success": "succeeded", "failure": "failed"}
-_FAILED_MESSAGE = lazy("{robot} could not {action}")
+_FAILED_MESSAGE = lazy("{robot} couldn't {action}")
 
 
 @lru_cache(maxsize=1)
@@ -115,7 +115,7 @@ def from_reply(message: object) -> dict[str, object] | None:
     first = as_object(primitives[0] if isinstance(primitives, list) and primitives else primitives)
     action = bounded_str(first.get("primitive") or "")
     error = _(_FAILED_MESSAGE).format(
-        robot=bounded_str(said.get("robots") or _("the robot")), action=action or _("perform it")
+        robot=bounded_str(said.get("robots") or _("the robot")), action=action or _("perform the action")
     )
     return {
         "id": wanted,

@@ -78,7 +78,7 @@ class VirtualPepper(SimulatedActions):
         volume: Volume = 60,
         language: Language = "en",
     ) -> Mapping[str, object]:
-        """Say a text. A speech bubble shows it while the robot speaks."""
+        """Say something. A speech bubble shows the text while the robot speaks."""
         with self._simulation.changed:
             body = self._simulation.body
             body.volume, body.language = volume, language
@@ -252,7 +252,7 @@ class VirtualPepper(SimulatedActions):
         "light %where %colour",
         FACE,
         "lightbulb",
-        says="lights its %where",
+        says="lights up its %where",
         uses=("lights",),
         cancellable=False,
         rize="leds",

@@ -106,7 +106,7 @@ def make_application() -> QApplication:
     translate_qt(application)
     refused = fonts.load()
     if refused:
-        words = _("Qt can't load the fonts {fonts}; using others").format(fonts=", ".join(refused))
+        words = _("Qt can't load the fonts {fonts}; using fallback fonts").format(fonts=", ".join(refused))
         sys.stderr.write(f"{words}\n")
     return application
 
@@ -183,7 +183,7 @@ def raise_startup_alerts(session: Session) -> None:
         session.alerts.raise_alert(
             "journal:newer",
             "warn",
-            _("A newer version of NEP Studio has unsaved work here: {names}.").format(
+            _("There is unsaved work from a newer version of NEP Studio: {names}.").format(
                 names=format_list([f"“{name}”" for name in names])
             ),
             _("Start that version to restore it."),
@@ -309,7 +309,7 @@ def startup_problem(environ: Mapping[str, str], platform: str, user: int) -> str
         return ""
     if not any(environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")):
         return _(
-            "no screen found (DISPLAY and WAYLAND_DISPLAY are not set). Start Studio on a desktop, or "
+            "no screen found (DISPLAY and WAYLAND_DISPLAY aren't set). Start Studio on a desktop, or "
             "run a behaviour without a window: nep-studio run FILE"
         )
     if user == 0 and not environ.get("QTWEBENGINE_DISABLE_SANDBOX"):

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from PySide6.QtTextToSpeech import QTextToSpeech
 
 LANGUAGES = {"en": lazy("English"), "fr": lazy("French"), "ja": lazy("Japanese"), "es": lazy("Spanish")}
-NO_SOUND = lazy("This computer plays no sound.")
+NO_SOUND = lazy("This computer can't play sound.")
 ADVICE = {
     "linux": lazy(
         "Install the packages “speech-dispatcher”, “espeak-ng” and “libpulse0”, then start Studio again."
@@ -133,7 +133,7 @@ def voice_text(problem: str, *, has_engine: bool, platform: str = sys.platform) 
     """
     if has_engine and not problem:
         return _("Robots speak with the voice of this computer.")
-    why = problem or _("This computer has no voice: what robots say is only shown.")
+    why = problem or _("This computer has no voice, so what robots say is only shown as text.")
     return f"{why} {_(ADVICE.get(platform, ADVICE['linux']))}"
 
 

@@ -77,5 +77,5 @@ def parse_port(port: str | int) -> int:
     """Parse a port number. Raises `NepError` if it is not from 1 to 65535."""
     text = str(port)
     if not text.isascii() or not text.isdigit() or len(text) > 5 or not 1 <= int(text) <= 65535:
-        raise NepError(_("'{port}' is not a port; use a number from 1 to 65535").format(port=quotable(text)))
+        raise NepError(_("'{port}' isn't a port; use a number from 1 to 65535").format(port=quotable(text)))
     return int(text)

@@ -408,7 +408,7 @@ def check_calls(service: str, count: int, used: int, size: int) -> None:
         size: Size of the new call in bytes.
     """
     if size > PAYLOAD_MAX_BYTES:
-        raise NepError(_("the call cannot be sent: {reason}").format(reason=size_error_text(size)))
+        raise NepError(_("the call can't be sent: {reason}").format(reason=size_error_text(size)))
     if count >= CALLS_MAX or (used and used + size > CALLS_MAX_BYTES):
         raise NepError(
             _("{count} calls of '{service}' are in flight; wait for their replies first").format(
@@ -441,6 +441,6 @@ def rejection_reply(service: str, *, is_closed: bool) -> Reply:
 
 def size_error_text(size: int) -> str:
     """Return the error message for a payload of `size` bytes, which exceeds the limit."""
-    return _("it has {size} bytes, but calls allow at most {most}; publish large data on a topic").format(
-        size=size, most=PAYLOAD_MAX_BYTES
-    )
+    return _(
+        "the payload is {size} bytes, but calls allow at most {most}; publish large data on a topic"
+    ).format(size=size, most=PAYLOAD_MAX_BYTES)

@@ -108,7 +108,7 @@ class TypedService:
         kind, number, data = answer["kind"], answer["codec"], answer["data"]
         found = next((each for each in _KINDS if each == kind), None)
         if found is None or not isinstance(number, int) or not isinstance(data, bytes):
-            raise WireError(_("it is not a service reply"), len(body))
+            raise WireError(_("not a service reply"), len(body))
         return Reply(found, data, number)
 
     # ---- for servers
@@ -124,7 +124,7 @@ class TypedService:
             return DecodedCall(codec.encode(request).data, codec.number, None)
         number, limit_ms, data = request["codec"], request["timeout_ms"], request["data"]
         if not isinstance(number, int) or not isinstance(limit_ms, int) or not isinstance(data, bytes):
-            raise WireError(_("it is not a service call"), len(body))
+            raise WireError(_("not a service call"), len(body))
         return DecodedCall(data, number, limit_ms / 1000 if limit_ms else None)
 
     def encode_reply(self, reply: Reply) -> bytes:
@@ -139,5 +139,5 @@ class TypedService:
             return self.response.encode({"kind": kind, "codec": reply.codec, "data": data})
         codec = codec_by_number(reply.codec)
         if codec is None or reply.kind != CallKind.ANSWER:
-            raise DecodeError(self.name, len(reply.data), _("it is not a service reply"))
+            raise DecodeError(self.name, len(reply.data), _("not a service reply"))
         return self.response.encode(codec.decode(reply.data, {}))

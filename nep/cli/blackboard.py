@@ -47,7 +47,7 @@ _COLUMNS = (
 def _check_lifetime(lifetime_s: float | None) -> float | None:
     if lifetime_s is not None and not lifetime_s > 0.0:  # rejects NaN, too
         raise typer.BadParameter(
-            _("{given:g} is not a valid lifetime; use a number of seconds greater than 0").format(
+            _("{given:g} isn't a valid lifetime; use a number of seconds greater than 0").format(
                 given=lifetime_s
             )
         )
@@ -99,7 +99,7 @@ def run(
         typer.Option(
             "--lives",
             metavar=_("SECONDS"),
-            help=_("Delete values that have not been updated for this long (default: never)."),
+            help=_("Delete values that haven't been updated for this long (default: never)."),
             show_default=False,
             callback=_check_lifetime,
         ),
@@ -189,7 +189,7 @@ def _no_blackboard_error(name: str) -> NepError:
 def _entries(answer: object) -> Sequence[Mapping[str, object]]:
     found = answer.get("entries") if isinstance(answer, Mapping) else None
     if not isinstance(found, list) or not all(isinstance(each, Mapping) for each in found):
-        raise NepError(_("the service that replied is not a blackboard; use another --name"))
+        raise NepError(_("the service that replied isn't a blackboard; use another --name"))
     return found
 
 

@@ -101,7 +101,7 @@ def bridge(
     """Forward topics between two back ends until Ctrl+C, as configured in a file or for one topic.
 
     Messages are forwarded unchanged if both back ends use the same encoding, else they are converted.
-    Forwarded messages are not sent back. Once a second a table shows what was forwarded, lost and dropped
+    Forwarded messages aren't sent back. Once a second a table shows what was forwarded, lost and dropped
     because of a rate limit. Topics that move a robot are forwarded only with --allow-moving. If a network is
     down, the bridge waits for it.
     """
@@ -137,7 +137,7 @@ def _configuration(what: Sequence[str], direction: str, rate_hz: float | None) -
     if len(what) == 2:
         if rate_hz is not None and not 1e-6 <= rate_hz <= 1e6:
             raise typer.BadParameter(
-                _("{given:g} is not a valid rate; use messages per second, such as 10").format(given=rate_hz),
+                _("{given:g} isn't a valid rate; use messages per second, such as 10").format(given=rate_hz),
                 param_hint="--rate",
             )
         way = parse_direction(direction)

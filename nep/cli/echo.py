@@ -73,7 +73,7 @@ FilterOption = Annotated[
     ),
 ]
 FullOption = Annotated[
-    bool, typer.Option("--full", help=_("Print long lists and texts in full, on a terminal too."))
+    bool, typer.Option("--full", help=_("Print long lists and strings in full, even on a terminal."))
 ]
 
 

@@ -69,7 +69,7 @@ def hz(
     """Print the rate of topics and the intervals between their messages, once a second until Ctrl+C.
 
     Intervals are measured with the publishers' time stamps; programs of the original NEP send none, so
-    arrival times are used. Latched messages from before the start are not counted.
+    arrival times are used. Latched messages from before the start aren't counted.
     """
     heads = (lazy("rate"), lazy("shortest"), lazy("longest"), lazy("std dev"), lazy("messages"), lazy("lost"))
     _Report(topics, window_s, heads, _frequency_cells).run(count, timeout_s, master, backend, as_json=as_json)

@@ -55,15 +55,15 @@ def text_of(data: bytes, file: str) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        message = _("byte {start} of '{text}' is not valid UTF-8; save the file as UTF-8")
+        message = _("byte {start} of '{text}' isn't valid UTF-8; save the file as UTF-8")
         raise NepError(message.format(start=error.start + 1, text=escaped(file))) from error
 
 
 def _invalid_json_message(fault: JsonFault, shown: str, first_line: int, *, other_types: bool) -> str:
-    message = _("'{text}' is not valid JSON: line {line}, column {column}: {reason}")
+    message = _("'{text}' isn't valid JSON: line {line}, column {column}: {reason}")
     if fault.is_nan and other_types:
         message = _(
-            "'{text}' is not valid JSON: line {line}, column {column}: {reason}, or use --type msgpack"
+            "'{text}' isn't valid JSON: line {line}, column {column}: {reason}, or use --type msgpack"
         )
     line = fault.line + first_line - 1
     return message.format(text=shown, line=line, column=fault.column, reason=fault.reason)
@@ -72,10 +72,10 @@ def _invalid_json_message(fault: JsonFault, shown: str, first_line: int, *, othe
 def _not_json_message(text: str, *, other_types: bool) -> str:
     example = text if len(text) <= _MAX_SHOWN_CHARACTERS else _("some text")
     quoted = _shell_quoted(json.dumps(example, ensure_ascii=bool(first_control(example))))
-    message = _("'{text}' is not valid JSON; put strings in quotes, such as {quoted}")
+    message = _("'{text}' isn't valid JSON; put strings in quotes, such as {quoted}")
     if other_types:
         message = _(
-            "'{text}' is not valid JSON; put strings in quotes, such as {quoted}, or use --type string"
+            "'{text}' isn't valid JSON; put strings in quotes, such as {quoted}, or use --type string"
         )
     return message.format(text=_excerpt(text), quoted=quoted)
 

@@ -88,8 +88,8 @@ def master(
             if problem:
                 print_status(
                     _(
-                        "but programs on this computer can't reach it: {problem}; run 'nep "
-                        "doctor' for details"
+                        "programs on this computer can't reach the master: {problem}; run 'nep doctor' "
+                        "for details"
                     ).format(problem=problem),
                     terminal,
                 )

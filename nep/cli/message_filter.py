@@ -38,13 +38,13 @@ class MessageFilter:
     def __init__(self, text: str) -> None:
         # Raises `NepError` naming the part that is not supported.
         if len(text) > _MAX_LENGTH:
-            raise NepError(_("a filter has at most {count} characters").format(count=_MAX_LENGTH))
+            raise NepError(_("a filter can have at most {count} characters").format(count=_MAX_LENGTH))
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # Python's SyntaxWarnings about odd comparisons
                 tree = parse_expression(text.strip())
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-            message = _("'{text}' is not a valid filter; use a condition such as '{example}'")
+            message = _("'{text}' isn't a valid filter; use a condition such as '{example}'")
             raise NepError(message.format(text=quotable(text), example=_EXAMPLE)) from error
         try:
             self._term = _condition(tree.body)

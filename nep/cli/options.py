@@ -25,8 +25,8 @@ AllowMovingOption = Annotated[
         "--allow-moving",
         metavar=_("ROBOT"),
         help=_(
-            "Allow this robot, virtual or real, to be moved; can be repeated. A topic allows all "
-            "robots that it moves. Make sure that nobody is in the way."
+            "Allow this robot, virtual or real, to be moved; can be repeated. The name of a topic "
+            "allows all robots that it moves. Make sure that nobody is in the way."
         ),
         show_default=False,
     ),
@@ -38,7 +38,7 @@ def check_duration(given: float | None) -> float | None:
     """Validate a duration in seconds, which must not be negative; raise `typer.BadParameter` otherwise."""
     if given is not None and not given >= 0.0:  # rejects NaN, too
         raise typer.BadParameter(
-            _("{given:g} is not a valid duration; use a number of seconds, 0 or greater").format(given=given)
+            _("{given:g} isn't a valid duration; use a number of seconds, 0 or greater").format(given=given)
         )
     return given
 

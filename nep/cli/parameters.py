@@ -166,11 +166,11 @@ def load(
     ],
     master: MasterOption = None,
 ) -> None:
-    """Set the parameters in a file: all of them, or none if one is rejected."""
+    """Set parameters from a file. If one is rejected, none is changed."""
     shown = escaped(str(file))
     values = parse_json(text_of(read_file(file, "json"), str(file)), file=str(file))
     if not isinstance(values, dict):
-        raise NepError(_("'{file}' is not a JSON object of names and values").format(file=shown))
+        raise NepError(_("'{file}' isn't a JSON object of names and values").format(file=shown))
     with _parameters(node, master) as parameters:
         parameters.set_all(values)
 

@@ -199,9 +199,9 @@ def _remapped_names(chosen: Sequence[str], remap: Sequence[str]) -> dict[str, st
         old, separator, new = each.partition("=")
         if not separator or not new or old not in chosen:
             raise typer.BadParameter(
-                _(
-                    "'{word}' is not a valid remapping; use --remap OLD=NEW with a topic that is played"
-                ).format(word=each)
+                _("'{word}' isn't a valid remapping; use --remap OLD=NEW with a topic that is played").format(
+                    word=each
+                )
             )
         names[old] = check_topic(new)
     return names

@@ -43,8 +43,8 @@ _PayloadArgument = Annotated[
     typer.Argument(
         metavar=_("MESSAGE"),
         help=_(
-            "Message as JSON, or as plain text for the type string. @FILE reads it from a file, - publishes "
-            "each line of the standard input."
+            "Message as JSON, or as plain text for the type string. @FILE reads it from a file, - "
+            "publishes each line of standard input."
         ),
         show_default=False,
     ),
@@ -201,7 +201,7 @@ def parse_payload(text: str, msg_type: str, first_line: int = 1) -> object:
     if msg_type == "bytes":
         return _encode_argument(text)
     if msg_type in _BYTE_TYPES:
-        raise EncodeError(msg_type, "str", _("specify a JPEG or PNG file, such as @picture.jpg"))
+        raise EncodeError(msg_type, "str", _("specify a JPEG or PNG file, such as @image.jpg"))
     allow_nan = codec_for(msg_type).name == "msgpack"
     return parse_json(text, file=file, first_line=first_line, allow_nan=allow_nan, other_types=True)
 
@@ -211,7 +211,7 @@ def _encode_argument(text: str) -> bytes:
     try:
         return text.encode("utf-8", "surrogateescape")
     except UnicodeEncodeError as error:
-        raise EncodeError("bytes", "str", _("it contains half of a surrogate pair")) from error
+        raise EncodeError("bytes", "str", _("the text contains an unpaired surrogate")) from error
 
 
 def read_file(file: Path, msg_type: str) -> bytes:
@@ -226,13 +226,13 @@ def read_file(file: Path, msg_type: str) -> bytes:
         ) from error
     except ValueError as error:  # characters that this system doesn't allow in file names
         raise EncodeError(
-            msg_type, "file", _("'{file}' is not a valid file name").format(file=shown)
+            msg_type, "file", _("'{file}' isn't a valid file name").format(file=shown)
         ) from error
     if len(data) > _MAX_FILE_BYTES:
         raise EncodeError(
             msg_type,
             "file",
-            _("'{file}' is larger than {most}, the limit of a message").format(
+            _("'{file}' is larger than {most}, the maximum message size").format(
                 file=shown, most=size(_MAX_FILE_BYTES)
             ),
         )
@@ -249,8 +249,7 @@ def _publish_lines(publisher: Publisher, msg_type: str) -> None:
             text = data.decode()
         except UnicodeDecodeError as error:
             template = _(
-                "byte {byte} of line {line} is not valid UTF-8; convert the text to UTF-8, or use "
-                "--type bytes"
+                "byte {byte} of line {line} isn't valid UTF-8; convert the text to UTF-8, or use --type bytes"
             )
             raise NepError(template.format(byte=error.start + 1, line=number)) from error
         publisher.publish(encode_payload(text, msg_type, number))
@@ -264,7 +263,7 @@ def _stdin_lines() -> Iterator[bytes]:
             yield from sys.stdin.buffer
     except OSError as error:
         why = _("it is closed") if error.errno == errno.EBADF else (error.strerror or str(error)).lower()
-        raise NepError(_("can't read the standard input: {why}").format(why=why)) from error
+        raise NepError(_("can't read standard input: {why}").format(why=why)) from error
 
 
 def repeat(

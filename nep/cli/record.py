@@ -93,7 +93,7 @@ def record(
     """
     if duration_s is not None and not 0.0 < duration_s < 1e9:
         raise typer.BadParameter(
-            _("{given:g} is not a valid duration; use a number of seconds, 0 or greater").format(
+            _("{given:g} isn't a valid duration; use a number of seconds, 0 or greater").format(
                 given=duration_s
             ),
             param_hint="--duration",
@@ -151,7 +151,7 @@ def _max_bytes(text: str | None, *, split: bool) -> int | None:
     size_bytes = round(float(found[1].replace(",", ".")) * _UNIT_BYTES[found[2].lower()]) if found else 0
     if not splits.MIN_PART_BYTES <= size_bytes < 2**63:
         raise typer.BadParameter(
-            _("'{given}' is not a valid size; use 100kB or more, such as 500MB or 2GB").format(
+            _("'{given}' isn't a valid size; use 100kB or more, such as 500MB or 2GB").format(
                 given=quotable(text)
             ),
             param_hint="--max-size",

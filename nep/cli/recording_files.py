@@ -158,9 +158,7 @@ def parse_time_ns(text: str, start_ns: int, end_ns: int) -> int:
         return _parse_clock_time_ns(words, start_ns, end_ns)
     if not 0.0 <= seconds < 1e9:
         raise typer.BadParameter(
-            _("{given:g} is not a valid duration; use a number of seconds, 0 or greater").format(
-                given=seconds
-            )
+            _("{given:g} isn't a valid duration; use a number of seconds, 0 or greater").format(given=seconds)
         )
     return start_ns + int(seconds * 1e9)
 
@@ -177,9 +175,9 @@ def _parse_clock_time_ns(words: str, start_ns: int, end_ns: int) -> int:
         later = _to_unix_ns(datetime.combine(began.date() + timedelta(days=1), given))
     except (ValueError, OverflowError, OSError) as error:
         raise typer.BadParameter(
-            _(
-                "'{given}' is not a valid time; use seconds after the start, or a time such as 15:04:05"
-            ).format(given=quotable(words))
+            _("'{given}' isn't a valid time; use seconds after the start, or a time such as 15:04:05").format(
+                given=quotable(words)
+            )
         ) from error
     return later if found < start_ns and later <= end_ns else found
 

@@ -49,7 +49,7 @@ _ATTACHMENT_COLUMNS = (
 def info(
     file: FileArgument,
     check_all: Annotated[
-        bool, typer.Option("--check", help=_("Check the whole file for damage, however large it is."))
+        bool, typer.Option("--check", help=_("Check the whole file for damage, regardless of its size."))
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -90,7 +90,7 @@ def _show(recording: reader.Recording, topic_figures: Mapping[str, figures.Topic
         write(f"{escaped(recording.recorder_metadata['note'])}\n")
     if recording.recorder_metadata.get("part"):
         part = quotable(recording.recorder_metadata["part"])
-        write(_("file {number} of a recording that was split").format(number=part) + "\n")
+        write(_("file {number} of a split recording").format(number=part) + "\n")
     write(f"{_writer_text(recording.facts)}\n")
     topics = list(islice(recording.topics.values(), _MAX_ROWS))
     show_table(_COLUMNS, [_row(recording, each, topic_figures.get(each.name)) for each in topics])

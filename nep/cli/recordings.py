@@ -64,7 +64,7 @@ def repair(
 ) -> None:
     """Copy the readable messages of a truncated or damaged recording to a new file and verify it.
 
-    The damaged file is not changed.
+    The damaged file isn't changed.
     """
     with progress_bar(_("repairing")) as progress:
         report = repairs.repair(file, output, progress)

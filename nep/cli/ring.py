@@ -66,7 +66,7 @@ class _Saver:
         wanted = self._seconds if seconds is None else seconds
         if not 0.0 < wanted < 1e9:
             raise NepError(
-                _("{given:g} is not a valid duration; use a number of seconds greater than 0").format(
+                _("{given:g} isn't a valid duration; use a number of seconds greater than 0").format(
                     given=wanted
                 )
             )
@@ -121,8 +121,8 @@ def ring(
 ) -> None:
     """Run a flight recorder: buffer the last seconds of messages until Ctrl+C.
 
-    'nep recording keep', a call of the service flight_recorder/keep (for example by an alarm) or the signal
-    USR1 saves them as a recording, while buffering continues.
+    'nep recording keep', a call to the service flight_recorder/keep (for example by an alarm) or the signal
+    SIGUSR1 saves them as a recording, while buffering continues.
     """
     for given, least, most, hint in ((seconds, 0.1, 1e6, "--seconds"), (size_gb, 0.001, 1e6, "--size")):
         if not least <= given <= most:
@@ -227,7 +227,7 @@ def keep(
         request_body["seconds"] = seconds
     with open_command_node("keep", master) as node:
         if not has_flight_recorder(node.graph(), f"{name}/keep"):
-            raise NepError(_("nothing to save: 'nep recording ring' is not running"))
+            raise NepError(_("nothing to save: 'nep recording ring' isn't running"))
         answer = node.new_client(f"{name}/keep", timeout_s=SAVE_TIMEOUT_S).call(request_body)
     result = answer if isinstance(answer, dict) else {}
     if as_json:

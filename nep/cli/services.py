@@ -118,7 +118,7 @@ def find(
         str,
         typer.Argument(
             metavar=_("TYPE"),
-            help=_("Type to find."),
+            help=_("Type to search for."),
             show_default=False,
             autocompletion=complete_service_type,
         ),

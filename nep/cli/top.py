@@ -110,7 +110,7 @@ def top(
     """Show a live table of all topics and nodes, updated every second until Ctrl+C.
 
     The values are those that publishers and subscribers report to the master; no topic is subscribed to.
-    In a file or pipe the tables follow one another. If the master goes down, the command waits for it.
+    Files and pipes get one table after another. If the master goes down, the command waits for it.
     """
     graph = view(master)  # fail at once: the address may be wrong
     shown = _GraphPrinter(pattern, order)

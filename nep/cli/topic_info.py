@@ -42,7 +42,7 @@ TopicArgument = Annotated[
 TypeArgument = Annotated[
     str,
     typer.Argument(
-        metavar=_("TYPE"), help=_("Type to find."), show_default=False, autocompletion=complete_type
+        metavar=_("TYPE"), help=_("Type to search for."), show_default=False, autocompletion=complete_type
     ),
 ]
 _COLUMNS = (

@@ -56,7 +56,7 @@ class TopicMonitor:
                     name for name, other in graph.topics.items() if name != topic and other.publishers
                 ]
                 if topic in self._published_before:
-                    template = _("'{topic}' has no publisher any more; {meant}waiting (Ctrl+C to stop)")
+                    template = _("'{topic}' no longer has a publisher; {meant}waiting (Ctrl+C to stop)")
                 else:
                     template = _("'{topic}' has no publisher yet; {meant}waiting (Ctrl+C to stop)")
                 print_status(template.format(topic=topic, meant=suggestion(topic, other_topics)))

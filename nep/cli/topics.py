@@ -31,7 +31,7 @@ from nep.text import escaped
 app: typer.Typer = typer.Typer(
     cls=TranslatedGroup,
     no_args_is_help=True,
-    help=_("List, print, measure and publish topics."),
+    help=_("List topics, print or measure their messages, and publish to them."),
 )
 app.command("echo")(echo)
 app.command("pub")(publish)

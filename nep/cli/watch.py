@@ -280,7 +280,7 @@ class _AlarmRunner:
             near = nearest(condition.name, known)
             meant = "" if near is None else " " + _("did you mean '{near}'?").format(near=near)
             print_status(
-                _("'{name}' does not exist yet; waiting.{meant}").format(name=condition.name, meant=meant)
+                _("'{name}' doesn't exist yet; waiting.{meant}").format(name=condition.name, meant=meant)
             )
 
     # ---- actions
@@ -294,7 +294,7 @@ class _AlarmRunner:
 
     def _save_ring(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         if self._view is None or not has_flight_recorder(self._view):
-            done(False, _("nothing saved: 'nep recording ring' is not running"))
+            done(False, _("nothing saved: 'nep recording ring' isn't running"))
             return
         asked = {"seconds": action.seconds, "note": event_text(event.rule.condition, event.value)}
         try:

@@ -37,8 +37,8 @@ ListenOption = Annotated[
         "--listen",
         metavar=_("ADDRESS"),
         help=_(
-            "Accept connections of other computers on this address of this computer, or on all with 0.0.0.0. "
-            "They need the token."
+            "Accept connections from other computers at this address of this computer; 0.0.0.0 means "
+            "all. They need the token."
         ),
         show_default=False,
     ),

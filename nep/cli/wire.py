@@ -52,8 +52,8 @@ def check(
 ) -> None:
     """Check a client library against the rules of the native wire.
 
-    COMMAND starts an adapter: a small program that carries out requests from its standard input with the
-    client library. NEP_MASTER has the address of the tester's master. See docs/wire-check.md.
+    COMMAND starts an adapter: a small program that reads requests from standard input and executes them with
+    the client library. NEP_MASTER contains the address of the tester's master. See docs/wire-check.md.
 
     Exits with 0 if no rule failed, 1 if a rule failed, and 2 if the adapter can't be started.
     """

@@ -256,7 +256,7 @@ class Graph:
 
     def _authorize_node(self, node: NodeRecord, sender: str, out: list[Outgoing]) -> None:
         if node.key and not is_proven(node):
-            reason = _("the node id '{id}' does not match the node's key").format(id=node.id)
+            reason = _("the node id '{id}' doesn't match the node's key").format(id=node.id)
             raise WireError(reason, code="node-key")
         if not node.key and sender != node.id:
             raise WireError(
@@ -281,7 +281,7 @@ class Graph:
     ) -> None:
         if record.number and not is_proven(node, record):
             raise WireError(
-                _("the id {id} does not match the node's key and the number {number}").format(
+                _("the id {id} doesn't match the node's key and the number {number}").format(
                     id=record.id, number=record.number
                 ),
                 code="record-key",

@@ -29,14 +29,14 @@ def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[
             address = ipaddress.IPv4Address(host)
         except ValueError:
             raise NepError(
-                _("'{host}' is not an IPv4 address; use an address such as '192.168.1.20'").format(host=host)
+                _("'{host}' isn't an IPv4 address; use an address such as '192.168.1.20'").format(host=host)
             ) from None
         if host != ANY_HOST and host not in known and not address.is_loopback:
             others = ", ".join(sorted(known)) or _(
                 "none that other computers can reach; connect to a network first"
             )
             raise NepError(
-                _("'{host}' is not an address of this computer; its addresses: {others}").format(
+                _("'{host}' isn't an address of this computer; its addresses: {others}").format(
                     host=host, others=others
                 )
             )

@@ -80,7 +80,7 @@ def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
     reply = _request(QueryGraph(), chosen, timeout_s)
     if not isinstance(reply, GraphReply):
         raise RequestRefusedError(
-            _("the master at '{chosen}' did not reply with its graph").format(chosen=chosen)
+            _("the master at '{chosen}' didn't reply with its graph").format(chosen=chosen)
         )
     return reply.view
 

@@ -549,7 +549,7 @@ def check_record(record: PublisherRecord | SubscriberRecord) -> None:
 def _check_node(node: NodeRecord) -> None:
     if not _NODE_ID.fullmatch(node.id):
         raise WireError(
-            _("'{id}' is not a node id; node ids have 16 hexadecimal digits").format(
+            _("'{id}' isn't a node id; node ids have 16 hexadecimal digits").format(
                 id=shortened(node.id, 40)
             ),
             code="node-id",
@@ -564,9 +564,9 @@ def _check_node(node: NodeRecord) -> None:
     _check_text("key", node.key, 200)
     _check_text("computer", node.computer, 64)
     if node.pid is not None and not 0 <= node.pid <= _PID_MAX:
-        raise WireError(_("{pid} is not a process id").format(pid=node.pid), code="pid")
+        raise WireError(_("{pid} isn't a process id").format(pid=node.pid), code="pid")
     if not 0 <= node.since_ns <= COUNT_MAX:
-        reason = _("{since_ns} is not a valid start time of a node").format(since_ns=node.since_ns)
+        reason = _("{since_ns} isn't a valid start time of a node").format(since_ns=node.since_ns)
         raise WireError(reason, code="since")
 
 
@@ -574,7 +574,7 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
     check_record(record)
     if not 1 <= record.id <= COUNT_MAX:
         raise WireError(
-            _("{id} is not the id of a publisher or subscriber; it must be from 1 to 2^63-1").format(
+            _("{id} isn't the id of a publisher or subscriber; it must be from 1 to 2^63-1").format(
                 id=record.id
             ),
             code="record-id",
@@ -593,7 +593,7 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
             if not is_tcp_endpoint(endpoint) and not is_nanomsg_endpoint(endpoint):
                 shown_endpoint = escaped(shortened(endpoint, 80))
                 raise WireError(
-                    _("'{said}' is not a publisher endpoint; it must have the form 'tcp://HOST:PORT'").format(
+                    _("'{said}' isn't a publisher endpoint; it must have the form 'tcp://HOST:PORT'").format(
                         said=shown_endpoint
                     ),
                     code="endpoint",
@@ -604,12 +604,12 @@ def _check_text(what: str, word: str, most: int) -> None:
     control = first_control(word)
     if len(word) > most or control:
         hint = (
-            _("the character '{control}' is not allowed").format(control=control)
+            _("the character '{control}' isn't allowed").format(control=control)
             if control
             else _("use at most {most} characters").format(most=most)
         )
         raise WireError(
-            _("'{word}' is not a valid {what}; {hint}").format(
+            _("'{word}' isn't a valid {what}; {hint}").format(
                 word=escaped(shortened(word, 40)), what=what, hint=hint
             ),
             code="text",

@@ -268,7 +268,7 @@ def _name_alerts(registry: Registry) -> Iterator[Alert]:
             yield Alert(
                 f"name:{name}",
                 _("{count} programs are named “{name}”").format(count=count, name=name),
-                _("Give each program a different name. All of them keep working."),
+                _("Use a different name for each program. Until then, all of them keep working."),
             )
 
 
@@ -277,7 +277,7 @@ def _missing_alerts(registry: Registry) -> Iterator[Alert]:
         if member.hung_for:
             yield Alert(
                 f"missing:{member.node.id}",
-                _("“{node}” does not respond to {others}").format(
+                _("“{node}” doesn't respond to {others}").format(
                     node=member.node.name, others=_names(_names_of(registry, member.hung_for))
                 ),
                 _("It may be busy or stopped in a debugger. Messages published in the meantime may be lost."),
@@ -309,10 +309,10 @@ def _topic_alerts(
         if publisher.problem:
             yield Alert(
                 f"encode:{topic}",
-                _("“{node}” can't send on “{topic}”: {problem}").format(
+                _("“{node}” can't publish on “{topic}”: {problem}").format(
                     node=member.node.name, topic=topic, problem=publisher.problem
                 ),
-                _("Fix the program: its messages are not being sent."),
+                _("Fix the program: its messages aren't being sent."),
             )
             break
     for member, subscriber in subscribing:

@@ -120,7 +120,7 @@ def _encode_json(payload: object) -> Encoded:
     except (TypeError, RecursionError) as error:
         # orjson's own limit is 254 levels
         is_deep = isinstance(error, RecursionError) or "Recursion limit" in str(error)
-        reason = too_deep_reason() if is_deep else str(error.__cause__ or error) or _("it can't be encoded")
+        reason = too_deep_reason() if is_deep else str(error.__cause__ or error) or _("unsupported value")
         raise EncodeError("json", type(payload).__name__, reason) from error
     if json_is_too_deep(data):
         raise EncodeError("json", type(payload).__name__, too_deep_reason())
@@ -169,7 +169,7 @@ def _encode_string(payload: object) -> Encoded:
     try:
         return Encoded(text.encode("utf-8"))
     except UnicodeEncodeError as error:
-        raise EncodeError("string", "str", _("it contains an unpaired surrogate")) from error
+        raise EncodeError("string", "str", _("the text contains an unpaired surrogate")) from error
 
 
 def _decode_string(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
@@ -177,7 +177,7 @@ def _decode_string(data: bytes | memoryview, _extension: Mapping[str, object]) -
         return str(data, "utf-8")
     except UnicodeDecodeError as error:
         raise DecodeError(
-            "string", len(data), _("byte {start} is not valid UTF-8").format(start=error.start)
+            "string", len(data), _("byte {start} isn't valid UTF-8").format(start=error.start)
         ) from error
 
 

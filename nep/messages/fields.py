@@ -29,8 +29,9 @@ def parse_path(text: str) -> Path:
         if found is None or (text[at] != "." and text[at] != "[" and at > 0):
             raise NepError(
                 _(
-                    "'{text}' is not a valid field path; use a path such as 'pose.x' or 'joints[3]', or '.' "
-                    "for the whole value"
+                    "'{text}' isn't a valid field path; use a path such as 'pose.x' or 'joints[3]', or "
+                    "'.' for "
+                    "the whole value"
                 ).format(text=quotable(text))
             )
         index, quoted, plain = found.groups()

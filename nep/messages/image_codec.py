@@ -247,11 +247,11 @@ def _validate(payload: object) -> NDArray[Any]:
         raise EncodeError(
             "image",
             kind,
-            _("its elements are '{dtype}'; use {types}").format(dtype=payload.dtype, types=_(_DTYPE_NAMES)),
+            _("the elements are '{dtype}'; use {types}").format(dtype=payload.dtype, types=_(_DTYPE_NAMES)),
         )
     is_picture = payload.ndim == 2 or (payload.ndim == 3 and 1 <= payload.shape[2] <= 4)
     if not is_picture or 0 in payload.shape:
-        reason = _("{shape} is not a valid image shape; use (height, width, 3)").format(shape=payload.shape)
+        reason = _("{shape} isn't a valid image shape; use (height, width, 3)").format(shape=payload.shape)
         raise EncodeError("image", kind, reason)
     frame: NDArray[Any] = payload
     try:
@@ -347,13 +347,13 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
     if len(sides) < 2 or not all(type(side) is int for side in sides):
         raise DecodeError(
-            "image", data.nbytes, _("'{shape}' is not a valid image shape").format(shape=str(shape)[:60])
+            "image", data.nbytes, _("'{shape}' isn't a valid image shape").format(shape=str(shape)[:60])
         )
     height, width = sides
     pixel_bytes = layout.channels * numbers.itemsize
     if min(height, width) < 1 or height * width * pixel_bytes != data.nbytes:
         reason = _(
-            "the data size does not match an image of {width} x {height} pixels with {pixel_bytes} bytes each"
+            "the data size doesn't match an image of {width} x {height} pixels with {pixel_bytes} bytes each"
         ).format(width=width, height=height, pixel_bytes=pixel_bytes)
         raise DecodeError("image", data.nbytes, reason)
     check_size(width, height, pixel_bytes, data.nbytes)

@@ -96,9 +96,9 @@ def parse_header(data: bytes | memoryview) -> ImageFile:
     for start, name in _UNSUPPORTED_FORMATS.items():
         if head.startswith(start):
             raise DecodeError(
-                "image", size, _("it is a {name} file, but only JPEG and PNG are supported").format(name=name)
+                "image", size, _("{name} files aren't supported; use JPEG or PNG").format(name=name)
             )
-    raise DecodeError("image", size, _("it is neither a JPEG nor a PNG image"))
+    raise DecodeError("image", size, _("not a JPEG or PNG image"))
 
 
 def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> None:
@@ -163,53 +163,53 @@ class _Jpeg(_Reader):
                 continue
             length = self.number(at, 2)
             if length < 2 or at + length > self.size:
-                raise self.error(_("it is truncated"))
+                raise self.error(_("the data is truncated"))
             if marker in _FRAME_MARKERS:
                 if frame is not None:
-                    raise self.error(_("it has two header chunks"))
+                    raise self.error(_("two header chunks"))
                 frame = self._read_frame(marker, at, length)
             elif marker == _SCAN:
                 if frame is None:
-                    raise self.error(_("its pixels come before the frame header"))
+                    raise self.error(_("pixels before the frame header"))
                 return self._check_frame(frame, orientation, at)
             elif marker == _APP1:
                 orientation = _orientation(self.data[at + 2 : at + length]) or orientation
             elif marker not in _TABLE_MARKERS:
-                raise self.error(
-                    _("it has the unknown marker 'ff{marker}'").format(marker=number(marker, "02x"))
-                )
+                raise self.error(_("unknown marker 'ff{marker}'").format(marker=number(marker, "02x")))
             at += length
-        raise self.error(_("it has too many segments"))
+        raise self.error(_("too many segments"))
 
     def _read_marker(self, at: int) -> tuple[int, int]:
         if self.number(at, 1) != 0xFF:
             reason = (
-                _("it is truncated")
+                _("the data is truncated")
                 if at >= self.size
-                else _("a segment does not follow directly after the previous one")
+                else _("a segment doesn't follow directly after the previous one")
             )
             raise self.error(reason)
         found = _FILL_BYTES.match(self.data, at)
         at = found.end() if found is not None else at
         if at >= self.size:
-            raise self.error(_("it is truncated"))
+            raise self.error(_("the data is truncated"))
         return self.data[at], at + 1
 
     def _read_frame(self, marker: int, at: int, length: int) -> _Frame:
         bits, height, width = self.number(at + 2, 1), self.number(at + 3, 2), self.number(at + 5, 2)
         components = self.number(at + 7, 1)
         if length != 8 + 3 * components or components not in (1, 3, 4):
-            raise self.error(_("it has {components} colour components").format(components=components))
+            raise self.error(
+                _("invalid number of colour components: {components}").format(components=components)
+            )
         if bits != 8:
             raise DecodeError(
                 "image",
                 self.size,
-                _("JPEG images with {bits} bits per channel are not supported; use PNG").format(bits=bits),
+                _("JPEG images with {bits} bits per channel aren't supported; use PNG").format(bits=bits),
             )
         sampling = [self.number(at + 9 + 3 * each, 1) for each in range(components)]
         factors = [(each >> 4, each & 15) for each in sampling]
         if not all(1 <= across <= 4 and 1 <= down <= 4 for across, down in factors):
-            raise self.error(_("its colour components have invalid sampling factors"))
+            raise self.error(_("invalid sampling factors of the colour components"))
         return _Frame(width, height, components, _FRAME_MARKERS[marker], factors)
 
     def _check_frame(self, frame: _Frame, orientation: int, at: int) -> ImageFile:
@@ -267,7 +267,7 @@ class _Png(_Reader):
         depth, colour = self.data[24], self.data[25]
         if depth not in _PNG_DEPTHS.get(colour, ()):
             raise self.error(
-                _("colour type {colour} does not allow {depth} bits").format(colour=colour, depth=depth)
+                _("colour type {colour} doesn't allow {depth} bits").format(colour=colour, depth=depth)
             )
         needed, kinds, orientation = self._read_chunks()
         channels = 4 if b"tRNS" in kinds and colour in (2, 3) else _PNG_CHANNELS[colour]
@@ -290,10 +290,10 @@ class _Png(_Reader):
         for _piece in range(MAX_SEGMENTS):
             kind, end = bytes(self.data[at + 4 : at + 8]), at + 12 + self.number(at, 4)
             if kind == b"IHDR" and kind in kinds:
-                raise self.error(_("it has two header chunks"))
+                raise self.error(_("two header chunks"))
             if kind in _REQUIRED_CHUNKS:
                 if end > self.size:  # OpenCV allocates the declared size, up to 4 GB, before it checks
-                    raise self.error(_("it is truncated"))
+                    raise self.error(_("the data is truncated"))
                 kinds.add(kind)
                 if needed and needed[-1][1] == at:
                     needed[-1] = needed[-1][0], end
@@ -307,7 +307,7 @@ class _Png(_Reader):
             at = end
             if kind == b"IEND" or at + 8 > self.size:
                 return needed, kinds, orientation
-        raise self.error(_("it has too many chunks"))
+        raise self.error(_("too many chunks"))
 
 
 _MAX_EXIF_BYTES = 4096

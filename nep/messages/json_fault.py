@@ -93,7 +93,7 @@ def _orjson_fault(text: str) -> JsonFault | None:
             return JsonFault(1, 1, _("too many nested levels"))
         if "infinity" in error.msg:
             return JsonFault(1, 1, _("a number is too large"))
-        return _fault_at(text, error.pos, _("an unpaired surrogate is not a character"))
+        return _fault_at(text, error.pos, _("an unpaired surrogate isn't a character"))
     return None
 
 
@@ -116,7 +116,7 @@ def _constant_fault(text: str) -> JsonFault:
     found = next(each for each in _STRING_OR_CONSTANT.finditer(text) if each["constant"] is not None)
     fix = JsonFix(found.start(), found.end(), "null")
     return _fault_at(
-        text, found.start(), _("{word} is not JSON; use null").format(word=found[0]), fix, is_nan=True
+        text, found.start(), _("{word} isn't JSON; use null").format(word=found[0]), fix, is_nan=True
     )
 
 
@@ -168,9 +168,9 @@ def _trailing_comma(text: str, position: int) -> JsonFault:
 def _missing_comma(text: str, position: int, end: int) -> JsonFault:
     sign = text[position]
     if sign in {"}", "]"}:
-        return _fault_at(text, position, _("{sign} does not match the opening bracket").format(sign=sign))
+        return _fault_at(text, position, _("{sign} doesn't match the opening bracket").format(sign=sign))
     if position == end and (sign.isalnum() or sign in "._"):
-        return _fault_at(text, position, _("JSON does not support this number"))
+        return _fault_at(text, position, _("JSON doesn't support this number"))
     return _fault_at(text, end, _("a comma is missing between two values"), JsonFix(end, end, ","))
 
 

@@ -28,7 +28,7 @@ _STRING_LITERAL = re.compile(rb'"[^"]*"')
 
 def too_deep_reason() -> str:
     """Return the reason, in the current language, for rejecting a payload with too many levels."""
-    return _("it has more than {levels} levels of lists and maps").format(levels=MAX_LEVELS)
+    return _("the value has more than {levels} levels of lists and maps").format(levels=MAX_LEVELS)
 
 
 def json_is_too_deep(data: bytes | memoryview) -> bool:

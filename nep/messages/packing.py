@@ -24,7 +24,7 @@ def pack(value: object, default: Callable[[object], object] | None = None) -> by
     try:
         packed: bytes = msgpack.packb(value, use_bin_type=True, default=default, datetime=True)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise ValueError(str(error) or _("it can't be encoded")) from error
+        raise ValueError(str(error) or _("unsupported value")) from error
     return packed
 
 
@@ -98,7 +98,9 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
         nonlocal left
         left -= 1
         if left < 0:
-            raise ValueError(_("it has more than {most_lists} lists and maps").format(most_lists=most_lists))
+            raise ValueError(
+                _("the value has more than {most_lists} lists and maps").format(most_lists=most_lists)
+            )
         return value
 
     try:

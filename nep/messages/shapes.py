@@ -46,7 +46,7 @@ class ShapeMismatch(Exception):  # noqa: N818 - internal
     @property
     def message(self) -> str:
         """Path and reason as a sentence."""
-        place = self.path or _("it")
+        place = self.path or _("the value")
         return f"{place} {self.reason}"
 
 
@@ -152,7 +152,7 @@ def _int_shape() -> ValueShape:
             raise wrong_type_error(value, shape.expected)
         if not _MIN_INT <= plain <= _MAX_INT:
             raise ShapeMismatch(
-                _("does not fit into 64 bits; expected {wanted}").format(wanted=shape.expected)
+                _("doesn't fit into 64 bits; expected {wanted}").format(wanted=shape.expected)
             )
         return int(plain)
 

@@ -143,7 +143,7 @@ def typed_codec(declared: MessageType, base: Codec) -> Codec:
         except ShapeMismatch as mismatch:
             place, reason = mismatch.path, mismatch.message
         except RecursionError:
-            place, reason = "", _("it contains itself, or has too many levels")
+            place, reason = "", _("the value contains itself, or has too many levels")
         raise EncodeError(declared.name, type(payload).__name__, reason, place)
 
     return replace(base, encode=encode, check=check)
@@ -188,7 +188,7 @@ class TypedReader:
             except ShapeMismatch as mismatch:
                 reason = mismatch.message
             except RecursionError:
-                reason = _("it has too many levels")
+                reason = _("the value has too many levels")
             raise DecodeError(name, memoryview(data).nbytes, reason)
 
         return decode_typed
@@ -354,7 +354,7 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
                 other_name = each.metadata.get(OTHER_NAME, each.name)
                 entries.append(_FieldEntry(each.name, other_name, field_shape, is_required))
         elif is_required:
-            raise ValueError(_("{where} is not sent; add a default value").format(where=where))
+            raise ValueError(_("{where} isn't sent; add a default value").format(where=where))
     _check_constructor(declared, {each.name for each in entries})
 
     def read(value: object) -> object:
@@ -381,8 +381,8 @@ def _check_constructor(declared: type, names: Collection[str]) -> None:
         if not is_open and (each.name not in names or each.kind is each.POSITIONAL_ONLY):
             raise ValueError(
                 _(
-                    "{where} is required by the constructor but is not a field of the message; "
-                    "add a default value"
+                    "{where} is required by the constructor but isn't a field of the message; add a "
+                    "default value"
                 ).format(where=f"{declared.__name__}.{each.name}")
             )
 
@@ -418,7 +418,7 @@ def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]
             for name, part in value.items():
                 if name not in shapes:
                     raise ShapeMismatch(
-                        _("is not a field of '{name}'; {did_you_mean}").format(
+                        _("isn't a field of '{name}'; {did_you_mean}").format(
                             name=declared.__name__, did_you_mean=did_you_mean(str(name), tuple(shapes))
                         )
                     )

@@ -21,7 +21,7 @@ def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | 
         return False
     if not backend.has_patterns:
         raise ValueError(
-            _("the back end '{name}' does not support wildcards; subscribe to each topic by its name").format(
+            _("the back end '{name}' doesn't support wildcards; subscribe to each topic by its name").format(
                 name=backend.name
             )
         )
@@ -37,10 +37,10 @@ def codec_with_image_format(codec: Codec, image: ImageFormat | None) -> Codec:
         return codec
     if not isinstance(image, ImageFormat):
         raise WrongTypeError(
-            _("image must be a 'nep.ImageFormat', not '{kind}'").format(kind=type(image).__name__)
+            _("'image' must be a 'nep.ImageFormat', not '{kind}'").format(kind=type(image).__name__)
         )
     if codec is not CODECS["image"]:
-        raise ValueError(_("image applies only to images; publish them as 'image'"))
+        raise ValueError(_("'image' requires the message type 'image'"))
     return replace(codec, encode=image.encode)
 
 
@@ -51,7 +51,7 @@ def check_history(backend: Backend, history: int, configuration: Configuration) 
     if history and (is_original or not backend.has_history):
         where = _("the original wire") if is_original else _("the back end '{name}'")
         raise ValueError(
-            _("{where} does not support history; omit history").format(where=where.format(name=backend.name))
+            _("{where} doesn't support history; omit history").format(where=where.format(name=backend.name))
         )
     return history
 
@@ -60,6 +60,6 @@ def check_quality(backend: Backend, qos: str) -> str:
     """Validate a quality of service and return it. Raises `ValueError`."""
     if qos and not backend.qos:
         raise ValueError(
-            _("the back end '{name}' does not support quality of service; omit qos").format(name=backend.name)
+            _("the back end '{name}' doesn't support quality of service; omit qos").format(name=backend.name)
         )
     return check_choice("qos", qos, ("", *backend.qos))

@@ -464,7 +464,7 @@ class Node(ServiceNode):
         if not isinstance(configuration, Hybrid | Direct):
             kind = type(configuration).__name__
             raise WrongTypeError(
-                _("configuration is a '{kind}'; create one with 'node.hybrid' or 'node.direct'").format(
+                _("'configuration' is a '{kind}'; create it with 'node.hybrid' or 'node.direct'").format(
                     kind=kind
                 )
             )

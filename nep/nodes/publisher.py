@@ -240,7 +240,7 @@ class Publisher:
             return
         codec, data, extension = self._spec.codec.name, payload.data, payload.extension
         if not isinstance(data, _BYTES_TYPES):
-            raise EncodeError(codec, type(data).__name__, _("its data must be 'bytes'"))
+            raise EncodeError(codec, type(data).__name__, _("the data must be 'bytes'"))
         if extension is not None and not isinstance(extension, Mapping):
             raise EncodeError(codec, type(extension).__name__, _("an extension must be a map"))
 

@@ -176,8 +176,8 @@ class Work:
         if self._coroutine:
             raise NepError(
                 _(
-                    "the callback of '{what}' is a coroutine function, which 'spin' cannot run; use "
-                    "'await node.spin_async()'"
+                    "the callback of '{what}' is a coroutine function, which 'spin' can't run; use 'await "
+                    "node.spin_async()'"
                 ).format(what=self._coroutine)
             )
         has_run = self._run_timers() if self.timers else False

@@ -231,10 +231,10 @@ def _envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str,
     try:
         value = unpack_it(body)
     except ValueError as error:
-        reason = _("the body is not valid msgpack: {error}").format(error=error)
+        reason = _("the body isn't valid msgpack: {error}").format(error=error)
         raise WireError(reason, len(body), code="msgpack") from error
     if not isinstance(value, dict):
-        raise WireError(_("the body is not a map"), len(body), code="map")
+        raise WireError(_("the body isn't a map"), len(body), code="map")
     return value
 
 

@@ -137,7 +137,7 @@ class _Native:
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
         kind, codec, limit_ms, number, data = _read_frame(parts)
         if kind != CallKind.CALL:
-            raise WireError(_("it is not a service call"), code="call-kind")
+            raise WireError(_("not a service call"), code="call-kind")
         return CallHeader(number, codec, limit_ms / 1000 if limit_ms else None, data)
 
     def reply(self, number: int, reply: Reply) -> list[bytes | memoryview]:
@@ -146,7 +146,7 @@ class _Native:
     def read_reply(self, parts: Sequence[bytes | memoryview]) -> ReceivedReply:
         kind, codec, _limit, number, data = _read_frame(parts)
         if kind not in {CallKind.ANSWER, CallKind.ERROR, CallKind.REFUSED}:
-            raise WireError(_("it is not a service reply"), code="call-kind")
+            raise WireError(_("not a service reply"), code="call-kind")
         return ReceivedReply(number, Reply(CallKind(kind), data, codec))
 
 
@@ -228,7 +228,7 @@ def read_error_reply(data: bytes | memoryview) -> tuple[str, str]:
     except ValueError:
         content = None
     if not isinstance(content, dict):
-        return "", _("the reason cannot be read")
+        return "", _("the reason can't be read")
     name, reason = content.get("nep_error", ""), content.get("reason", "")
     return escaped(bounded_str(name, _MAX_CLASS_LENGTH)), escaped(bounded_str(reason, _MAX_REASON_LENGTH))
 

@@ -126,18 +126,19 @@ def check_topic(topic: str) -> str:
     try:
         size = len(topic.encode("utf-8"))
     except UnicodeEncodeError:
-        raise BadTopicError(ascii(topic)[1:-1], _("it is not valid Unicode text")) from None
+        raise BadTopicError(ascii(topic)[1:-1], _("not valid Unicode text")) from None
     if not 1 <= size <= TOPIC_MAX_BYTES:
         raise BadTopicError(
-            topic, _("it has {size} bytes; 1 to {most} are allowed").format(size=size, most=TOPIC_MAX_BYTES)
+            topic,
+            _("the name is {size} bytes; 1 to {most} are allowed").format(size=size, most=TOPIC_MAX_BYTES),
         )
     for letter in topic:
         if letter.isspace() or letter == "{":
             raise BadTopicError(
-                topic, _("the character '{ascii}' is not allowed").format(ascii=ascii(letter)[1:-1])
+                topic, _("the character '{ascii}' isn't allowed").format(ascii=ascii(letter)[1:-1])
             )
     if control := first_control(topic):
-        raise BadTopicError(topic, _("the character '{control}' is not allowed").format(control=control))
+        raise BadTopicError(topic, _("the character '{control}' isn't allowed").format(control=control))
     return topic
 
 
@@ -149,12 +150,14 @@ def check_node_name(name: str) -> str:
     if not isinstance(name, str):
         raise BadNameError(str(name), _("a node name must be a 'str'"))
     if control := first_control(name):
-        raise BadNameError(name, _("the character '{control}' is not allowed").format(control=control))
+        raise BadNameError(name, _("the character '{control}' isn't allowed").format(control=control))
     size = len(name.encode("utf-8"))
     if not 1 <= size <= NODE_NAME_MAX_BYTES:
         raise BadNameError(
             name,
-            _("it has {size} bytes; 1 to {most} are allowed").format(size=size, most=NODE_NAME_MAX_BYTES),
+            _("the name is {size} bytes; 1 to {most} are allowed").format(
+                size=size, most=NODE_NAME_MAX_BYTES
+            ),
         )
     return name
 
@@ -287,7 +290,7 @@ def read_header(part: bytes) -> Header:
     version, codec, flags, size, seq, stamp_ns, publisher = _HEADER.unpack(part)
     if version != VERSION:
         raise WireError(
-            _("its version is {version}, but this nep reads version {own}; update nep").format(
+            _("the message has wire version {version}, but this nep reads version {own}; update nep").format(
                 version=version, own=VERSION
             ),
             len(part),
@@ -310,12 +313,12 @@ def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
     try:
         value = unpack(part)
     except ValueError as error:
-        reason = _("the extension is not valid msgpack: {error}").format(error=error)
+        reason = _("the extension isn't valid msgpack: {error}").format(error=error)
         raise WireError(reason, len(part), code="extension") from error
     if packed_is_too_deep(part, value):
         raise WireError(too_deep_reason(), len(part), code="extension")
     if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
-        raise WireError(_("the extension is not a map with string keys"), len(part), code="extension")
+        raise WireError(_("the extension isn't a map with string keys"), len(part), code="extension")
     return value
 
 
@@ -409,7 +412,7 @@ def split_rest(
 def _topic_in(part: bytes) -> str:
     try:
         if part[-1:] != b"\0":
-            raise WireError(_("its topic does not end with a zero byte"), len(part), code="topic-end")
+            raise WireError(_("the topic doesn't end with a zero byte"), len(part), code="topic-end")
         return check_topic(part[:-1].decode("utf-8"))
     except (UnicodeDecodeError, BadTopicError) as error:
         raise WireError(

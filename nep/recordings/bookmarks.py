@@ -96,7 +96,7 @@ class Bookmarks:
             RecordingError: The bookmark can't be saved.
         """
         if len(self._saved) >= MAX_BOOKMARKS:
-            reason = _("it already has {most} bookmarks, the maximum; delete one first").format(
+            reason = _("the recording already has {most} bookmarks, the maximum; delete one first").format(
                 most=MAX_BOOKMARKS
             )
             raise RecordingError(str(self._recording.path), reason)

@@ -332,7 +332,7 @@ def _status_to_plain(status: RecordingStatus | RingStatus) -> dict[str, object]:
 def _checked_duration_s(seconds: object) -> float:
     # Raises `ValueError`.
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0.0 < seconds < _MAX_SECONDS:
-        raise ValueError(_("{given} is not a time").format(given=seconds))
+        raise ValueError(_("{given} isn't a time").format(given=seconds))
     return float(seconds)
 
 

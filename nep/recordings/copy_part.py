@@ -84,7 +84,7 @@ class _Copy:
     def _channel_number(self, channel: int) -> int:
         number = self._writer.table.number(self._recording.facts.channels[channel])
         if number is None:
-            raise RecordingError(str(self._path), _("it has too many channels"))
+            raise RecordingError(str(self._path), _("the recording has too many channels"))
         return number
 
     def add(self, raw: RawMessage) -> None:

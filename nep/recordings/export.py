@@ -161,24 +161,20 @@ def _suitable_topics(
     ]
     if not topics:
         reason = {
-            "mcap": _("it does not contain the selected topics"),
+            "mcap": _("the selected topics aren't in the recording"),
             "pictures": _("no topic has images"),
             "mp4": _("no topic has images"),
         }.get(kind, _("no topic has values for a table"))
         raise RecordingError(str(recording.path), reason)
     if kind != "mcap" and len(topics) > MAX_FILES:
-        sentence = _("it has {count} suitable topics; choose at most {most}")
+        sentence = _("the recording has {count} suitable topics; choose at most {most}")
         raise RecordingError(str(recording.path), sentence.format(count=len(topics), most=MAX_FILES))
     counts = _counts(recording, topics, part)
     if kind != "mcap":
         topics = [name for name in topics if counts.get(name)]
     if not any(counts.values()):
         is_all = part.start_ns is None and part.end_ns is None
-        reason = (
-            _("it has no message that can be decoded")
-            if is_all
-            else _("it has no messages in the selected part")
-        )
+        reason = _("no message can be decoded") if is_all else _("there are no messages in the selected part")
         raise RecordingError(str(recording.path), reason)
     return topics, _Progress(sum(counts.values()), progress)
 
@@ -313,7 +309,7 @@ def _columns(source: _Source) -> dict[str, set[type]]:
         if len(columns) > MAX_COLUMNS:
             raise RecordingError(
                 source.topic,
-                _("its messages have more than {most} different fields").format(most=MAX_COLUMNS),
+                _("the messages have more than {most} different fields").format(most=MAX_COLUMNS),
             )
     return columns
 
@@ -489,5 +485,5 @@ def _write_video(source: _Source, path: Path, fps: float, container: Container) 
     finally:
         film.remove()
     if not count:
-        raise RecordingError(str(path), _("none of its images can be read"))
+        raise RecordingError(str(path), _("none of the images can be read"))
     return count

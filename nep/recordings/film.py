@@ -138,7 +138,7 @@ class VideoFile:
                 raise RecordingError(str(self._path), _("OpenCV can't write videos on this computer"))
             self._start_ns = log_ns
         if log_ns - self._start_ns > MAX_DURATION_S * 1e9:
-            raise RecordingError(str(self._path), _("its images span more than a day; choose a shorter part"))
+            raise RecordingError(str(self._path), _("the images span more than a day; choose a shorter part"))
         until = int((log_ns - self._start_ns) * self._fps / 1e9)
         while self._last is not None and self._frames < until:
             self._film.write(self._last)

@@ -204,7 +204,7 @@ class Playback:
     def speed(self, speed: float) -> None:
         if not SPEED_MIN <= speed <= SPEED_MAX:
             raise ValueError(
-                _("{speed:g} is not a valid speed; use {least:g} to {most:g}").format(
+                _("{speed:g} isn't a valid speed; use {least:g} to {most:g}").format(
                     speed=speed, least=SPEED_MIN, most=SPEED_MAX
                 )
             )

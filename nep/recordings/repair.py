@@ -137,7 +137,7 @@ def repair(
                 counts = repairer.run()
                 first_ns, last_ns = _verify(unfinished, repairer.writer)
                 if not counts.recovered:
-                    raise RecordingError(str(path), _("it has no message that can be decoded"))
+                    raise RecordingError(str(path), _("no message can be decoded"))
                 replace_file(unfinished, target)
             finally:
                 repairer.writer.close()
@@ -193,7 +193,7 @@ class _Repair:
         self._search_budget = open_budget(path, self._size)
         file.seek(0)
         if file.read(len(MAGIC)) != MAGIC and not self._find_chunk(0):
-            raise RecordingError(str(path), _("it is not an MCAP file"))
+            raise RecordingError(str(path), _("not an MCAP file"))
         self._definitions = self._known_definitions(path)
         self._table = ChannelTable(self._definitions.channels)
         self._counts = _Counts()

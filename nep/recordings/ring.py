@@ -303,7 +303,7 @@ class FlightRecorder:
             raise ValueError(_("the duration must be finite and greater than 0"))
         target = Path(path)
         if not self._writer.flush():
-            raise RecordingError(str(target), self._writer.problem or _("the disk does not respond"))
+            raise RecordingError(str(target), self._writer.problem or _("the disk doesn't respond"))
         segments = self._segments.select(seconds)
         if not segments:
             raise RecordingError(str(target), _("no messages received yet"))

@@ -332,7 +332,7 @@ class RecordingWriter:
             self._lock.notify_all()
         self._thread.join(timeout_s)
         if self._thread.is_alive():
-            raise ClosedError(_("a recording whose disk does not respond"))
+            raise ClosedError(_("a recording whose disk doesn't respond"))
         return self.status
 
     def __enter__(self) -> Self:

@@ -62,7 +62,7 @@ def master_address(address: str | None = None) -> str:
         chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)
     if not _HOST.fullmatch(host) or not _is_valid_host(host) or not _is_port(port):
         raise NepError(
-            _("'{chosen}' is not a valid address of a master; use an address such as '{example}'").format(
+            _("'{chosen}' isn't a valid address of a master; use an address such as '{example}'").format(
                 chosen=quotable(chosen), example=DEFAULT_MASTER
             )
         )
@@ -77,7 +77,7 @@ def check_host(host: object) -> str:
     if isinstance(host, str) and _is_ipv6(host):
         raise NepError(
             _(
-                "'{host}' is an IPv6 address, which nep does not support; use an IPv4 address such as "
+                "'{host}' is an IPv6 address, which nep doesn't support; use an IPv4 address such as "
                 "'127.0.0.1', or the computer's name"
             ).format(host=quotable(host))
         )
@@ -90,7 +90,7 @@ def check_host(host: object) -> str:
     if not isinstance(host, str) or not _HOST.fullmatch(host) or not _is_valid_host(host):
         raise NepError(
             _(
-                "'{host}' is not a valid computer address; use an IP address such as '127.0.0.1', or the "
+                "'{host}' isn't a valid computer address; use an IP address such as '127.0.0.1', or the "
                 "computer's name"
             ).format(host=quotable(str(host)))
         )

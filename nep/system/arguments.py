@@ -153,7 +153,7 @@ def check_plain_function(name: str, value: F) -> F:
     """Validate a callable that is not a coroutine function, and return it. Raises `ValueError`."""
     if is_coroutine_function(check_function(name, value)):
         raise ValueError(
-            _("{name} is a coroutine function, which is not awaited here; use a regular function").format(
+            _("{name} is a coroutine function, which isn't awaited here; use a regular function").format(
                 name=name
             )
         )

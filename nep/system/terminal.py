@@ -147,8 +147,8 @@ class Terminal(io.TextIOBase):
             dropped, self._lines_dropped = self._lines_dropped, 0
         if dropped:
             text += ngettext(
-                "… {count} line dropped because the output was not read",
-                "… {count} lines dropped because the output was not read",
+                "… {count} line dropped because the output wasn't read",
+                "… {count} lines dropped because the output wasn't read",
                 dropped,
             ).format(count=dropped)
             text += "\n"

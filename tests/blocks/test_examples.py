@@ -119,7 +119,7 @@ def test_picture_behaviour_has_the_designed_problems():
     pepper, absent = (parse(saved["robots"][name]) for name in ("Pepper", "NAO"))
     program = compile_behaviour(saved["workspace"], [pepper], absent=[absent], name=saved["name"])
     assert [problem.message for problem in program.problems] == [
-        "NAO is not connected, so wave will be skipped.",
+        "NAO isn't connected, so wave will be skipped.",
         "wait until waits forever if no one appears.",
     ]
     assert program.starts == 3

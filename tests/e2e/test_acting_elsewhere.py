@@ -59,7 +59,7 @@ def test_click_in_a_picture_publishes_its_pixel_once_armed(studio: Studio, addre
         picture = until(lambda: studio.all("Image", kind="ClickablePicture"), "a picture shows")[0]
         studio.screen.click(*middle(picture["rect"]))
         studio.screen.key("p")
-        studio.says("Clicks are not sent until you arm sending")
+        studio.says("Clicks aren't sent until you arm sending")
         picture = studio.find("Image", kind="ClickablePicture")
         studio.screen.click(*middle(picture["rect"]))
         studio.click(kind="Switch", name="Armed")
@@ -74,7 +74,7 @@ def test_click_in_a_picture_publishes_its_pixel_once_armed(studio: Studio, addre
         assert abs(point["y"] - HEIGHT / 2) <= 2
         studio.says("1 point sent, received by 1")
         Fingers(studio).press("F12")
-        studio.says("Clicks are not sent until you arm sending")
+        studio.says("Clicks aren't sent until you arm sending")
         studio.screen.click(*middle(picture["rect"]))
         Fingers(studio).do("sent", "Sent")
         listed = until(lambda: studio.rows("Sent messages, newest first"), "what was sent is listed")

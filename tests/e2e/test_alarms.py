@@ -35,7 +35,7 @@ def test_alarm_created_by_right_click_shows_a_banner_and_clears_by_itself(studio
         try:
             until(lambda: not studio.all("Dismiss"), "the banner goes")
             studio.click("Condition: silent")
-            studio.pick("A topic has too many messages")
+            studio.pick("A topic's message rate is too high")
             studio.find("/distance has more than 100 messages per second for 2 s", kind="AlarmRow")
         finally:
             talking.set()

@@ -84,7 +84,7 @@ def test_crashed_robot_is_reported_missing_and_reconnects(with_robot: Callable[[
     robot.kill()
     studio.says("The virtual robot Pepper stopped unexpectedly.")
     until(lambda: "not connected" in str(studio.page("document.body.textContent")), "the toolbox says so")
-    studio.says("Pepper is not connected, so ")
+    studio.says("Pepper isn't connected, so ")
     studio.click("Start a virtual Pepper")
     studio.says("Pepper ready", 40)
     studio.open_category("Movement")

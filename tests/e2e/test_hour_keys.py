@@ -327,7 +327,7 @@ def take_back(studio: Studio, film: Film, fingers: Fingers) -> None:
         fingers.to_canvas()
         fingers.go_to(kind_of(studio, "robot_pepper_do_say")[0])
         fingers.press("Delete")
-        until(lambda: not kind_of(studio, "robot_pepper_do_say"), "it closed the connection")
+        until(lambda: not kind_of(studio, "robot_pepper_do_say"), "the other side closed the connection")
         fingers.until_in_page("Tab", "nepBin")
         fingers.press("Return")
         until(lambda: studio.page(BIN), "the bin shows it")

@@ -240,7 +240,7 @@ def make_mistakes(hour: Hour) -> None:
     with film.step("A loose block: Problems says that it does not run"):
         walk = hand.put("Movement", "robot_pepper_do_walk", 60, 400)
         has_problem(studio, "walk doesn't run")
-    with film.step("A wrong drop: why it can't be encoded stands where it was let go"):
+    with film.step("A wrong drop: why unsupported value stands where it was let go"):
         face = hand.take("Sensors", "robot_pepper_get_sees_face", hand.gap(walk))
         until(lambda: studio.page(WHY) == "“walk” needs a number here", "it says why")
         assert not holds(studio, walk, face)

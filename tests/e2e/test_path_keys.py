@@ -73,7 +73,7 @@ def look_at_topics(studio: Studio, film: Film, fingers: Fingers) -> None:
     with film.step("F6: the Inspector; Ctrl+F finds a value in it"):
         fingers.until_on("F6", **{"in": "inspector"})
         fingers.press("f", held=["Ctrl"])
-        studio.find("Find a key or value, or $ and a path", focus=True)
+        studio.find("Find a key, value or $ path", focus=True)
         studio.screen.type("count")
         studio.says("1 of 1")
 

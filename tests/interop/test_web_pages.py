@@ -130,7 +130,7 @@ def test_foxglove_client_receives_publishes_and_calls_services(
     page.tell(["listen", "/odom"])
     assert page.hears({"topic": "/odom", "isNow": True, "value": {"text": "日本"}})
     page.tell(["listen", "/picture"])
-    page.wait(lambda: "/picture" in str(page.got[-1]) and page.got[-1]["value"] > 50, "a picture")
+    page.wait(lambda: "/picture" in str(page.got[-1]) and page.got[-1]["value"] > 50, "an image")
     page.tell(["talk", "/cmd", "geometry_msgs/Twist", {"linear": {"x": 2.0}}])
     assert heard.listen(timeout_s=30) == (True, Twist(linear=Vector3(x=2.0)))
     page.tell(["call", "/add_two_ints", 7, {"a": 1, "b": 2}])

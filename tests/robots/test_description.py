@@ -107,7 +107,7 @@ def test_invalid_inputs_are_reported_with_readable_messages():
     assert say.check({"text": ""}) == ("say: text must not be empty",)
     assert say.check({"text": "x" * 501}) == ("say: text must be at most 500 characters long",)
     assert say.check({"text": "x", "volume": 2.5}) == ("say: volume must be a whole number",)
-    assert light.check({"colour": "red"}) == ("light: colour must be a colour like #20c0e0",)
+    assert light.check({"colour": "red"}) == ("light: colour must be a colour such as #20c0e0",)
     assert turn.check({"angle": 90, "direction": "left"}) == ()
     assert turn.complete({"angle": 90}) == {"direction": "left", "angle": 90, "speed": 40.0}
 
@@ -129,7 +129,7 @@ def broken(change) -> tuple[str, ...]:
         (lambda d: d.pop("title"), "the description has no 'title'"),
         (lambda d: d.pop("actions"), "the description has no 'actions'"),
         (lambda d: d["actions"]["turn"].update({"rb:uses": ["wings"]}),
-         "actions.turn.rb:uses names 'wings', which is not in rb:resources"),
+         "actions.turn.rb:uses names 'wings', which isn't in rb:resources"),
         (lambda d: d["actions"]["turn"].update({"rb:onBusy": "panic"}),
          "actions.turn.rb:onBusy must be one of queue, replace, reject"),
         (lambda d: d["actions"]["turn"]["input"]["properties"]["angle"].update(minimum="low"),
@@ -139,15 +139,15 @@ def broken(change) -> tuple[str, ...]:
         (lambda d: d["actions"]["turn"]["input"]["properties"]["angle"].update(default=400),
          "actions.turn.input.angle: the default must be between -360 and 360 °"),
         (lambda d: d["actions"]["turn"]["rb:block"]["text"].update(en="turn %wings"),
-         "actions.turn.rb:block.text.en uses %wings, which is not defined"),
+         "actions.turn.rb:block.text.en uses %wings, which isn't defined"),
         (lambda d: d["events"]["touched"].update({"rb:filter": ["where"]}),
-         "events.touched.rb:filter names 'where', which is not in its data"),
+         "events.touched.rb:filter names 'where', which isn't in its data"),
         (lambda d: d["rb:safeStop"].update(action="halt"),
-         "rb:safeStop.action names 'halt', which is not an action"),
+         "rb:safeStop.action names 'halt', which isn't an action"),
         (lambda d: d["rb:safeStop"].update(action="say"),
          "'say' is the safe stop, so its input must not have required fields"),
         (lambda d: d["actions"]["turn"]["input"].update({"$ref": "http://example.org"}),
-         "actions.turn.input uses $ref, which is not supported; write the definition in place"),
+         "actions.turn.input uses $ref, which isn't supported; write the definition inline"),
         (lambda d: d.update({"rb:profile": 2}), "rb:profile must be 1"),
         (lambda d: d["events"].update(state={}),
          ("'state' is reserved or used twice; each sensor and event needs a name of its own, "

@@ -167,7 +167,7 @@ class WhoseWordsCount:
         with nep.node("spy", master=evil._master) as spy:
             spy.new_sub("/Pepper/command", "robot/command", sink=forge)
             assert not side.stop(SHORT_S)
-        assert side.stop_says() == "Pepper did not reply"
+        assert side.stop_says() == "Pepper didn't reply"
 
     @pytest.mark.parametrize("silent", [False, True])
     def test_stop_needs_an_answer_of_every_program_with_the_robot_name(

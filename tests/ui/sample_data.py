@@ -88,7 +88,7 @@ VALUES: Mapping[str, object] = {
 """What Pepper's sensors say."""
 
 PROBLEMS = (
-    Problem("warning", "b8", "robot", "wave", "NAO is not connected, so wave will be skipped.",
+    Problem("warning", "b8", "robot", "wave", "NAO isn't connected, so wave will be skipped.",
             "Show the robots", "connect:NAO", icon="hand"),
     Problem("info", "b3", "control", "wait until", "wait until waits forever if no one appears.",
             "Add a time limit", "add_time_limit", icon="hourglass"),
@@ -109,7 +109,7 @@ FOUND = (
     Finding(
         "master:foreign",
         "error",
-        "“python3 server.py” (process 77) uses port 7780 but is not a master.",
+        "“python3 server.py” (process 77) uses port 7780 but isn't a master.",
         "Close that program, or start the master on port 7781 and set NEP_MASTER=127.0.0.1:7781 for all "
         "programs.", "nep master --port 7781",
     ),

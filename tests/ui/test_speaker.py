@@ -126,7 +126,7 @@ def test_failing_engine_leaves_the_speaker_silent_with_a_reason(qtbot, caplog) -
     speaker = QtSpeaker(broken)
     speaker.speak("Hello", "en", 0.5)
     qtbot.waitUntil(lambda: not speaker.is_busy)
-    assert speaker.problem == "This computer plays no sound."
+    assert speaker.problem == "This computer can't play sound."
     speaker.close()
     assert "no sound server" in caplog.text
 
@@ -138,7 +138,7 @@ def test_speaker_without_audio_libraries_is_silent_with_a_reason(qtbot) -> None:
     assert speaker.problem == "This computer has no voice for English."
     speaker.play(((440.0, 0.1),), 0.5)
     qtbot.waitUntil(lambda: len(speaker._problems) == 2)
-    assert speaker._problems["play"] == "This computer plays no sound."
+    assert speaker._problems["play"] == "This computer can't play sound."
     speaker.close()
 
 
@@ -177,7 +177,7 @@ def test_reason_for_silent_robots_names_what_to_install() -> None:
     assert voice_text("", has_engine=True) == "Robots speak with the voice of this computer."
     silent = voice_text("", has_engine=False, platform="linux")
     assert silent.startswith(
-        "This computer has no voice: what robots say is only shown. Install the packages"
+        "This computer has no voice, so what robots say is only shown as text. Install the packages"
     )
     assert "Windows" in voice_text("", has_engine=False, platform="win32")
     assert "System Settings" in voice_text("", has_engine=False, platform="darwin")

@@ -32,7 +32,7 @@ _CREATE_BLOCKS = (
         "empty list",
         icon="list",
         tooltip="A list without items.",
-        help="Set a variable to it first, then add items to that variable.",
+        help="First set a variable to this list, then add items to the variable.",
         python="new_list()",
         check="List",
         can_fail=False,
@@ -180,7 +180,7 @@ _AGGREGATE_BLOCKS = (
         icon="copy",
         tooltip="A new list with the same items, in this order.",
         help="The list itself doesn't change; to sort it, set it to the sorted copy. Numbers come before "
-        "texts; capital and small letters aren't distinguished.",
+        "texts; capital and small letters are treated as the same.",
         python={
             "same": "copy_of(%LIST)",
             "up": "sorted_up(%LIST)",

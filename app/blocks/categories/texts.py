@@ -19,7 +19,7 @@ _BASIC_BLOCKS = (
         shape="value",
         style="values",
         icon="",
-        tooltip="A text.",
+        tooltip="A letter, word or line of text.",
         python="%TEXT",
         arguments=(TextField("TEXT", "Hello"),),
         check="String",
@@ -167,7 +167,7 @@ _CONDITION_BLOCKS = (
         "%TEXT %HOW %PIECE",
         icon="text-search",
         tooltip="Checks if a text contains, starts with or ends with these characters.",
-        help="Capital and small letters are distinguished.",
+        help="Capital and small letters are treated as different.",
         python={
             "contains": "has_in_it(%TEXT, %PIECE)",
             "starts": "starts_with(%TEXT, %PIECE)",

@@ -82,7 +82,7 @@ class ProblemCollector:
     def report_misplaced(self, placed: PlacedBlock, block: Block) -> None:
         """Report a block at an invalid position, which the editor prevents but a file may contain."""
         name = self.label(placed, block)
-        sentence = _("{block} can't be used here. It is kept but skipped.")
+        sentence = _("{block} can't be used here. It stays in the file but is skipped.")
         self._add("warning", placed, block, name, sentence.format(block=name))
 
     def report_too_deep(self, placed: PlacedBlock) -> None:
@@ -92,7 +92,10 @@ class ProblemCollector:
         self._add(
             "error", placed, block, name,
             _(
-                "{block} is nested too deeply. Move inner blocks to variables or scripts of their own."
+
+            "{block} is nested too deeply. Save intermediate results in variables, or move inner "
+            "blocks to separate scripts."
+
             ).format(block=name),
         )  # fmt: skip
 
@@ -107,7 +110,9 @@ class ProblemCollector:
     def report_unknown_input(self, placed: PlacedBlock, block: Block) -> None:
         """Report a function input that is used outside of its function, or that was removed."""
         name = block_text(placed, self._catalogue.blocks, self._workspace.variables)
-        sentence = _("“{name}” only works inside its own function. It is kept but skipped.").format(name=name)
+        sentence = _(
+            "“{name}” only works inside its own function. It stays in the file but is skipped."
+        ).format(name=name)
         self._add("warning", placed, block, name, sentence)
 
     def report_undefined(self, placed: PlacedBlock, block: Block) -> None:
@@ -173,7 +178,7 @@ class ProblemCollector:
     def report_invalid_field(self, placed: PlacedBlock, block: Block, error: FieldError) -> None:
         """Report an invalid field value."""
         name = self.label(placed, block)
-        sentence = _("{block} {what_is_wrong}. It is kept but skipped.")
+        sentence = _("{block} {what_is_wrong}. It stays in the file but is skipped.")
         self._add("error", placed, block, name, sentence.format(block=name, what_is_wrong=error))
 
     def report_unsupported(
@@ -197,7 +202,7 @@ class ProblemCollector:
             and robot not in self._catalogue.connected
             and placed.type.startswith("robot_")
         ):
-            sentence = _("{robot} is not connected, so {block} will be skipped.")
+            sentence = _("{robot} isn't connected, so {block} will be skipped.")
             self._add(
                 "warning", placed, block, name, sentence.format(robot=robot, block=skipped),
                 fix=_("Show the robots"), fix_action=f"connect:{robot}", style="robot",
@@ -217,24 +222,30 @@ class ProblemCollector:
         prefixes = {each.partition("_")[0] for each in self._catalogue.blocks}
         if placed.type.startswith("robot_"):
             sentence = _(
-                "This file uses “{block}”, which no connected robot supports. It is kept but skipped."
+                "This file uses “{block}”, which no connected robot supports. It stays in the file but is "
+                "skipped."
             )
             self._add("warning", placed, None, name, sentence.format(block=name), style="robot")
         elif own is not None:
             words = label(PlacedBlock("", own.type), own)
             sentence = _(
-                "“{block}” belongs to another program and can't run here. It is kept but skipped. "
-                "“{own_block}” does the same."
+                "“{block}” belongs to another program and can't run here. It stays in the file but is "
+                "skipped. “{own_block}” does the same."
             )
             self._add(
                 "warning", placed, None, name, sentence.format(block=name, own_block=words),
                 fix=_("Show “{block}”").format(block=words), fix_action=f"point.block:{own.type}",
             )  # fmt: skip
         elif placed.type.partition("_")[0] in prefixes:
-            sentence = _("“{block}” is not known to this version of NEP Studio. It is kept but skipped.")
+            sentence = _(
+                "“{block}” isn't known to this version of NEP Studio. It stays in the file but is skipped."
+            )
             self._add("warning", placed, None, name, sentence.format(block=name))
         else:
-            sentence = _("“{block}” belongs to another program and can't run here. It is kept but skipped.")
+            sentence = _(
+                "“{block}” belongs to another program and can't run here. It stays in the file but is "
+                "skipped."
+            )
             self._add("warning", placed, None, name, sentence.format(block=name))
 
     def check_unknown(self) -> None:

@@ -102,7 +102,7 @@ class RunnerOutput:
             if self._left == 0:
                 self.send(
                     "print",
-                    text=_("no more lines are shown: the limit of {count} is reached").format(
+                    text=_("no more lines are shown: the limit of {count} lines has been reached").format(
                         count=MAX_LINES
                     ),
                 )

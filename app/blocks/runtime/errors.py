@@ -54,7 +54,9 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
     if isinstance(error, TypeError):
         if "NoneType" in str(error):
             return BehaviourError(
-                _("{name} needs a value that isn't known yet.").format(name=name), block, unknown=True
+                _("{name} can't run: one of its values isn't known yet.").format(name=name),
+                block,
+                unknown=True,
             )
         return BehaviourError(
             _("{name} doesn't work with {kinds}.").format(name=name, kinds=_type_names_in(str(error))), block

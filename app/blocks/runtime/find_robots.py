@@ -178,7 +178,7 @@ def _result(there: Mapping[str, Robot], asked: Mapping[str, _DescriptionTopic]) 
     claims = [f"{each.error}." for each in asked.values() if each.error]
     claims += [
         _(
-            "{count} programs announce themselves as {robot}. {first} was first and is used; ignored: "
+            "{count} programs announce themselves as {robot}. Using the first one, {first}; ignoring "
             "{others}."
         ).format(
             count=len(each.duplicates) + 1,

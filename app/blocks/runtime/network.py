@@ -328,7 +328,7 @@ class Network:
 
         The text has no full stop.
         """
-        return self._stop_errors.get(name) or _("{robot} did not reply").format(robot=name)
+        return self._stop_errors.get(name) or _("{robot} didn't reply").format(robot=name)
 
     def _stop_nodes(self, robot: Robot) -> set[str]:
         # The robot's own node, and others that answer its commands, must answer a stop.

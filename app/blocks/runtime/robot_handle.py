@@ -353,7 +353,7 @@ class RobotHandle:
             lambda: call.state != "sent", FIRST_REPLY_TIMEOUT_S
         ):
             raise BehaviourError(
-                _("{name} is not responding. {check}").format(name=self._name, check=_check_hint(robot))
+                _("{name} isn't responding. {check}").format(name=self._name, check=_check_hint(robot))
             )
         can_hold = action.cancellable and robot.dialect == "native"
         limit = action.timeout_s or DEFAULT_TIMEOUT_S
@@ -374,7 +374,7 @@ class RobotHandle:
                 self._runtime.status_text.set_text(_waiting_text(robot, call) if waits else words)
             said = self._silence_error(robot, call)
             if said is None and time.monotonic() >= until:
-                said = _("{name} did not finish “{title}” within {limit:g} s.").format(
+                said = _("{name} didn't finish “{title}” within {limit:g} s.").format(
                     name=self._name, title=action.title, limit=limit
                 )
             if said is not None:
@@ -396,7 +396,7 @@ class RobotHandle:
         self._runtime.link().cancel(call)
         if not self._runtime.scheduler.wait_for(lambda: call.done, PAUSE_TIMEOUT_S):
             raise BehaviourError(
-                _("{name} did not pause, so the behaviour was stopped.").format(name=self._name)
+                _("{name} didn't pause, so the behaviour was stopped.").format(name=self._name)
             )
 
 
@@ -435,7 +435,7 @@ def _converted_input(action: Action, name: str, value: object) -> object:
         return value
     if value is None:
         raise BehaviourError(
-            _("“{title}” needs a value for “{value}” that is not known yet.").format(
+            _("Can't run “{title}”: the value for “{value}” isn't known yet.").format(
                 title=action.title, value=parameter.title
             ),
             unknown=True,

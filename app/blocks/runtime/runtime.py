@@ -191,7 +191,7 @@ class Runtime:
             self.scheduler.finish_run()
             if hat.dropped:
                 self.write(
-                    _("“{title}” could not keep up: {dropped} of its events were skipped").format(
+                    _("“{title}” couldn't keep up: {dropped} of its events were skipped").format(
                         title=hat.title, dropped=hat.dropped
                     )
                 )
@@ -280,7 +280,7 @@ class Runtime:
         name = f"“{self._labels.get(block, '')}”"
         if isinstance(result, complex):
             raise BehaviourError(_("{name} has no result for these numbers.").format(name=name), block)
-        raise BehaviourError(_("{name} needs numbers, not a text.").format(name=name), block)
+        raise BehaviourError(_("{name} needs numbers, not text.").format(name=name), block)
 
     def called(self, block: str, call: Callable[[], object]) -> object:
         """Call a user-defined function and return its result.
@@ -482,7 +482,7 @@ class Runtime:
     def robot_description(self, name: str) -> Robot:
         """Return the description of a robot. Raises BehaviourError if the robot is not connected."""
         if name not in self._robots:
-            raise BehaviourError(_("{name} is not connected.").format(name=name))
+            raise BehaviourError(_("{name} isn't connected.").format(name=name))
         return self._robots[name]
 
     @property
@@ -496,7 +496,7 @@ class Runtime:
 
     def _require_link(self) -> ProgramLink:
         if self._link is None:
-            raise BehaviourError(_("the program has not started yet."))
+            raise BehaviourError(_("the program hasn't started yet."))
         return self._link
 
 

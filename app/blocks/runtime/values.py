@@ -110,7 +110,7 @@ def number(value: object, what: str) -> int | float:
     """
     if value is None:
         raise BehaviourError(
-            _("{what} needs a value that isn't known yet.").format(what=_(what)), unknown=True
+            _("{what} can't run: one of its values isn't known yet.").format(what=_(what)), unknown=True
         )
     if not isinstance(value, (int, float)):
         raise BehaviourError(

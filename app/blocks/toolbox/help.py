@@ -246,7 +246,7 @@ def _value_text(gap: ValueInput) -> str:
         words = _("{kind}; {value} by default").format(kind=words, value=f"{gap.default:g}")
     if gap.only_if is None:
         return words
-    return _("{kind}; only if you choose an item by its number").format(kind=words)
+    return _("{kind}; used only if you choose an item by its number").format(kind=words)
 
 
 def _choice_text(field: ChoiceField) -> str:

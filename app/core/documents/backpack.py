@@ -246,7 +246,7 @@ class Backpack:
         except OSError as error:
             raise BackpackError(
                 _("can't read the backpack from '{path}': {reason}").format(
-                    path=self.path, reason=_("it is damaged")
+                    path=self.path, reason=_("the file is damaged")
                 )
             ) from error
         self._report_once(

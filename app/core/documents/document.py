@@ -180,7 +180,7 @@ class Document:
         """
         target = path if path is not None else self.path
         if target is None:
-            raise DocumentError(None, _("this behaviour is not saved to a file yet"), _("choose one"))
+            raise DocumentError(None, _("this behaviour isn't saved to a file yet"), _("choose one"))
         name = name_of(target, self.name)
         write_file(target, BehaviourFile(name, self.workspace, self.robots, self.others))
         self.path, self.name = target, name

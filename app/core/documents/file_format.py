@@ -79,13 +79,13 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
         damaged = _("{file} is damaged or not a behaviour").format(file=name)
         raise DocumentError(path, damaged, _(OPEN_EARLIER_ADVICE)) from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise DocumentError(path, _("{file} is not a behaviour").format(file=name), file_type_hint())
+        raise DocumentError(path, _("{file} isn't a behaviour").format(file=name), file_type_hint())
     version = content.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
         raise DocumentError(path, _("{file} has no format version").format(file=name), _(OPEN_EARLIER_ADVICE))
     if version > VERSION:
         newer = _("{file} was saved by a newer NEP Studio (version {version}) and is unchanged")
-        raise DocumentError(path, newer.format(file=name, version=version), _("update this one"))
+        raise DocumentError(path, newer.format(file=name, version=version), _("update NEP Studio"))
     workspace, robots = content.get("workspace"), content.get("robots", {})
     if not isinstance(workspace, dict) or not isinstance(robots, dict):
         raise DocumentError(path, _("{file} has no blocks").format(file=name), _(OPEN_EARLIER_ADVICE))
@@ -123,7 +123,7 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
         if len(data) > MAX_BYTES:
             size, most = len(data) / 1e6, MAX_BYTES / 1e6
             template = _("{file} would be {size} MB").format(file=path.name, size=number(size, ".1f"))
-            advice = _("at most {most} MB can be read; use smaller images").format(most=number(most, ".0f"))
+            advice = _("the limit is {most} MB; use smaller images").format(most=number(most, ".0f"))
             raise DocumentError(path, template, advice)
         write_atomically(path, data)
     except RecursionError as error:

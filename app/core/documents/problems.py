@@ -140,5 +140,5 @@ def _with_block_count(line: ProblemLine) -> ProblemLine:
         return line
     name = _missing_robot(line.problem) or ""
     subject = ngettext("{count} block", "{count} blocks", line.block_count).format(count=line.block_count)
-    sentence = _("{robot} is not connected, so {block} will be skipped.").format(robot=name, block=subject)
+    sentence = _("{robot} isn't connected, so {block} will be skipped.").format(robot=name, block=subject)
     return replace(line, problem=replace(line.problem, subject=subject, message=sentence, icon="bot"))

@@ -69,7 +69,7 @@ def rename_file(old: Path, new: Path) -> None:
     """
     try:
         if not old.is_file():
-            raise FileNotFoundError(2, _("it no longer exists"), str(old))
+            raise FileNotFoundError(2, _("the file no longer exists"), str(old))
         taken = not _is_same_file(new, old)
         if taken:
             os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY))

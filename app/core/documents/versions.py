@@ -97,7 +97,7 @@ def save_version(
         os.utime(copy, ns=(written.st_mtime_ns, written.st_mtime_ns))
     except OSError as error:
         reason = error.strerror or error
-        words = _("{file} was not saved: its previous version can't be kept ({reason})")
+        words = _("{file} wasn't saved: its previous version can't be kept ({reason})")
         raise DocumentError(path, words.format(file=path.name, reason=reason)) from error
     with contextlib.suppress(OSError):  # another instance has done this already
         _thin_out(where, _path_hash(path))

@@ -62,10 +62,10 @@ class JsonIndex:
         opens, closes = np.isin(kinds, list(OPEN)), np.isin(kinds, list(CLOSE))
         after = np.cumsum(opens.astype(np.int32) - closes)
         if not len(after) or after[-1] != 0 or after.min() < 0:
-            raise ValueError(_("its brackets do not match"))
+            raise ValueError(_("unbalanced brackets"))
         level = after + closes
         if level.max() > MAX_DEPTH:
-            raise ValueError(_("it is nested deeper than {most} levels").format(most=MAX_DEPTH))
+            raise ValueError(_("nested deeper than {most} levels").format(most=MAX_DEPTH))
         order = np.argsort(level.astype(np.int16), kind="stable")
         bounds = np.searchsorted(np.take(level, order), np.arange(1, int(level.max()) + 2))
         self._levels = [  # `take` releases the GIL, unlike indexing with brackets
@@ -290,7 +290,7 @@ def _find_structure(data: memoryview) -> tuple[Positions, NDArray[np.uint8]]:
         kinds.append(part[found])
         in_text = int(inside[-1])
     if in_text or not places:
-        raise ValueError(_("it contains an unterminated string"))
+        raise ValueError(_("unterminated string"))
     return np.concatenate(places), np.concatenate(kinds)
 
 

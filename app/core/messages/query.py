@@ -76,7 +76,7 @@ class JsonQuery:
         except OverflowError as error:
             raise QueryError(_("a number in the query is too large")) from error
         except (RecursionError, ValueError) as error:  # brackets nested a thousand deep; numbers out of range
-            raise QueryError(_("the query is not valid")) from error
+            raise QueryError(_("the query isn't valid")) from error
 
     def evaluate(
         self, value: object, most_steps: int = MAX_STEPS, most_found: int = MAX_RESULTS
@@ -122,7 +122,7 @@ def _error_message(error: jsonpath.JSONPathError, text: str) -> str:
     rest = text[token.index :] if token is not None and 0 <= token.index < len(text) else ""
     if not rest:
         return _("the query is incomplete: {reason}").format(reason=reason)
-    template = _("the query is not valid from {rest} on: {reason}")
+    template = _("the query isn't valid from {rest} on: {reason}")
     return template.format(rest=escaped(shortened(rest, 20)), reason=reason)
 
 

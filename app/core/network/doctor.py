@@ -116,7 +116,7 @@ class Doctor:
         try:
             return tuple(self._look(missed, self._report))
         except Exception as error:  # noqa: BLE001  reported as a finding
-            words = _("The doctor could not finish: {kind}: {error}.").format(
+            words = _("The doctor couldn't finish: {kind}: {error}.").format(
                 kind=type(error).__name__, error=error
             )
             return (

@@ -86,9 +86,9 @@ def web_status(web: WebPages, network: str) -> tuple[str, str, str | None]:
     count = len(web.connected)
     pages = ngettext("{count} page", "{count} pages", count).format(count=count) if count else ""
     if not web.host:
-        words = _("Web open to this computer")
+        words = _("Web: this computer only")
         return "globe", ", ".join(filter(None, (words, pages))), None
-    words = _("Web open to {network}").format(network=network or web.host)
+    words = _("Web: open to {network}").format(network=network or web.host)
     return "globe", ", ".join(filter(None, (words, pages))), "warn"
 
 

@@ -231,9 +231,9 @@ class NodeParameters:
 def read_only_reason(node: NodeEntry, parameter: ShownParameter) -> str:
     """Return the reason why a parameter can't be set from Studio, or ""."""
     if node.gone_s is not None:
-        return _("its node has disappeared")
+        return _("the node has disappeared")
     if len(parameter.text) > MAX_TEXT_LENGTH:
-        return _("it is too long to edit here; use nep param set")
+        return _("the value is too long to edit here; use nep param set")
     if not node.can_set_parameters:
         return _("parameters on this network are read-only")
     return _("only its own node can set it") if parameter.read_only else ""
@@ -246,7 +246,7 @@ def parse_parameters(state: object) -> tuple[ShownParameter, ...]:
     """
     listed = state.get("parameters") if isinstance(state, Mapping) else None
     if not isinstance(listed, list):
-        raise NepError(_("this is not a list of parameters"))
+        raise NepError(_("this isn't a list of parameters"))
     parameters = [_parse_parameter(each) for each in listed[:MAX_PARAMETERS] if isinstance(each, Mapping)]
     return tuple({each.name: each for each in parameters}.values())
 

@@ -185,7 +185,7 @@ class RecorderProcess:
             with suppress(queue.Full):
                 self._orders.put_nowait(None)  # ends the thread that waits for commands
             writer.join(END_TIMEOUT_S)
-        return "" if code == 0 else _tail(log) or _("it exited with code {code}").format(code=code)
+        return "" if code == 0 else _tail(log) or _("the recorder exited with code {code}").format(code=code)
 
     def _write(self, process: subprocess.Popen[bytes]) -> None:
         if process.stdin is None:
@@ -427,7 +427,7 @@ class RecorderClient:
         elif op == "keep":
             self._set(self._without_saving(_path(content)))
             self._alerts.raise_alert(
-                "recorder:keep", "error", _("The last seconds could not be saved."), sentence
+                "recorder:keep", "error", _("The last seconds couldn't be saved."), sentence
             )
         elif op == "ring":
             self._ring = None
@@ -436,7 +436,7 @@ class RecorderClient:
         elif op == "stop":
             self._set(replace(self.state, phase=""))
             self._alerts.raise_alert(
-                "recorder:ended", "error", _("The recording could not be closed."), sentence
+                "recorder:ended", "error", _("The recording couldn't be closed."), sentence
             )
 
     def _on_gone(self, detail: str) -> None:
@@ -448,7 +448,7 @@ class RecorderClient:
             title = _("The recorder stopped. Everything up to a second before that is saved.")
             self._alerts.raise_alert("recorder:ended", "error", title, detail or _path_text(before.path))
         if before.saving:
-            title = _("The last seconds could not be saved.")
+            title = _("The last seconds couldn't be saved.")
             self._alerts.raise_alert("recorder:keep", "error", title, detail)
         if self._ring is not None:
             self._alert_ring_off(detail)
@@ -473,8 +473,8 @@ class RecorderClient:
             self._alerts.resolve("recorder:low")
         if state.phase and state.unwritten:
             title = ngettext(
-                "{count} message was not recorded: the disk is too slow.",
-                "{count} messages were not recorded: the disk is too slow.",
+                "{count} message wasn't recorded: the disk is too slow.",
+                "{count} messages weren't recorded: the disk is too slow.",
                 state.unwritten,
             )
             self._alerts.raise_alert("recorder:unkept", "warn", title.format(count=state.unwritten), count=0)
@@ -494,7 +494,7 @@ class RecorderClient:
             self._number += 1
             self._process = self._start(self._number, self._address, self._post_event)
         if not self._process.send_command(content):
-            self._on_problem({**content, "sentence": _("the recorder does not respond")})
+            self._on_problem({**content, "sentence": _("the recorder doesn't respond")})
 
     def _without_saving(self, path: Path | None) -> RecorderState:
         return replace(self.state, saving=tuple(each for each in self.state.saving if each != path))

@@ -111,7 +111,7 @@ class SessionRecordings:
             if not self._settings.get(FOLDER_KEY, ""):
                 folder.mkdir(parents=True, exist_ok=True)
             if not folder.is_dir():
-                problem = _("{folder} does not exist.").format(folder=folder)
+                problem = _("{folder} doesn't exist.").format(folder=folder)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             problem = _("Can't create {folder}: {reason}.").format(folder=folder, reason=reason)

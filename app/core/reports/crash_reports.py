@@ -40,7 +40,7 @@ TITLES: dict[Part, str] = {
     "editor": lazy("The block editor crashed last time."),
 }
 HEADING = "Crash report of NEP Studio "
-OTHER_VERSION_MESSAGE = lazy("That was NEP Studio {version}; this is {own}.")
+OTHER_VERSION_MESSAGE = lazy("The crash happened in NEP Studio {version}; this is {own}.")
 DETAIL = lazy("A report helps us fix the problem. Nothing is sent automatically.")
 
 _log = logging.getLogger("studio.crashes")

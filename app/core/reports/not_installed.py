@@ -99,7 +99,7 @@ class MissingLibraries:
         """Instructions for installing the libraries that the window needs."""
         if not self.command:
             return _("Install the package that contains it, then start Studio again.")
-        words = _("On Debian and Ubuntu type “{command}” in a terminal, then start Studio again.")
+        words = _("On Debian and Ubuntu, run “{command}” in a terminal, then start Studio again.")
         return words.format(command=self.command)
 
     @property
@@ -121,8 +121,8 @@ class MissingLibraries:
                 "without it."
             )
         return _(
-            "On Debian and Ubuntu type “{command}” in a terminal, then start Studio again. "
-            "The Developer layout works without it."
+            "On Debian and Ubuntu, run “{command}” in a terminal, then start Studio again. The "
+            "Developer layout works without it."
         ).format(command=self.command)
 
 
@@ -178,7 +178,7 @@ def import_problem(
     if isinstance(error, ModuleNotFoundError) and package in EXTRA_MODULES:
         missing = [each for each in EXTRA_MODULES if each == package or not is_installed(each)]
         return _(
-            "NEP Studio needs packages that are not installed ({names}). Install them with “{command}”"
+            "NEP Studio needs packages that aren't installed ({names}). Install them with “{command}”"
         ).format(names=format_list(missing), command="pip install 'nep-studio[studio]'")
     libraries = missing_libraries(error)
     return f"{libraries.start_title} {libraries.start_remedy}" if libraries is not None else ""

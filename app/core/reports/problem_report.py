@@ -97,11 +97,11 @@ def describe_contents(parts: ReportParts) -> list[str]:
     """Return a list of the contents, so that the user can decide whether to share them."""
     size = sum(path.stat().st_size for path in _logs(parts.log)) / 1000
     lines = [
-        _("The versions of Studio, Python, Qt and this system, and the size of the screen"),
-        _("Recent errors in Studio: its log, {size} kB").format(size=number(size, ".1f"))
+        _("Versions of Studio, Python, Qt and the operating system, and the screen size"),
+        _("Studio log with recent errors ({size} kB)").format(size=number(size, ".1f"))
         if size
-        else _("Recent errors in Studio: its log, which is empty"),
-        _("Results of the connection doctor: programs of NEP, and the addresses of this computer"),
+        else _("Studio log (empty)"),
+        _("Results of the connection doctor: NEP programs, and the addresses of this computer"),
         _("Your settings, such as language and theme"),
     ]
     crashed = len(parts.crashes.all())
@@ -113,7 +113,7 @@ def describe_contents(parts: ReportParts) -> list[str]:
 
 def work_text(names: Sequence[str]) -> str:
     """Return the line about the included behaviours."""
-    return _("Current settings: {names}").format(names=format_list([f"“{name}”" for name in names]))
+    return _("Open behaviours: {names}").format(names=format_list([f"“{name}”" for name in names]))
 
 
 def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] = ()) -> bytes:

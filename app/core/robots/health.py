@@ -111,7 +111,7 @@ class Health:
                 self._alerts.raise_alert(
                     f"robot:{link.name}",
                     "error",
-                    _("{robot} is not responding.").format(robot=link.name),
+                    _("{robot} isn't responding.").format(robot=link.name),
                     _("The behaviour uses this robot. {next_step}").format(
                         next_step=_(VIRTUAL_ROBOT_HINT if link.virtual else REAL_ROBOT_HINT)
                     ),
@@ -135,7 +135,7 @@ class Health:
         self._alerts.raise_alert(
             "journal",
             "error",
-            _("Your unsaved work is not backed up."),
+            _("Your unsaved work isn't backed up."),
             f"{sentence[0].upper()}{sentence[1:]}.",
             button=_("Save"),
             action="file.save",
@@ -277,7 +277,7 @@ class Health:
         self._alerts.raise_alert(
             f"robot:{link.name}",
             "warn",
-            (_("{robot} is not responding.") if link.virtual else _("{robot} disconnected.")).format(
+            (_("{robot} isn't responding.") if link.virtual else _("{robot} disconnected.")).format(
                 robot=link.name
             ),
             _(VIRTUAL_ROBOT_HINT if link.virtual else REAL_ROBOT_HINT),

@@ -135,7 +135,7 @@ class Launcher:
         self.ended: frozenset[str] = frozenset()
         """Virtual robots started here whose processes ended unexpectedly."""
         sentence = (
-            _("The master can't be started.") if is_loopback(address) else _("The master does not respond.")
+            _("The master can't be started.") if is_loopback(address) else _("The master doesn't respond.")
         )
         self._master = MasterStart(
             address, lambda why: post_event(LaunchFailed("master", sentence, why, False))

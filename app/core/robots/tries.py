@@ -113,7 +113,7 @@ class ManualInvocations:
                 self._mark_unresponsive(
                     link,
                     made,
-                    _("{robot} is not responding. Check that it is switched on.").format(robot=link.name),
+                    _("{robot} isn't responding. Check that it is switched on.").format(robot=link.name),
                 )
             return
         silence = max(MIN_SILENCE_S, MAX_MISSED_HEARTBEATS * robot.beat_s) if robot.beat_s else None

@@ -227,7 +227,9 @@ class RobotVoices:
     def _enqueue(self, said: Utterance) -> None:
         if len(self._waiting) >= MAX_WAITING:
             lost = self._waiting.popleft()
-            words = _("“{words}” was shown but not spoken: others were speaking").format(words=lost.text)
+            words = _("“{words}” was shown but not spoken: too many texts were waiting").format(
+                words=lost.text
+            )
             self._tell("info", lost.robot, words)
         self._waiting.append(said)
 

@@ -433,8 +433,8 @@ def unanswered_texts(report: StopReport, doubts: Sequence[str] = ()) -> tuple[st
     detail = _("Switch {robots} off by hand.").format(robots=them)
     if doubts:
         detail = ngettext(
-            "{why}. Switch {robots} off by hand if it still moves.",
-            "{why}. Switch {robots} off by hand if they still move.",
+            "{why}. Switch {robots} off by hand if it is still moving.",
+            "{why}. Switch {robots} off by hand if they are still moving.",
             len(report.unconfirmed_names),
         ).format(why="; ".join(doubts[:MAX_NAMED]), robots=them)
     if still:
@@ -459,7 +459,7 @@ def _problem_text(report: StopReport) -> str:
         silent = [*silent[:MAX_NAMED], _("{count} more").format(count=len(silent) - MAX_NAMED)]
     wrong = [*refusals, *untold]
     if silent:
-        words = ngettext("{robots} did not reply", "{robots} did not reply", len(silent))
+        words = ngettext("{robots} didn't reply", "{robots} didn't reply", len(silent))
         wrong.append(words.format(robots=format_list(silent)))
     left = len(wrong) - MAX_NAMED
     if left > 0:

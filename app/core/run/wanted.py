@@ -92,5 +92,5 @@ def _missing_robot_errors(program: Program, stack: Stack) -> dict[str, str]:
     fixes = (each.fix_action or "" for each in program.problems if each.block_id == stack.id)
     robot = next((fix.removeprefix(CONNECT_PREFIX) for fix in fixes if fix.startswith(CONNECT_PREFIX)), "")
     if not robot:
-        return {stack.id: _("The robot is not connected, so these blocks can't be tried.")}
-    return {stack.id: _("{robot} is not connected, so these blocks can't be tried.").format(robot=robot)}
+        return {stack.id: _("The robot isn't connected, so these blocks can't be tried.")}
+    return {stack.id: _("{robot} isn't connected, so these blocks can't be tried.").format(robot=robot)}

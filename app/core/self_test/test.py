@@ -125,7 +125,7 @@ class SelfTest:
         _gone, left = psutil.wait_procs(family, timeout=bounds.STEP_TIMEOUTS_S["processes"])
         if left:
             names = format_list([f"{each.pid} ({' '.join(command(each)[:4])})" for each in left])
-            self.fail(_("These processes did not exit: {names}").format(names=names))
+            self.fail(_("These processes didn't exit: {names}").format(names=names))
             kill_children()
         else:
             self.record_success()
@@ -143,7 +143,7 @@ class SelfTest:
                 self._changed.wait(left)
             what = self._awaited
         self.fail(
-            _("Studio did not respond in time and was stopped. It was waiting for: {what}").format(what=what)
+            _("Studio didn't respond in time and was stopped. It was waiting for: {what}").format(what=what)
         )
         self.report.finish()
         with suppress(OSError, ValueError):  # closed at the very end

@@ -140,7 +140,7 @@ class Curves:
         if not sources:
             raise CurveError(_("{text} has no elements now").format(text=text))
         if len(self.all) + len(new) > MAX_CURVES:
-            raise CurveError(_("a plot has at most {count} curves").format(count=MAX_CURVES))
+            raise CurveError(_("a plot can have at most {count} curves").format(count=MAX_CURVES))
         curves = []
         for source in new:
             shared = self._acquire(source)
@@ -225,10 +225,10 @@ class Curves:
         if found is MISSING:
             near = nearest_field(curve.series.path, payload)
             if near is None:
-                return _("{field} does not exist.").format(field=curve.text)
+                return _("{field} doesn't exist.").format(field=curve.text)
             meant = FieldSource(curve.series.topic, FieldPath.parse(near))
-            return _("{field} does not exist. Did you mean {near}?").format(field=curve.text, near=meant)
-        return _("{field} is not a number, text or boolean. Choose one of its fields.").format(
+            return _("{field} doesn't exist. Did you mean {near}?").format(field=curve.text, near=meant)
+        return _("{field} isn't a number, text or boolean. Choose one of its fields.").format(
             field=curve.text
         )
 

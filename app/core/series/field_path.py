@@ -81,7 +81,7 @@ class FieldPath:
             bare = found is not None and found["name"] is not None and bool(steps) and text[at] != "."
             if found is None or bare or len(steps) >= MAX_STEPS or len(text) > MAX_LENGTH:
                 raise CurveError(
-                    _("'{path}' is not a valid field path; use a path such as pose.x or joints[3]").format(
+                    _("'{path}' isn't a valid field path; use a path such as pose.x or joints[3]").format(
                         path=text[:80]
                     )
                 )
@@ -146,7 +146,7 @@ def _parse_step(found: re.Match[str]) -> Step:
         key = json.loads(found["key"])
     except ValueError:
         raise CurveError(
-            _("'{path}' is not a valid field path; use a path such as pose.x or joints[3]").format(
+            _("'{path}' isn't a valid field path; use a path such as pose.x or joints[3]").format(
                 path=found["key"][:80]
             )
         ) from None

@@ -163,7 +163,7 @@ class _Parser:
         try:
             tree = parse_expression(python)
         except (SyntaxError, ValueError, MemoryError, RecursionError):
-            raise CurveError(_("'{text}' is not a valid formula").format(text=self._text[:80])) from None
+            raise CurveError(_("'{text}' isn't a valid formula").format(text=self._text[:80])) from None
         if sum(1 for _node in ast.walk(tree)) > MAX_NODES:
             raise CurveError(_("this is too complex for one curve; use several curves"))
         source = self._source(tree.body)
@@ -188,7 +188,7 @@ class _Parser:
                 place, wants_value = duration.end(), False
                 continue
             if letter == "_" and wants_value:
-                raise CurveError(_("'{text}' is not a valid formula").format(text=self._text[:80]))
+                raise CurveError(_("'{text}' isn't a valid formula").format(text=self._text[:80]))
             out.append("**" if letter == "^" else letter)
             if not letter.isspace():
                 wants_value = letter in "(,+-*/%^"
@@ -280,7 +280,7 @@ class _Parser:
         is_field = isinstance(node, ast.Name) and re.fullmatch(r"_\d+", name)
         if not is_field and not (isinstance(node, ast.Call) and name in WINDOW_FUNCTIONS):
             near = nearest(name, [*FUNCTIONS, *WINDOW_FUNCTIONS])
-            template = _("'{name}' does not exist; {hint}")
+            template = _("'{name}' doesn't exist; {hint}")
             hint = (
                 _("did you mean '{near}'?").format(near=near)
                 if near
@@ -310,5 +310,5 @@ def unknown_topic(name: str, topics: Sequence[str]) -> CurveError:
     """Return an error for an unknown topic, which suggests the existing topic with the most similar name."""
     near = nearest(name, list(topics))
     if near is None:
-        return CurveError(_("topic {topic} does not exist").format(topic=name))
-    return CurveError(_("topic {topic} does not exist; did you mean {near}?").format(topic=name, near=near))
+        return CurveError(_("topic {topic} doesn't exist").format(topic=name))
+    return CurveError(_("topic {topic} doesn't exist; did you mean {near}?").format(topic=name, near=near))

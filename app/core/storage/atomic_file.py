@@ -40,7 +40,7 @@ def read_regular_file(path: Path, most_bytes: int = MAX_BYTES) -> bytes:
     try:
         about = os.fstat(handle)
         if not stat.S_ISREG(about.st_mode):
-            raise OSError(errno.EINVAL, _("it is a folder, a pipe or a device, not a file"), str(path))
+            raise OSError(errno.EINVAL, _("not a file, but a folder, a pipe or a device"), str(path))
         with os.fdopen(handle, "rb", closefd=False) as file:
             data = file.read(most_bytes + 1) if about.st_size <= most_bytes else b""
     finally:
@@ -49,7 +49,7 @@ def read_regular_file(path: Path, most_bytes: int = MAX_BYTES) -> bytes:
         size, most = max(about.st_size, len(data)) / 1e6, most_bytes / 1e6
         raise OSError(
             errno.EFBIG,
-            _("it has {size} MB; the limit is {most} MB").format(
+            _("the file is {size} MB; the limit is {most} MB").format(
                 size=number(size, ".1f"), most=number(most, ".0f")
             ),
             str(path),

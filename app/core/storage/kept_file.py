@@ -54,7 +54,7 @@ def read_stored(
     try:
         value, problem = parse(data)
     except newer as error:
-        template = _("Your changes are not being saved: {reason}. The file is unchanged.")
+        template = _("Your changes aren't being saved: {reason}. The file is unchanged.")
         return StoredFile(None, template.format(reason=error), is_newer=True)
     except NepError as error:
         return StoredFile(None, _save_damaged(path, str(error)))

@@ -280,7 +280,7 @@ class Settings:
             self.damaged = None
             return {}
         self.notice = _(
-            "The settings could not be read, so Studio uses defaults. The old file was kept as “{file}”."
+            "The settings couldn't be read, so Studio uses defaults. The old file was kept as “{file}”."
         ).format(file=self.damaged.name)
         return {}
 

@@ -299,7 +299,7 @@ def value_problem(parameter: Parameter, value: object, place: str = "") -> str |
         return None if isinstance(value, bool) else _("{place} must be yes or no").format(place=place)
     if parameter.kind == "colour":
         good = isinstance(value, str) and _HEX_COLOUR.fullmatch(value) is not None
-        return None if good else _("{place} must be a colour like #20c0e0").format(place=place)
+        return None if good else _("{place} must be a colour such as #20c0e0").format(place=place)
     if parameter.kind == "list":
         return _list_problem(parameter, value, place)
     if parameter.kind == "object":

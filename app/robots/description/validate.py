@@ -112,19 +112,17 @@ def _json_problem(value: object, seen: Iterator[int], path: str = "", depth: int
         )
         return next((found for found in found_items if found is not None), None)
     if isinstance(value, (int, float)) and not -_MAX_NUMBER <= value <= _MAX_NUMBER:
-        return _("{place} is not a finite number, or is too large").format(place=path)
+        return _("{place} isn't a finite number, or is too large").format(place=path)
     if value is None or isinstance(value, (str, bool, int, float)):
         return None
-    return _("{place} is not JSON: {kind}").format(place=path, kind=type(value).__name__)
+    return _("{place} isn't JSON: {kind}").format(place=path, kind=type(value).__name__)
 
 
 def _key_problem(key: object, place: str) -> str | None:
     if not isinstance(key, str):
-        return _("{place} has a name that is not text: {name}").format(place=place, name=repr(key))
+        return _("{place} has a name that isn't text: {name}").format(place=place, name=repr(key))
     if key == "$ref":
-        return _("{place} uses $ref, which is not supported; write the definition in place").format(
-            place=place
-        )
+        return _("{place} uses $ref, which isn't supported; write the definition inline").format(place=place)
     return None
 
 
@@ -155,7 +153,7 @@ _RULE_MESSAGES = {
     "maxProperties": _TOO_LONG_MESSAGE,
     "anyOf": lazy("{place} doesn't match any allowed format"),
 }
-INVALID_MESSAGE = lazy("{place} is not valid")
+INVALID_MESSAGE = lazy("{place} isn't valid")
 DESCRIPTION_LABEL = lazy("the description")
 
 
@@ -175,7 +173,7 @@ def _error_message(error: ValidationError) -> str:
         return _("{place} must be {value}").format(place=place, value=limit)
     if rule == "pattern":
         shown = _shorten_and_quote(error.instance)
-        return _("{place}: {value} is not allowed; use letters, digits, - and _ without spaces").format(
+        return _("{place}: {value} isn't allowed; use letters, digits, - and _ without spaces").format(
             place=place, value=shown
         )
     return _(_RULE_MESSAGES.get(rule, INVALID_MESSAGE)).format(place=place, limit=limit)
@@ -194,7 +192,7 @@ def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
     properties = object_member(model, "properties")
     stop = bounded_str(object_member(model, "rb:safeStop").get("action"))
     if stop not in actions:
-        yield _("rb:safeStop.action names '{stop}', which is not an action").format(stop=stop)
+        yield _("rb:safeStop.action names '{stop}', which isn't an action").format(stop=stop)
     elif object_member(object_member(actions, stop), "input").get("required"):
         yield _("'{stop}' is the safe stop, so its input must not have required fields").format(stop=stop)
     resources_named = set(names(model.get("rb:resources")))
@@ -215,7 +213,7 @@ def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
         yield from _field_contradictions(f"events.{name}.data", data)
         for field in names(happening.get("rb:filter")):
             if field not in data:
-                yield _("events.{name}.rb:filter names '{field}', which is not in its data").format(
+                yield _("events.{name}.rb:filter names '{field}', which isn't in its data").format(
                     name=name, field=field
                 )
         yield from _text_contradictions(f"events.{name}", happening, data)
@@ -228,19 +226,19 @@ def _action_contradictions(
     yield from _field_contradictions(f"actions.{name}.input", fields)
     for field in names(object_member(action, "input").get("required")):
         if field not in fields:
-            yield _("actions.{name}.input requires '{field}', which it does not define").format(
+            yield _("actions.{name}.input requires '{field}', which it doesn't define").format(
                 name=name, field=field
             )
     for used in names(action.get("rb:uses")):
         if used not in resources_named:
-            yield _("actions.{name}.rb:uses names '{used}', which is not in rb:resources").format(
+            yield _("actions.{name}.rb:uses names '{used}', which isn't in rb:resources").format(
                 name=name, used=used
             )
     for field, data in fields.items():
         source = as_object(data).get("rb:optionsFrom")
         if source is not None and source not in properties:
             yield _(
-                "actions.{name}.input.{field} takes its options from '{source}', which is not a property"
+                "actions.{name}.input.{field} takes its options from '{source}', which isn't a property"
             ).format(name=name, field=field, source=source)
     yield from _text_contradictions(f"actions.{name}", action, fields)
 
@@ -274,7 +272,7 @@ def _text_contradictions(
             used = PLACEHOLDER.findall(str(text))
             for name in used:
                 if name != "robot" and name not in fields:
-                    yield _("{place}.rb:block.{kind}.{language} uses %{name}, which is not defined").format(
+                    yield _("{place}.rb:block.{kind}.{language} uses %{name}, which isn't defined").format(
                         place=place, kind=kind, language=language, name=name
                     )
             if kind == "text" and len(used) != len(set(used)):

@@ -142,7 +142,7 @@ def _type_schema(annotation: object, inside: tuple[object, ...]) -> Schema:
         )
     if annotation in inside:
         raise TypeError(
-            _("recursive types are not supported: {annotation}").format(annotation=format_type(annotation))
+            _("recursive types aren't supported: {annotation}").format(annotation=format_type(annotation))
         )
     fields = fields_of(annotation)
     if fields is not None:
@@ -170,7 +170,7 @@ def _choice_schema(annotation: object, choices: tuple[tuple[object, object, str 
     values = [value for value, _, _ in choices]
     if not all(isinstance(value, (str, int, float)) and not isinstance(value, bool) for value in values):
         raise TypeError(
-            _("choices must be texts or numbers, not {annotation}; for true or false, use bool").format(
+            _("choices must be strings or numbers, not {annotation}; for true or false, use bool").format(
                 annotation=format_type(annotation)
             )
         )
@@ -219,7 +219,7 @@ def _note_schema(note: object, schema: Schema) -> Schema:
         return {"pattern": "^#[0-9a-fA-F]{6}$", "rb:widget": "colour"}
     if isinstance(note, _PictureText):
         return {"format": "uri-reference", "contentMediaType": "image/jpeg", "rb:widget": "image"}
-    raise TypeError(_("{note} is not a valid annotation for a robot's value").format(note=repr(note)))
+    raise TypeError(_("{note} isn't a valid annotation for a robot's value").format(note=repr(note)))
 
 
 def _without_none(found: Mapping[str, object]) -> Schema:
@@ -231,7 +231,7 @@ def _check_unit(unit: object) -> None:
         return
     if not isinstance(unit, str):
         raise TypeError(
-            _("a unit must be a text such as 'm', not {unit}; use Range(0, 1, unit='m')").format(
+            _("a unit must be a string such as 'm', not {unit}; use Range(0, 1, unit='m')").format(
                 unit=repr(unit)
             )
         )

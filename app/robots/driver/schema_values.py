@@ -48,7 +48,7 @@ def split_optional(annotation: object) -> tuple[object, bool]:
         return float, is_optional
     if len(kinds) != 1:
         raise TypeError(
-            _("a union of several types is not supported: {annotation}").format(
+            _("a union of several types isn't supported: {annotation}").format(
                 annotation=format_type(annotation)
             )
         )

@@ -559,7 +559,7 @@ class Tasks:
 
 
 def _stopped_reply() -> TaskReply:
-    return TaskReply("canceled", error=_("the robot was stopped before this started"))
+    return TaskReply("canceled", error=_("the robot was stopped before this action started"))
 
 
 def still_moving_message(name: str, actions: Sequence[str]) -> str:

@@ -207,7 +207,7 @@ class DoctorPanel(PanelWidget):
         recorded = not topic or self.session.topics.get(topic) is not None
         sentence = _("A recording is open, so panels show recorded data instead of live data.")
         if not recorded:
-            sentence = _("A recording is open and {topic} is not in it.").format(topic=topic_label(topic))
+            sentence = _("The open recording doesn't contain {topic}.").format(topic=topic_label(topic))
         fix = _("The checks below are about the live network.")
         return Blocker(sentence, fix, _("Back to live"), lambda: self.context.run("replay.live"))
 

@@ -224,7 +224,7 @@ class VariablesPanel(TablePanel[VariableRow]):
     def update_empty_state(self) -> None:
         self.empty.set_texts(
             _("No variables yet"),
-            _("A variable stores a number, a text or a list under a name. You see its value here."),
+            _("A variable stores a number, a text or a list under a name. Its value is shown here."),
             "variable",
         )
         new = EmptyAction(

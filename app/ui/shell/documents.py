@@ -400,10 +400,10 @@ def alert_text(error: Exception) -> AlertText:
 def unknown_type_text(paths: Sequence[Path]) -> AlertText:
     """Return the text of the alert for files of unknown types."""
     names = [path.name or str(path) for path in paths]
-    words, others = _("{file} is not a behaviour"), len(names) - 1
+    words, others = _("{file} isn't a behaviour"), len(names) - 1
     if others:
         words = ngettext(
-            "{file} and {count} more are not behaviours", "{file} and {count} more are not behaviours", others
+            "{file} and {count} more aren't behaviours", "{file} and {count} more aren't behaviours", others
         )
     return AlertText(f"{words.format(file=names[0], count=others)}.", _as_sentence(file_type_hint()))
 

@@ -579,7 +579,12 @@ class MainWindow(QMainWindow):
             return True
         self.show_layout("behaviour")
         self.session.documents.show(unkept[0])
-        self.toast.show_toast(_("Studio can't close: save this behaviour first, or its changes are lost"))
+        self.toast.show_toast(
+            _(
+                "Can't close Studio: this behaviour can't be backed up. Save it, or close again to discard "
+                "its changes."
+            )
+        )
         return False
 
     def _save_state(self) -> None:

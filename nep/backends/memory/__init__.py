@@ -94,7 +94,7 @@ forks.call_in_child(_forked)
 
 def _hub(configuration: Configuration) -> _Hub:
     if not isinstance(configuration, Hybrid):
-        raise NepError(_("the back end 'memory' does not support direct connections; use 'zeromq'"))
+        raise NepError(_("the back end 'memory' doesn't support direct connections; use 'zeromq'"))
     with _hubs_lock:
         return _hubs.setdefault(configuration.master, _Hub())
 

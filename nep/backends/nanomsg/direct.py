@@ -38,10 +38,7 @@ def check_direct(direct: Direct) -> None:
     """Raise `NepError` for a mode or wire that this back end doesn't support."""
     if direct.mode == "many2many":
         raise NepError(
-            _(
-                "the back end 'nanomsg' does not support direct connections of mode 'many2many'; "
-                "use 'one2many'"
-            )
+            _("the back end 'nanomsg' doesn't support direct connections of mode 'many2many'; use 'one2many'")
         )
     if direct.wire != "original":
         raise NepError(
@@ -81,7 +78,7 @@ def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng is not typed
         socket.dial(f"tcp://{address}", block=False)
     except load_pynng().NNGException as error:
         raise NepError(
-            _("cannot connect to '{address}'; use a computer's address and a port up to 65535").format(
+            _("can't connect to '{address}'; use a computer's address and a port up to 65535").format(
                 address=address
             )
         ) from error
@@ -171,7 +168,7 @@ class DirectPublisher:
         if warns:
             _logger.warning(
                 _(
-                    "a message on '{topic}' has {size} bytes; programs that use libnanomsg silently drop "
+                    "a message on '{topic}' is {size} bytes; programs that use libnanomsg silently drop "
                     "messages of more than {most} bytes, so send smaller messages"
                 ).format(topic=self.spec.topic, size=len(frame), most=_LIBNANOMSG_MAX_BYTES)
             )

@@ -63,7 +63,7 @@ def split_message(message: bytes, first: bytes, *, is_alone: bool) -> list[bytes
         return [rest[:HEADER_BYTES], body]
     if header.size > len(body):
         raise WireError(
-            _("its header declares {size} bytes, but only {count} follow").format(
+            _("the header declares {size} bytes, but only {count} follow").format(
                 size=header.size, count=len(body)
             ),
             len(message),

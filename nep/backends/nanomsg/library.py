@@ -45,8 +45,8 @@ def load_pynng(load: Callable[[str], ModuleType] = importlib.import_module) -> A
     if _inherited_libraries:
         raise NepError(
             _(
-                "'nanomsg' does not work in a forked process of a program that uses it; start the process "
-                "with multiprocessing's method 'spawn'"
+                "'nanomsg' doesn't work in a process forked from a program that uses it; start the process "
+                "with multiprocessing's start method 'spawn'"
             )
         )
     try:

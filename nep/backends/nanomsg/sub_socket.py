@@ -155,10 +155,10 @@ class NanomsgSubSocket(UnbatchedReader):
             source.endpoint = f"tcp://{places[0]}"
             return
         source.failed_endpoint = endpoint
-        source.problem = _("cannot connect to the endpoint '{shown}' of '{name}': {why}").format(
+        source.problem = _("can't connect to the endpoint '{shown}' of '{name}': {why}").format(
             shown=ascii(endpoint[:100])[1:-1],
             name=remote.node_name,
-            why=why or _("it is not an endpoint of 'nanomsg'"),
+            why=why or _("not an endpoint of 'nanomsg'"),
         )
         if self.refusals.add(source.problem):
             _logger.warning("subscription to '%s': %s", self._name, source.problem)

@@ -35,7 +35,7 @@ def ros_master_address(given: str | None) -> str:
         host, port = None, 0
     if not host or not port:
         raise NepError(
-            _("'{chosen}' is not a valid address of a ROS master; use an address such as '{example}'").format(
+            _("'{chosen}' isn't a valid address of a ROS master; use an address such as '{example}'").format(
                 chosen=quotable(text), example=f"127.0.0.1:{_DEFAULT_PORT}"
             )
         )

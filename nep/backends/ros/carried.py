@@ -298,8 +298,8 @@ def version_error(ros_type: str) -> NepError:
     """Return the error for a type that the publisher defines differently from this program."""
     return NepError(
         _(
-            "its '{ros_type}' has different fields from the definition on this computer; use the same "
-            "version on both sides"
+            "the publisher's '{ros_type}' has different fields from the definition on this computer; "
+            "use the same version on both sides"
         ).format(ros_type=escaped(shortened(ros_type, 100)))
     )
 
@@ -307,8 +307,8 @@ def version_error(ros_type: str) -> NepError:
 def _type_mismatch_error(msg_type: str, ros_type: str) -> NepError:
     return NepError(
         _(
-            "it publishes '{ros_type}', which a subscriber of '{msg_type}' can't read; subscribe with "
-            "that type"
+            "the publisher sends '{ros_type}', which a subscriber of '{msg_type}' can't read; "
+            "subscribe with that type"
         ).format(ros_type=ros_type, msg_type=msg_type)
     )
 
@@ -317,7 +317,7 @@ def _read_sized(body: memoryview, at: int) -> tuple[memoryview, int]:
     # Returns the bytes after the length at `at`, and the offset of their end.
     (size,) = _LENGTH.unpack_from(body, at)
     if at + 4 + size > len(body):
-        raise WireError(_("it is truncated"), len(body))
+        raise WireError(_("the data is truncated"), len(body))
     return body[at + 4 : at + 4 + size], at + 4 + size
 
 
@@ -338,7 +338,7 @@ def _from_array(body: memoryview) -> Unpacked:
     (count,) = _LENGTH.unpack_from(body, 0)
     at = 4
     if count * 12 > len(body):
-        raise WireError(_("it is truncated"), len(body))
+        raise WireError(_("the data is truncated"), len(body))
     for _number in range(count):
         _label, at = _read_sized(body, at)
         at += 8
@@ -368,7 +368,7 @@ def _from_raw(body: memoryview) -> Unpacked:
     if layout is None:
         raise WireError(
             _(
-                "its encoding '{name}' is not supported; use an encoding such as 'bgr8', 'mono8' or '16UC1'"
+                "the encoding '{name}' isn't supported; use an encoding such as 'bgr8', 'mono8' or '16UC1'"
             ).format(name=encoding)
         )
     size = int(layout.dtype[-1])

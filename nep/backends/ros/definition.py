@@ -224,7 +224,7 @@ class _Parser:
 
     def _definition_error(self, part: str) -> NepError:
         return NepError(
-            _("the definition of '{name}' cannot be read; check '{part}'").format(
+            _("the definition of '{name}' can't be read; check '{part}'").format(
                 name=escaped(shortened(self._name, 100)), part=escaped(shortened(part, 60))
             )
         )
@@ -282,7 +282,7 @@ def _float_kind(name: str) -> FieldKind:
             out += packing.pack(as_float(value))
         except (OverflowError, TypeError, ValueError, struct.error):
             raise _FieldError(
-                path, _("is {value}, which is not a '{name}'").format(value=_describe(value), name=name)
+                path, _("is {value}, which isn't a '{name}'").format(value=_describe(value), name=name)
             ) from None
 
     return FieldKind(
@@ -298,7 +298,7 @@ def _time_kind(name: str) -> FieldKind:
             out += packing.pack(*_secs_of(value, path, name))
         except struct.error:
             raise _FieldError(
-                path, _("is {value}, which is not a '{name}'").format(value=_describe(value), name=name)
+                path, _("is {value}, which isn't a '{name}'").format(value=_describe(value), name=name)
             ) from None
 
     def read(reader: _Reader, _path: str) -> object:
@@ -391,7 +391,7 @@ def _bytes_of(value: object, path: str, name: str) -> bytes | bytearray | memory
     try:
         return bytes(value)
     except (TypeError, ValueError):
-        raise _FieldError(path, _("contains a value that is not an integer from 0 to 255")) from None
+        raise _FieldError(path, _("contains a value that isn't an integer from 0 to 255")) from None
 
 
 def _read_bytes(reader: _Reader, _path: str, count: int) -> object:
@@ -513,7 +513,7 @@ def _unknown_field(path: str, key: object, names: tuple[str, ...]) -> _FieldErro
     where = f"{path}.{key}" if path else str(key)
     return _FieldError(
         escaped(shortened(where, 200)),
-        _("does not exist; {did_you_mean}").format(did_you_mean=did_you_mean(str(key), names)),
+        _("doesn't exist; {did_you_mean}").format(did_you_mean=did_you_mean(str(key), names)),
     )
 
 

@@ -91,8 +91,8 @@ def get_rospy() -> Any:  # noqa: ANN401 - not typed
     if _inherited_libraries:
         raise NepError(
             _(
-                "'ros' does not work in a forked process of a program that uses it; start the process with "
-                "multiprocessing's method 'spawn'"
+                "'ros' doesn't work in a process forked from a program that uses it; start the process "
+                "with multiprocessing's start method 'spawn'"
             )
         )
     return sys.modules.get("rospy") or load_rospy()

@@ -88,7 +88,7 @@ class ServiceConnection:
         except ValueError:
             host = port = None
         if parts.scheme != "rosrpc" or not host or not port:
-            raise ServiceConnectionError(_("it has no valid address"))
+            raise ServiceConnectionError(_("the server has no valid address"))
         self._deadline = min(deadline, time.monotonic() + _HANDSHAKE_TIMEOUT_S)
         self._socket = socket.create_connection((host, port), max(0.001, self._remaining_s()))
         try:
@@ -130,7 +130,7 @@ class ServiceConnection:
     def _receive_sized(self, max_size: int) -> bytes:
         (size,) = _LENGTH.unpack(self._receive_exactly(4))
         if size > max_size:
-            raise ServiceConnectionError(_("its message is too large"))
+            raise ServiceConnectionError(_("the message is too large"))
         return self._receive_exactly(size)
 
     def _receive_exactly(self, size: int) -> bytes:
@@ -140,7 +140,7 @@ class ServiceConnection:
             self._set_timeout()
             count = self._socket.recv_into(view)
             if not count:
-                raise ServiceConnectionError(_("it closed the connection"))
+                raise ServiceConnectionError(_("the other side closed the connection"))
             view = view[count:]
         return bytes(data)
 

@@ -123,7 +123,7 @@ class RospySubscriber(WakingSubscriber):
             try:
                 message = self._read(source, body)
             except (WireError, struct.error) as error:
-                self._reject(error.reason if isinstance(error, WireError) else _("it is truncated"))
+                self._reject(error.reason if isinstance(error, WireError) else _("the data is truncated"))
                 return
             dropped = self.inbox.put(message)
             self.received += 1 - dropped

@@ -41,7 +41,7 @@ _BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
 
 def _master_address(configuration: Configuration) -> str:
     if not isinstance(configuration, Hybrid):
-        raise NepError(_("the back end 'ros' does not support direct connections; use 'zeromq'"))
+        raise NepError(_("the back end 'ros' doesn't support direct connections; use 'zeromq'"))
     return configuration.master
 
 

@@ -49,7 +49,7 @@ def resolve_domain(master: str | None, environment: Mapping[str, str] = os.envir
     said = (master or "").strip()
     if said and not _is_domain(said):
         raise NepError(
-            _("'{said}' is not a ROS 2 domain; use a number from 0 to {most}").format(
+            _("'{said}' isn't a ROS 2 domain; use a number from 0 to {most}").format(
                 said=said[:40], most=_DOMAIN_COUNT - 1
             )
         )

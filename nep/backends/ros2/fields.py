@@ -128,7 +128,7 @@ def to_message(types: TypeRegistry, name: str, payload: object, path: str = "") 
         if key not in fields:
             raise RosFieldError(
                 _join_path(path, escaped(str(key)[:100])),
-                _("is not a field of '{name}'; its fields: {fields}").format(
+                _("isn't a field of '{name}'; its fields: {fields}").format(
                     name=name, fields=", ".join(f"'{each}'" for each in fields) or _("none")
                 ),
             )
@@ -214,7 +214,7 @@ def _convert_text(field: RosField, value: object, path: str) -> str:
     if not isinstance(value, str):
         raise RosFieldError(path, _("is a '{kind}'; expected a 'str'").format(kind=_type_name(value)))
     if "\0" in value:
-        raise RosFieldError(path, _("contains a null character, which is not allowed in ROS strings"))
+        raise RosFieldError(path, _("contains a null character, which isn't allowed in ROS strings"))
     try:
         size = len(value.encode())
     except UnicodeEncodeError:
@@ -222,7 +222,7 @@ def _convert_text(field: RosField, value: object, path: str) -> str:
     if field.max_text_bytes and size > field.max_text_bytes:
         raise RosFieldError(
             path,
-            _("has {size} bytes; at most {most} are allowed").format(size=size, most=field.max_text_bytes),
+            _("is {size} bytes; at most {most} are allowed").format(size=size, most=field.max_text_bytes),
         )
     return value
 

@@ -51,8 +51,8 @@ def load_dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds
     if _inherited_libraries:
         raise NepError(
             _(
-                "'ros2' does not work in a forked process of a program that uses it; start the process "
-                "with multiprocessing's method 'spawn'"
+                "'ros2' doesn't work in a process forked from a program that uses it; start the process "
+                "with multiprocessing's start method 'spawn'"
             )
         )
     try:

@@ -44,7 +44,7 @@ class MessageTypes:
         except KeyError:
             known = [each.name.removeprefix("ROS2_").lower() for each in rosbags.Stores]
             raise NepError(
-                _("ROS_DISTRO is '{release}', which rosbags does not know; {did_you_mean}").format(
+                _("ROS_DISTRO is '{release}', which rosbags doesn't know; {did_you_mean}").format(
                     release=release[:40], did_you_mean=did_you_mean(release, known)
                 )
             ) from None
@@ -141,7 +141,7 @@ class MessageTypes:
             found = self._rosbags.get_types_from_msg(text, alike)[alike]
         except Exception as error:  # its parser raises its own exception classes
             raise NepError(
-                _("the definition of '{name}' cannot be read: {error}").format(name=name, error=error)
+                _("the definition of '{name}' can't be read: {error}").format(name=name, error=error)
             ) from error
         with self._lock:
             fields = read_definition(found[1])[1]
@@ -192,7 +192,7 @@ class MessageTypes:
                 found.update(self._rosbags.get_types_from_msg(text, name))
             except Exception as error:  # noqa: BLE001 - its parser raises its own exception classes
                 wrong[name] = NepError(
-                    _("the definition of '{name}' cannot be read: {error}").format(name=name, error=error)
+                    _("the definition of '{name}' can't be read: {error}").format(name=name, error=error)
                 )
         with self._lock:
             fields = {name: read_definition(entries)[1] for name, (_constants, entries) in found.items()}
@@ -215,12 +215,11 @@ class MessageTypes:
     def _missing_type_errors(self, fields: Mapping[str, Sequence[RosField]]) -> dict[str, NepError]:
         # Types that use unknown types.
         wide = _(
-            "'{name}' has the field '{field}' of type wstring, which 'ros2' does not support; use a string"
+            "'{name}' has the field '{field}' of type wstring, which 'ros2' doesn't support; use a string"
         )
         unknown = _(
-            "'{name}' uses the type '{kind}' for its field '{field}', which is unknown or not "
-            "supported; "
-            "add that type, too"
+            "'{name}' has the field '{field}' of type '{kind}', which is unknown or not supported; add "
+            "that type, too"
         )
         return {
             name: NepError(

@@ -78,7 +78,7 @@ def _type_alert(topic: str, writers: Sequence[NodeEndpoint], readers: Sequence[N
     return Alert(
         f"ros2-type:{topic}",
         _(
-            "{readers} does not receive “{topic}” from {writers}: it requests “{wanted}”, but the "
+            "{readers} doesn't receive “{topic}” from {writers}: it requests “{wanted}”, but the "
             "publisher offers “{sent}”"
         ).format(
             readers=_node_names(readers),
@@ -108,7 +108,7 @@ def _reliability_alert(topic: str, writers: Sequence[NodeEndpoint], readers: Seq
     return Alert(
         f"ros2-reliability:{topic}",
         _(
-            "{readers} does not receive “{topic}” from {writers}: it requests “reliable”, but the "
+            "{readers} doesn't receive “{topic}” from {writers}: it requests “reliable”, but the "
             "publisher offers “best effort”"
         ).format(readers=_node_names(readers), writers=_node_names(writers), topic=topic),
         _("Subscribe with qos='sensor' or qos='best_effort', or publish with qos='reliable'."),
@@ -119,8 +119,8 @@ def _durability_alert(topic: str, writers: Sequence[NodeEndpoint], readers: Sequ
     return Alert(
         f"ros2-durability:{topic}",
         _(
-            "{readers} does not receive “{topic}” from {writers}: it requests earlier messages "
-            "(“transient local”), but the publisher does not keep them (“volatile”)"
+            "{readers} doesn't receive “{topic}” from {writers}: it requests earlier messages "
+            "(“transient local”), but the publisher doesn't keep them (“volatile”)"
         ).format(readers=_node_names(readers), writers=_node_names(writers), topic=topic),
         _("Publish with latched=True, or subscribe with the durability “volatile”."),
     )

@@ -64,7 +64,7 @@ def type_name(msg_type: str) -> str:
     found = _TYPE.fullmatch(msg_type)
     if found is None:
         raise NepError(
-            _("'{name}' is not a ROS message type; use a name such as 'std_msgs/msg/String'").format(
+            _("'{name}' isn't a ROS message type; use a name such as 'std_msgs/msg/String'").format(
                 name=quotable(msg_type)
             )
         )

@@ -200,7 +200,7 @@ class Participant:
                 _delete(self._domain)
             raise NepError(
                 _(
-                    "Cyclone DDS cannot start: {error}; check CYCLONEDDS_URI, the network, and whether the "
+                    "Cyclone DDS can't start: {error}; check CYCLONEDDS_URI, the network, and whether the "
                     "domain already has {most} programs"
                 ).format(error=error, most=PARTICIPANTS_MAX)
             ) from error

@@ -190,7 +190,7 @@ class Ros2Publisher:
             codes = self._participant.dds.core.DDSException
             if error.code == codes.DDS_RETCODE_BAD_PARAMETER:  # cyclonedds validates every message
                 raise WireError(
-                    _("the bytes are not a message of type '{name}'").format(name=self._mapping.ros_type),
+                    _("the bytes aren't a message of type '{name}'").format(name=self._mapping.ros_type),
                     len(cdr),
                 ) from error
             if error.code != codes.DDS_RETCODE_TIMEOUT:

@@ -58,7 +58,7 @@ class Ros2Transport:
         if not isinstance(configuration, Hybrid):
             raise NepError(
                 _(
-                    "'ros2' does not support direct connections: its nodes find each other in a domain; omit "
+                    "'ros2' doesn't support direct connections: its nodes find each other in a domain; omit "
                     "the configuration, or choose the domain with master='5'"
                 )
             )

@@ -132,7 +132,7 @@ def _encode_text(payload: object) -> Encoded:
 
 
 def _null_character_reason() -> str:
-    return _("it contains a null character, which is not allowed in ROS strings; use the type 'bytes'")
+    return _("the text contains a null character, which isn't allowed in ROS strings; use the type 'bytes'")
 
 
 def _pack_text(encoded: Encoded) -> bytes:
@@ -145,7 +145,7 @@ def _pack_text(encoded: Encoded) -> bytes:
 def _unpack_text(cdr: bytes) -> memoryview:
     (size,) = _read_numbers(cdr, "I", 4)
     if not 0 < size <= len(cdr) - 8 or cdr[7 + size] != 0:
-        raise WireError(_("it is not a ROS string"), len(cdr))
+        raise WireError(_("not a ROS string"), len(cdr))
     return memoryview(cdr)[8 : 7 + size]
 
 
@@ -159,14 +159,14 @@ def _unpack_bytes(cdr: bytes) -> bytes | memoryview:
     if dimensions:
         return _read_data_field(_BYTES_TYPE, cdr)
     if size > len(cdr) - 16:
-        raise WireError(_("it is not a ROS byte array"), len(cdr))
+        raise WireError(_("not a ROS byte array"), len(cdr))
     return memoryview(cdr)[16 : 16 + size]
 
 
 def _read_numbers(cdr: bytes, form: str, at: int) -> tuple[int, ...]:
     # The header has the byte order. Raises `WireError`.
     if len(cdr) < at + 4 * len(form) or cdr[0] != 0 or cdr[1] > 1:
-        raise WireError(_("it is not a ROS message"), len(cdr))
+        raise WireError(_("not a ROS message"), len(cdr))
     return struct.unpack_from(f"{'<' if cdr[1] else '>'}{form}", cdr, at)
 
 

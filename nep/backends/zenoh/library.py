@@ -34,8 +34,8 @@ def load_zenoh(load: Callable[[str], ModuleType] = importlib.import_module) -> A
     if _inherited_libraries:
         raise NepError(
             _(
-                "'zenoh' does not work in a forked process of a program that uses it; start the process "
-                "with multiprocessing's method 'spawn'"
+                "'zenoh' doesn't work in a process forked from a program that uses it; start the process "
+                "with multiprocessing's start method 'spawn'"
             )
         )
     try:

@@ -97,8 +97,8 @@ def validate_address(master: str | None = None) -> str:
         return place
     raise NepError(
         _(
-            "'{place}' is not a zenoh address; use 'local', an endpoint such as "
-            "'tcp/192.168.1.5:7447', or a zenoh configuration file such as 'zenoh.json5'"
+            "'{place}' isn't a zenoh address; use 'local', an endpoint such as 'tcp/192.168.1.5:7447', "
+            "or a zenoh configuration file such as 'zenoh.json5'"
         ).format(place=place)
     )
 
@@ -170,7 +170,7 @@ def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
         except load_zenoh().ZError as error:
             if not left:
                 raise NepError(
-                    _("zenoh cannot listen at '{host}': {error}").format(
+                    _("zenoh can't listen at '{host}': {error}").format(
                         host=LOOPBACK, error=_error_text(error)
                     )
                 ) from error
@@ -203,7 +203,7 @@ def _load_config(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
         config = load_zenoh().Config.from_file(str(path.expanduser()))
     except load_zenoh().ZError as error:
         raise NepError(
-            _("'{path}' is not a zenoh configuration: {error}; see DEFAULT_CONFIG.json5 of zenoh").format(
+            _("'{path}' isn't a zenoh configuration: {error}; see DEFAULT_CONFIG.json5 of zenoh").format(
                 path=path, error=_error_text(error)
             )
         ) from error
@@ -222,12 +222,12 @@ def _open_session(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh is no
         message = _error_text(error)
         if _SECURE_PROTOCOL.search(message) is not None:
             reason = _(
-                "zenoh cannot open a session at '{place}': {error}; check that a router is running there "
+                "zenoh can't open a session at '{place}': {error}; check that a router is running there "
                 "and that each side trusts the certificate of the other"
             )
         else:
             reason = _(
-                "zenoh cannot open a session at '{place}': {error}; check that a router is running there "
+                "zenoh can't open a session at '{place}': {error}; check that a router is running there "
                 "and that it allows this connection"
             )
         raise NepError(reason.format(place=place, error=message)) from error

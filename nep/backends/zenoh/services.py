@@ -274,7 +274,7 @@ class ZenohClient(ClientCalls[_Call]):
         try:
             number, outcome = NATIVE.read_reply([attachment, sample.payload.to_bytes()])
             if number != call.number:
-                raise WireError(_("it is not a service reply"))
+                raise WireError(_("not a service reply"))
         except WireError as error:
             if self._refusals.add(error.reason):
                 log_line = "malformed reply from the server of '%s': %s"
@@ -298,7 +298,7 @@ class ZenohClient(ClientCalls[_Call]):
             self._finish(call, ServerGoneError(self.spec.service))
         elif call.finished_at <= now:
             reason = _(
-                "the server of '{service}' is connected but did not reply; it may be unable to decode the "
+                "the server of '{service}' is connected but didn't reply; it may be unable to decode the "
                 "call, or a router's access control denies '{key}'"
             )
             self._finish(call, NepError(reason.format(service=self.spec.service, key=call.key)))

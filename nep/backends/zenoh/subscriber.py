@@ -181,7 +181,9 @@ class ZenohSubscriber(WakingSubscriber):
         # Call with the lock of the inboxes held.
         try:
             if not rest[0]:
-                raise WireError(_("it has no header; the publisher is not a nep program"), len(rest[-1]))
+                raise WireError(
+                    _("the message has no header; its publisher isn't a nep program"), len(rest[-1])
+                )
             if (
                 first == topic_parser.topic
                 and _is_latched(rest[0])

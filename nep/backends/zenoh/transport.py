@@ -150,7 +150,7 @@ class ZenohTransport:
         if isinstance(configuration, Direct):
             raise NepError(
                 _(
-                    "the back end 'zenoh' does not support direct connections; omit the configuration (no "
+                    "the back end 'zenoh' doesn't support direct connections; omit the configuration (no "
                     "master is needed), or use master='tcp/192.168.1.5:7447' to connect to a router on "
                     "another "
                     "computer"

@@ -98,7 +98,7 @@ def from_frame(topic: str, msg_type: str, codec: str, frame: bytes) -> bytes | N
     try:
         return base64.b64decode(frame, validate=True)
     except binascii.Error as error:
-        raise WireError(_("an image is not base64-encoded"), len(frame)) from error
+        raise WireError(_("an image isn't base64-encoded"), len(frame)) from error
 
 
 def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:

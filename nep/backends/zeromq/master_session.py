@@ -328,7 +328,7 @@ class MasterSession:
         reply = self._calls.request(QueryGraph(), timeout_s)
         if not isinstance(reply, GraphReply):
             raise RequestRefusedError(
-                _("the master at '{address}' did not reply with its graph").format(address=self.address)
+                _("the master at '{address}' didn't reply with its graph").format(address=self.address)
             )
         return reply.view
 

@@ -166,7 +166,7 @@ class RpcClient:
                 _("the master's reply can't be read: {reason}").format(reason=error.reason)
             ) from error
         if isinstance(reply, Push):
-            raise RequestRefusedError(_("the master's message is not a reply"))
+            raise RequestRefusedError(_("the master's message isn't a reply"))
         return reply
 
     def notify(self, request: Request, then: ReplyCallback | None = None) -> None:

@@ -136,7 +136,7 @@ def connect(owner: Socket, address: str) -> str:
     endpoint = endpoint_of(address)
     if not is_endpoint(endpoint):
         raise NepError(
-            _("cannot connect to '{address}'; use a computer's address and a port up to 65535").format(
+            _("can't connect to '{address}'; use a computer's address and a port up to 65535").format(
                 address=address
             )
         )

@@ -171,9 +171,7 @@ class CarefulParser:
             source.has_echoed = True
         if not is_possible:
             raise WireError(
-                _("the sequence number of its publisher jumps from {last} to {seq}").format(
-                    last=last, seq=header.seq
-                ),
+                _("the sequence number jumps from {last} to {seq}").format(last=last, seq=header.seq),
                 code="seq-leap",
             )
 
@@ -191,7 +189,7 @@ class CarefulParser:
         if header.flags & SHARED:
             if self._shared is None:
                 raise WireError(
-                    _("its payload is in shared memory that no publisher offered"), code="shared-memory"
+                    _("the payload is in shared memory that no publisher has offered"), code="shared-memory"
                 )
             shared = self._shared.read(header.publisher, payload, may_copy=codec.name == "bytes")
             if shared is None:
@@ -225,7 +223,7 @@ class CarefulParser:
 
 
 def _topic_error() -> WireError:
-    return WireError(_("a message does not begin with its topic"), code="first-part")
+    return WireError(_("a message doesn't begin with its topic"), code="first-part")
 
 
 class SubSocket:
@@ -296,7 +294,7 @@ class SubSocket:
                 self._report_problem(
                     source,
                     endpoint,
-                    _("it is an endpoint of 'nanomsg'") if other else _("it is not a valid endpoint"),
+                    _("the endpoint belongs to 'nanomsg'") if other else _("not a valid endpoint"),
                 )
 
     def _disconnect_replaced(self, remote: RemotePublisher, endpoint: str) -> None:
@@ -339,7 +337,7 @@ class SubSocket:
         name = source.remote.node_name if source.remote is not None else ""
         shown = ascii(endpoint[:100])[1:-1]
         source.failed_endpoint = endpoint
-        source.problem = _("cannot connect to the endpoint '{shown}' of '{name}': {why}").format(
+        source.problem = _("can't connect to the endpoint '{shown}' of '{name}': {why}").format(
             shown=shown, name=name, why=why
         )
         if self.refusals.add(source.problem):

@@ -45,10 +45,10 @@ class ParameterForm:
         except shapes.ShapeMismatch as mismatch:
             raise ValueError(mismatch.message) from mismatch
         except RecursionError:
-            raise ValueError(_("it has too many levels")) from None
+            raise ValueError(_("the value has too many levels")) from None
         where = find_nan(plain)
         if where is not None:
-            raise ValueError(_("{where} must be a finite number").format(where=where or _("it")))
+            raise ValueError(_("{where} must be a finite number").format(where=where or _("the value")))
         return plain
 
     def instance(self, plain: object) -> object:

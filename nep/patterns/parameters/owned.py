@@ -109,7 +109,9 @@ class Parameters:
         )
         with self._lock:
             if name in self._known:
-                raise ParameterError(name, short_repr(default), _("it is already declared; use 'set'"))
+                raise ParameterError(
+                    name, short_repr(default), _("the parameter is already declared; use 'set'")
+                )
             if len(self._known) >= _MAX_PARAMETERS:
                 raise ParameterError(
                     name,
@@ -198,7 +200,7 @@ class Parameters:
         known = tuple(self._known)
         shown = escaped(bounded_str(name, 60))
         hint = did_you_mean(shown, known) if known else _("the node has no parameters")
-        return ParameterError(shown, "", _("it does not exist; {said}").format(said=hint))
+        return ParameterError(shown, "", _("no such parameter; {said}").format(said=hint))
 
     # ---- for others
 

@@ -90,16 +90,16 @@ class NodeParameter:
         if isinstance(value, int | float) and not isinstance(value, bool) and self.kind in {"int", "float"}:
             return self._convert_number(value)
         if type(value) is not KINDS[self.kind]:
-            raise self._error(value, _("it must be of type '{kind}'").format(kind=self.kind))
+            raise self._error(value, _("the value must be of type '{kind}'").format(kind=self.kind))
         return self._json_copy(value)
 
     def _convert_number(self, value: float) -> float:
         if not _is_finite(value):
-            raise self._error(value, _("it must be a finite number"))
+            raise self._error(value, _("the value must be a finite number"))
         if self.kind == "float":
             return float(value)
         if int(value) != value or abs(value) > _MAX_INT:
-            raise self._error(value, _("it must be a whole number"))
+            raise self._error(value, _("the value must be a whole number"))
         return int(value)
 
     def _json_copy(self, value: object) -> object:
@@ -111,7 +111,7 @@ class NodeParameter:
         if len(data) > _VALUE_MAX_BYTES:
             raise self._error(
                 value,
-                _("it has {size} bytes; at most {most} are allowed").format(
+                _("the value is {size} bytes; at most {most} are allowed").format(
                     size=len(data), most=_VALUE_MAX_BYTES
                 ),
             )
@@ -158,7 +158,7 @@ def new_parameter(
         raise ParameterError(
             check_topic(name),
             short_repr(default),
-            _("its type must be {kinds}").format(kinds=format_list([f"'{each}'" for each in KINDS], "or")),
+            _("the type must be {kinds}").format(kinds=format_list([f"'{each}'" for each in KINDS], "or")),
         )
     for each in (minimum, maximum):
         if each is not None and (word not in {"int", "float"} or not _is_finite(each)):
@@ -169,7 +169,7 @@ def new_parameter(
             )
     bare = NodeParameter(check_topic(name), None, word, None, _clean_description(description), form=form)
     if len(choices) > _CHOICES_MAX:
-        raise ParameterError(name, short_repr(default), _("it has too many choices"))
+        raise ParameterError(name, short_repr(default), _("too many choices"))
     allowed = tuple(bare.with_value(each).value for each in choices)
     parameter = replace(bare, minimum=minimum, maximum=maximum, choices=allowed, is_read_only=is_read_only)
     value = parameter.with_value(default).value

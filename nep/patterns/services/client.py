@@ -183,7 +183,7 @@ class Client:
         Raises `NepError` if the reply to the previous request has not been read.
         """
         if self._sent is not None:
-            raise NepError(_("the previous reply has not been read; call 'listen_info' first"))
+            raise NepError(_("the previous reply hasn't been read; call 'listen_info' first"))
         self._sent = self.call_async(request)
 
     def listen_info(self) -> object:
@@ -216,7 +216,7 @@ class Client:
         if outcome.kind == CallKind.ANSWER:
             codec = codec_by_number(outcome.codec)
             if codec is None:
-                reason = _("this version does not know the codec of the reply; update nep")
+                reason = _("this version doesn't know the codec of the reply; update nep")
                 raise DecodeError(str(outcome.codec), len(outcome.data), reason)
             return self._types.reply.read(codec.decode(outcome.data, {}), len(outcome.data))
         name, reason = read_error_reply(outcome.data)

@@ -174,7 +174,7 @@ class ServiceRegistry:
     def _service_transport(self) -> ServiceTransport:
         if not hasattr(self._transport, "create_server"):
             raise NepError(
-                _("the back end '{backend}' does not support services; use 'zeromq'").format(
+                _("the back end '{backend}' doesn't support services; use 'zeromq'").format(
                     backend=self._backend.name
                 )
             )
@@ -184,7 +184,7 @@ class ServiceRegistry:
         transport = self._service_transport()
         if not hasattr(transport, "create_surveyor"):
             raise NepError(
-                _("the back end '{backend}' does not support surveys; use 'zeromq'").format(
+                _("the back end '{backend}' doesn't support surveys; use 'zeromq'").format(
                     backend=self._backend.name
                 )
             )
@@ -264,5 +264,7 @@ def check_call_codec(codec: Codec) -> Codec:
     if codec.name == "image":
         raise NepError(_("a call can't contain an image; publish it on a topic"))
     if codec_by_number(codec.number) is not codec:  # a back end's codec without a number
-        raise NepError(_("'{name}' can't be used for calls; use 'json' or 'msgpack'").format(name=codec.name))
+        raise NepError(
+            _("the type '{name}' can't be used for calls; use 'json' or 'msgpack'").format(name=codec.name)
+        )
     return codec

@@ -173,14 +173,14 @@ class Server:
     def _decode_request(self, call: IncomingCall) -> object:
         codec = codec_by_number(call.codec)
         if codec is None:
-            reason = _("this version does not know the codec of the reply; update nep")
+            reason = _("this version doesn't know the codec of the reply; update nep")
             raise DecodeError(str(call.codec), len(call.data), reason)
         return self._types.request.read(codec.decode(call.data, {}), len(call.data))
 
     def _encode_reply(self, answer: object, number: int) -> Reply:
         codec = codec_by_number(number)
         if codec is None:
-            reason = _("this version does not know the codec of the reply; update nep")
+            reason = _("this version doesn't know the codec of the reply; update nep")
             raise EncodeError(str(number), type(answer).__name__, reason)
         answer_type = self._types.reply
         value = {} if answer is None and answer_type.is_any else answer

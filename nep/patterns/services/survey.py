@@ -152,7 +152,7 @@ class Surveyor:
                 raise NepError(f"{name}: {reason}" if name else reason)
             codec = codec_by_number(outcome.codec)
             if codec is None:
-                raise NepError(_("this version does not know the codec of the reply; update nep"))
+                raise NepError(_("this version doesn't know the codec of the reply; update nep"))
             return self._types.reply.read(codec.decode(outcome.data, {}), len(outcome.data))
         except WaitTimeoutError:  # slow, but not a failure
             raise

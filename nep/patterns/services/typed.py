@@ -62,7 +62,7 @@ class PayloadType:
         except shapes.ShapeMismatch as mismatch:
             reason = mismatch.message
         except RecursionError:
-            reason = _("it has too many levels")
+            reason = _("the value has too many levels")
         raise DecodeError(self._declared.name, size_bytes, reason)
 
 

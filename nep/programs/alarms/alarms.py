@@ -158,7 +158,7 @@ class Alarms:
         carrier = self._carriers.get(action.kind)
         self._running_count += 1
         if carrier is None:
-            self._results.put((event, action, MAX_TRIES, False, _("this action is not available here")))
+            self._results.put((event, action, MAX_TRIES, False, _("this action isn't available here")))
             return
         done = partial(self._on_action_done, event, action, tries)
         try:

@@ -103,7 +103,7 @@ def _reply_handler(service: str, done: DoneCallback) -> Callable[[Future[object]
         if isinstance(error, NoServerError):
             done(False, _("{service} has no server").format(service=service))
         elif isinstance(error, WaitTimeoutError):
-            template = _("{service} did not reply within {seconds} s")
+            template = _("{service} didn't reply within {seconds} s")
             done(False, template.format(service=service, seconds=number(CALL_TIMEOUT_S)))
         elif error is not None or ended.cancelled():
             done(False, _("{service}: {reason}").format(service=service, reason=str(error or "")))

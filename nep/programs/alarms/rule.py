@@ -147,7 +147,7 @@ class _RuleChecker:
 
     def number(self, key: str, value: object, minimum: float, maximum: float) -> None:
         if isinstance(value, bool) or not isinstance(value, int | float) or not minimum <= value <= maximum:
-            template = _("it must be a number from {least:g} to {most:g}")
+            template = _("must be a number from {least:g} to {most:g}")
             self.problems.append(RuleProblem(key, template.format(least=minimum, most=maximum)))
 
     def check_name(self, key: str, check: object, name: str) -> None:
@@ -178,7 +178,7 @@ def problem_of(rule: AlarmRule) -> RuleProblem | None:
     _check_condition(rule.condition, check)
     check.number("calm_s", rule.calm_s, MIN_CALM_S, MAX_CALM_S)
     if len(rule.actions) > MAX_ACTIONS:
-        template = _("it has more than {most} actions; split it into two alarms")
+        template = _("an alarm can have at most {most} actions; split it into two alarms")
         check.problems.append(RuleProblem("do", template.format(most=MAX_ACTIONS)))
     for action in rule.actions:
         _check_action(action, check)
@@ -199,7 +199,7 @@ def _check_condition(condition: AlarmCondition, check: _RuleChecker) -> None:
     else:
         check.check_name("topic", check_topic, condition.name)
         if is_pattern(condition.name) and condition.kind != "appears":
-            template = _("it has wildcards, which only 'appears' allows; use the name of a topic")
+            template = _("wildcards are allowed only with 'appears'; use the name of a topic")
             check.problems.append(RuleProblem("topic", template))
     if condition.is_about_value:
         check.check_name("value", parse_path, condition.path)
@@ -216,7 +216,7 @@ def _check_limit(condition: AlarmCondition, check: _RuleChecker) -> None:
     elif condition.kind in NUMBER_KINDS:
         check.number("than", limit, -_MAX_NUMBER, _MAX_NUMBER)
     elif condition.kind in KINDS_WITH_LIMIT and not _is_scalar(limit):
-        check.problems.append(RuleProblem("than", _("it must be a number, a string, true, false or null")))
+        check.problems.append(RuleProblem("than", _("must be a number, a string, true, false or null")))
     check.number("margin", condition.margin, 0, _MAX_NUMBER)
 
 

@@ -107,7 +107,7 @@ def read_alarms(path: Path) -> AlarmFile:
             data = file.read(_MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # NUL in a file name raises ValueError
         reason = getattr(error, "strerror", None) or str(error)
-        template = _("'{path}' cannot be read: {reason}; 'nep watch --example' prints an example")
+        template = _("'{path}' can't be read: {reason}; 'nep watch --example' prints an example")
         raise NepError(
             template.format(path=escaped(str(path)), reason=reason[:1].lower() + reason[1:])
         ) from error
@@ -133,12 +133,12 @@ def parse_alarms(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
-        template = _("line {line} of '{path}' is not UTF-8; save the file as UTF-8")
+        template = _("line {line} of '{path}' isn't UTF-8; save the file as UTF-8")
         raise NepError(template.format(line=line, path=path)) from error
     fault = find_json_fault(text, allow_nan=True)
     if fault is not None:
         template = _(
-            "'{path}' is not valid JSON: line {line}, column {column}: {reason}; 'nep watch --example' "
+            "'{path}' isn't valid JSON: line {line}, column {column}: {reason}; 'nep watch --example' "
             "prints an example"
         )
         raise NepError(template.format(path=path, line=fault.line, column=fault.column, reason=fault.reason))
@@ -237,10 +237,10 @@ class _Reader:
 
     def _root(self, value: object) -> list[object]:
         if not isinstance(value, dict):
-            self._fail("", _('it is not an alarm file; it must begin with {"format": 1, "alarms": ['))
+            self._fail("", _('not an alarm file; it must begin with {"format": 1, "alarms": ['))
         version = value.get("format", FORMAT_VERSION)
         if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-            self._fail("format", _("it must be {format}").format(format=FORMAT_VERSION))
+            self._fail("format", _("must be {format}").format(format=FORMAT_VERSION))
         if version > FORMAT_VERSION:
             template = _(
                 "'{path}' was written by a newer version of nep (format {found}; this version reads "
@@ -262,20 +262,20 @@ class _Reader:
 
     def _rule(self, entry: object, index: int) -> AlarmRule:
         if not isinstance(entry, dict):
-            self._fail("", _('it is not an alarm; write {"when": {...}, "do": [...]}'), index)
+            self._fail("", _('not an alarm; write {"when": {...}, "do": [...]}'), index)
         self._check_keys(entry, _RULE_KEYS, index)
         when = entry.get("when")
         if not isinstance(when, dict):
             self._fail("when", _('the condition is missing; write "when": {"topic": ..., "is": ...}'), index)
         do = entry.get("do", [])
         if not isinstance(do, list):
-            self._fail("do", _("it must be a list of actions"), index)
+            self._fail("do", _("must be a list of actions"), index)
         is_on = entry.get("on", True)
         if not isinstance(is_on, bool):
-            self._fail("on", _("it must be true or false"), index)
+            self._fail("on", _("must be true or false"), index)
         rule_id = entry.get("id") or new_id()
         if not isinstance(rule_id, str) or len(rule_id) > 64:
-            self._fail("id", _("it must be a short string"), index)
+            self._fail("id", _("must be a string of at most 64 characters"), index)
         rule = AlarmRule(
             rule_id,
             self._condition(when, index),
@@ -305,9 +305,9 @@ class _Reader:
             self._fail(other, template.format(kind=kind, subject=subject), index)
         name, path = when.get(subject, ""), when.get("value", "")
         if not isinstance(name, str) or not isinstance(path, str):
-            self._fail(subject if not isinstance(name, str) else "value", _("it must be a string"), index)
+            self._fail(subject if not isinstance(name, str) else "value", _("must be a string"), index)
         if path and kind not in VALUE_KINDS:
-            self._fail("value", _("'{kind}' does not take a value; remove it").format(kind=kind), index)
+            self._fail("value", _("'{kind}' doesn't take a value; remove it").format(kind=kind), index)
         if kind in KINDS_WITH_LIMIT and "than" not in when:
             self._fail("is", _('the limit is missing; write "than": ...'), index)
         return AlarmCondition(
@@ -340,19 +340,19 @@ class _Reader:
             return AlarmAction("keep", seconds=self._number(entry, "keep_s", 60.0, index))
         name, msg_type = entry[kind], entry.get("type", "json")
         if not isinstance(name, str) or not isinstance(msg_type, str) or not msg_type:
-            self._fail(kind if not isinstance(name, str) else "type", _("it must be a string"), index)
+            self._fail(kind if not isinstance(name, str) else "type", _("must be a string"), index)
         payload = entry.get("message" if kind == "send" else "with", {} if kind == "call" else None)
         return AlarmAction(kind, name, payload, msg_type)
 
     def _scalar(self, value: object, index: int) -> Scalar:
         if value is not None and not isinstance(value, str | int | float):
-            self._fail("than", _("it must be a number, a string, true, false or null"), index)
+            self._fail("than", _("must be a number, a string, true, false or null"), index)
         return value
 
     def _number(self, table: Mapping[str, object], key: str, default: float, index: int) -> float:
         value = table.get(key, default)
         if isinstance(value, bool) or not isinstance(value, int | float) or not -1e300 < value < 1e300:
-            self._fail(key, _("it must be a number"), index)
+            self._fail(key, _("must be a number"), index)
         return float(value)
 
     def _check_keys(self, table: Mapping[str, object], known: Sequence[str], index: int | None) -> None:

@@ -590,7 +590,7 @@ def _copy_value(key: Key, value: object) -> object:
     try:
         return deep_copy(value)
     except (ValueError, RecursionError) as error:
-        raise BadValueError(key_text(key), _("it contains itself, or has too many levels")) from error
+        raise BadValueError(key_text(key), _("the value contains itself, or has too many levels")) from error
 
 
 def _public_entry(entry: StoredEntry, now: float) -> BlackboardEntry:

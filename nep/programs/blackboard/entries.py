@@ -152,7 +152,7 @@ class Entries:
         limit.
         """
         if entry.bytes > self._max_bytes:
-            template = _("it needs {size} bytes, but at most {most} are allowed")
+            template = _("the value needs {size} bytes, but at most {most} are allowed")
             raise BadValueError(key_text(entry.key), template.format(size=entry.bytes, most=self._max_bytes))
         before = self.get(entry.key)
         if entry.expires_at <= now or (before is not None and _is_newer(before, entry, now)):

@@ -37,7 +37,7 @@ def parse_key(key: str | Sequence[str]) -> Key:
     else:
         raise BadKeyError(str(type(key).__name__), _("use a string such as 'human.1.position'"))
     if not names or names == ("",):
-        raise BadKeyError("", _("it is empty; use a name such as 'human.1.position'"))
+        raise BadKeyError("", _("the key is empty; use a name such as 'human.1.position'"))
     if len(names) > MAX_LEVELS:
         raise BadKeyError(key_text(names), _("use at most {most} names").format(most=MAX_LEVELS))
     if sum(map(len, names)) > _MAX_CHARACTERS:
@@ -45,7 +45,7 @@ def parse_key(key: str | Sequence[str]) -> Key:
     try:
         "".join(names).encode()
     except UnicodeEncodeError:
-        raise BadKeyError(key_text(names), _("it contains an unpaired surrogate")) from None
+        raise BadKeyError(key_text(names), _("the text contains an unpaired surrogate")) from None
     return names
 
 

@@ -68,7 +68,9 @@ class MessageMapping:
         if self._each:
             found = _field_value(payload, self._each)
             if not isinstance(found, list | tuple):
-                raise NepError(_("it has no list in the field '{field}'").format(field=key_text(self._each)))
+                raise NepError(
+                    _("the message has no list in the field '{field}'").format(field=key_text(self._each))
+                )
             return found
         return payload if self._has_holes and isinstance(payload, list | tuple) else (payload,)
 
@@ -123,7 +125,7 @@ def _field_value(item: object, path: Key) -> object:
 def _name_from_field(item: object, field: str) -> str:
     value = item.get(field) if isinstance(item, Mapping) else None
     if isinstance(value, bool) or not isinstance(value, str | int) or value == "":
-        raise NepError(_("it has no name or number in the field '{field}'").format(field=field))
+        raise NepError(_("an item has no name or number in the field '{field}'").format(field=field))
     return str(value)
 
 

@@ -161,7 +161,7 @@ def side_configuration(backend: str, master: str = "", network: str = "") -> Sid
         place = found.master(master or None)
     except ValueError as error:  # also invalid numbers
         raise NepError(
-            _("'{master}' is not a valid master address for '{backend}'; see docs/backends.md").format(
+            _("'{master}' isn't a valid master address for '{backend}'; see docs/backends.md").format(
                 master=master, backend=found.name
             )
         ) from error
@@ -252,7 +252,7 @@ def _parse_side_and_topic(word: str) -> tuple[SideConfiguration, str]:
     if not colon or not backend:
         raise NepError(
             _(
-                "'{word}' is not in the form BACKEND:TOPIC; write it as 'zeromq:/topic' or "
+                "'{word}' isn't in the form BACKEND:TOPIC; write it as 'zeromq:/topic' or "
                 "'zeromq@HOST:7780:/topic'"
             ).format(word=quotable(word))
         )

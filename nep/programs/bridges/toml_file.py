@@ -92,7 +92,7 @@ def read_configuration(path: Path) -> BridgeConfiguration:
     except (OSError, ValueError) as error:  # NUL in a file name raises ValueError
         reason = getattr(error, "strerror", None) or str(error)
         raise NepError(
-            _("'{path}' cannot be read: {reason}; 'nep bridge --example' prints an example").format(
+            _("'{path}' can't be read: {reason}; 'nep bridge --example' prints an example").format(
                 path=shown, reason=reason[:1].lower() + reason[1:]
             )
         ) from error
@@ -107,7 +107,7 @@ def read_configuration(path: Path) -> BridgeConfiguration:
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise NepError(
-            _("line {line} of '{path}' is not UTF-8; save the file as UTF-8").format(line=line, path=shown)
+            _("line {line} of '{path}' isn't UTF-8; save the file as UTF-8").format(line=line, path=shown)
         ) from error
     return parse_configuration(text, shown, path.stem)
 
@@ -132,7 +132,7 @@ def _toml_error_message(path: str, text: str, said: str) -> str:
     line = int(at.group(1)) if at and at.group(1) else text.count("\n") + 1
     reason = escaped(shortened(_TOML_POSITION.sub("", said).strip(), _MAX_REASON_LENGTH))
     return _(
-        "line {line} of '{path}' is not valid TOML: {reason}; 'nep bridge --example' prints an example"
+        "line {line} of '{path}' isn't valid TOML: {reason}; 'nep bridge --example' prints an example"
     ).format(line=line, path=path, reason=reason[:1].lower() + reason[1:])
 
 
@@ -184,7 +184,7 @@ class _Reader:
             self._fail(
                 "network",
                 side,
-                _("it has more than {most} characters; shorten it").format(most=_MAX_NETWORK_LENGTH),
+                _("use at most {most} characters").format(most=_MAX_NETWORK_LENGTH),
             )
         return self._checked(lambda: side_configuration(backend, master, network), "master", side)
 
@@ -223,7 +223,7 @@ class _Reader:
             self._fail(
                 key,
                 "topics",
-                _("the back end '{name}' does not support quality of service; remove this line").format(
+                _("the back end '{name}' doesn't support quality of service; remove this line").format(
                     name=backend.name
                 ),
                 number,
@@ -248,7 +248,7 @@ class _Reader:
             self._fail(
                 "max_rate_hz",
                 "topics",
-                _("it must be a number from 0.000001 to 1000000, such as 10; or omit it"),
+                _("must be a number from 0.000001 to 1000000, such as 10; or omit it"),
                 number,
             )
         return float(value)
@@ -285,7 +285,7 @@ class _Reader:
     ) -> str:
         value = table.get(key, default)
         if not isinstance(value, str):
-            self._fail(key, where, _("it is not a string; put it in quotes"), number)
+            self._fail(key, where, _("must be a string in quotes"), number)
         return value
 
     def _checked(self, check: Callable[[], _CHECKED], key: str, where: str, number: int = 0) -> _CHECKED:

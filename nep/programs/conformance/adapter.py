@@ -66,7 +66,7 @@ class AdapterProcess:
         reads, writes = self._process.stdout, self._process.stdin
         if reads is None or writes is None:
             raise AdapterError(
-                _("'{command}' has no standard input and output").format(command=" ".join(command))
+                _("'{command}' has no standard input or output").format(command=" ".join(command))
             )
         self.output: IO[bytes] = reads
         self.input: IO[bytes] = writes
@@ -164,7 +164,7 @@ class Adapter:
                 message = None
             if not isinstance(message, dict):
                 raise AdapterError(
-                    _("the adapter wrote {line}, which is not a JSON object").format(line=printable(line))
+                    _("the adapter wrote {line}, which isn't a JSON object").format(line=printable(line))
                 )
             if isinstance(message.get("re"), int):
                 self._replies[message["re"]] = message

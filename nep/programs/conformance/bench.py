@@ -147,7 +147,7 @@ class Bench:
 
         if not self.wait_until(has_finished, _REPLY_TIMEOUT_S):
             raise AdapterError(
-                _("the adapter did not reply to '{do}' within {seconds:g} s").format(
+                _("the adapter didn't reply to '{do}' within {seconds:g} s").format(
                     do=do, seconds=_REPLY_TIMEOUT_S
                 )
             )

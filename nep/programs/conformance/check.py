@@ -96,7 +96,7 @@ def _check_rule(rule: Rule, bench: Bench) -> Outcome:
     lacking = [each for each in rule.features if each not in announced]
     if lacking:
         return Outcome(
-            rule, "skipped", _("the adapter does not announce '{feature}'").format(feature=lacking[0])
+            rule, "skipped", _("the adapter doesn't announce '{feature}'").format(feature=lacking[0])
         )
     try:
         rule.check(bench)

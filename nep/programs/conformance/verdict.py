@@ -44,7 +44,7 @@ def time_limit(seconds: float) -> Iterator[None]:
     yield
     took_s = time.monotonic() - began
     if took_s > seconds:
-        raise broken_rule(_("it took {seconds:.1f} s").format(seconds=took_s))
+        raise broken_rule(_("the operation took {seconds:.1f} s").format(seconds=took_s))
 
 
 def printable(value: object) -> str:

@@ -138,7 +138,7 @@ def _node_package(packages: Sequence[PackageFact]) -> Finding:
         "package:nep-js",
         "info",
         _(
-            "JavaScript programs in this folder import nep-js {version} from {folder}, which is not "
+            "JavaScript programs in this folder import nep-js {version} from {folder}, which isn't "
             "part of NEP Studio."
         ).format(version=imported.version, folder=imported.location),
         _(

@@ -83,7 +83,7 @@ def _hung_finding(facts: Facts, holder: ProcessFact) -> Finding:
     return Finding(
         "master:hung",
         "error",
-        _("The master at {master} does not reply; it is hung or suspended.").format(
+        _("The master at {master} doesn't reply; it is hung or suspended.").format(
             master=_master_text(facts, holder)
         ),
         _("Stop it and start a new one. Programs that are already connected keep exchanging messages."),
@@ -97,7 +97,7 @@ def _port_taken_finding(facts: Facts, holder: ProcessFact | None) -> Finding:
     return Finding(
         "master:foreign",
         "error",
-        _("{program} uses port {number} but is not a master.").format(
+        _("{program} uses port {number} but isn't a master.").format(
             number=number, program=_holder_text(holder)
         ),
         _(
@@ -139,9 +139,9 @@ def _not_loopback_finding(facts: Facts) -> Finding:
 def _unreachable_finding(facts: Facts) -> Finding:
     host, _colon, port = facts.address.rpartition(":")
     if facts.reach_failure == "timeout":
-        sentence = _("{address} does not respond, so the master can't be reached.")
+        sentence = _("{address} doesn't respond, so the master can't be reached.")
         fix = _(
-            "{host} is off, is in another network, or has a firewall that blocks the connection. Allow "
+            "{host} is off, is on another network, or has a firewall that blocks the connection. Allow "
             "NEP Studio (Python) in its firewall."
         )
     elif facts.reach_failure == "refused":
@@ -151,9 +151,9 @@ def _unreachable_finding(facts: Facts) -> Finding:
         sentence = _("This computer has no route to {address}, so the master can't be reached.")
         fix = _("Check that both computers are on the same network.")
     else:
-        sentence = _("{host} responds at port {port}, but the master does not.")
+        sentence = _("{host} responds on port {port}, but the master doesn't.")
         fix = _(
-            "NEP Studio is not responding there, or another program uses that port. Restart NEP Studio "
+            "NEP Studio isn't responding there, or another program uses that port. Restart NEP Studio "
             "on that computer."
         )
     holes = {"address": facts.address, "host": host, "port": port}
@@ -311,7 +311,7 @@ def unsupported_finding(finding_id: str, program: str, generation: str) -> Findi
     return Finding(
         finding_id,
         "error",
-        _("“{program}” uses nep {generation}, which is not compatible with any other version.").format(
+        _("“{program}” uses nep {generation}, which isn't compatible with any other version.").format(
             program=program, generation=generation
         ),
         _("Install nep 0.5.4.8 or 0.5.4.5 for this program."),

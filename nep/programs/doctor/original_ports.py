@@ -95,8 +95,8 @@ def _taken_findings(ports: Sequence[PortFact]) -> Iterator[Finding]:
 def _free_findings(ports: Sequence[PortFact]) -> Iterator[Finding]:
     if ports:
         words = ngettext(
-            "The gateway for programs of the original NEP is not running: port {ports} is not in use.",
-            "The gateway for programs of the original NEP is not running: ports {ports} are not in use.",
+            "The gateway for programs of the original NEP isn't running: port {ports} isn't in use.",
+            "The gateway for programs of the original NEP isn't running: ports {ports} aren't in use.",
             len(ports),
         )
         why = _("The master was started without its gateway.")

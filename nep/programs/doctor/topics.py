@@ -24,7 +24,7 @@ def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
             Finding(
                 "topic:name",
                 "error",
-                _("“{topic}” is not a valid topic name: {reason}.").format(
+                _("“{topic}” isn't a valid topic name: {reason}.").format(
                     topic=facts.topic, reason=facts.name_problem
                 ),
                 _("Choose an existing topic."),
@@ -132,14 +132,14 @@ def _unreachable(each: PublisherFact) -> Finding:
             "master's network address as NEP_MASTER."
         )
     elif each.reach_failure == "timeout":
-        sentence = _("“{node}” publishes at {place} ({host}), but that address does not respond.")
+        sentence = _("“{node}” publishes at {place} ({host}), but that address doesn't respond.")
         fix = _(
-            "A firewall blocks the connection, or the computers are in different networks. Allow "
+            "A firewall blocks the connection, or the computers are on different networks. Allow "
             "Python in the firewall of {host}."
         )
     elif each.reach_failure == "refused":
         sentence = _("“{node}” published at {place} ({host}), but nothing is listening there now.")
-        fix = _("The program has stopped or is not responding. Start it again.")
+        fix = _("The program has stopped or isn't responding. Start it again.")
     else:
         sentence = _(
             "“{node}” publishes at {place} ({host}), but this computer has no route to that address."

@@ -218,7 +218,7 @@ class NativeNetwork:
                 why, hint = error.reason, _("Rename the topic.")
             self.report(
                 id,
-                _("“{topic}” is not forwarded to native programs: {why}").format(topic=topic, why=why),
+                _("“{topic}” isn't forwarded to native programs: {why}").format(topic=topic, why=why),
                 hint,
             )
             return None
@@ -241,8 +241,8 @@ class NativeNetwork:
             self.report(
                 "gateway:full",
                 ngettext(
-                    "{count} message did not reach programs of the original NEP in the last second",
-                    "{count} messages did not reach programs of the original NEP in the last second",
+                    "{count} message didn't reach programs of the original NEP in the last second",
+                    "{count} messages didn't reach programs of the original NEP in the last second",
                     lost,
                 ).format(count=lost),
             )

@@ -120,7 +120,7 @@ class Shape:
             if self.codec == "json" and frame.startswith((b"{", b"[", b'"')):
                 return frame
             raise FrameError(
-                _("A message on “{topic}” does not begin with the topic name").format(topic=self.topic)
+                _("A message on “{topic}” doesn't begin with the topic name").format(topic=self.topic)
             )
         if self.codec == "json":
             self._check_version(frame, own)
@@ -196,7 +196,7 @@ def _decode_base64(data: bytes) -> bytes:
     try:
         return base64.b64decode(data, validate=True)
     except binascii.Error as error:
-        raise FrameError(_("An image is not base64-encoded")) from error
+        raise FrameError(_("An image isn't base64-encoded")) from error
 
 
 def _is_json_in_json(frame: bytes) -> bool:

@@ -213,8 +213,7 @@ class Relay:
             self._alerts.report(
                 f"nan:{pair.line.topic}",
                 _(
-                    "“{topic}” contains NaN or infinity, which JSON does not support: native programs "
-                    "receive "
+                    "“{topic}” contains NaN or infinity, which JSON doesn't support: native programs receive "
                     "null instead"
                 ).format(topic=pair.line.topic),
                 _("Change the publishing program to send null for missing values."),
@@ -259,15 +258,15 @@ class Relay:
         names = [f"“{name}”" for name in self._program_names(pair.line, role)]
         if not names:
             words = _(
-                "A program on “{topic}” uses nep {version}, which is not compatible with any other version"
+                "A program on “{topic}” uses nep {version}, which isn't compatible with any other version"
             )
         elif len(names) == 1:
             words = _(
-                "{programs} on “{topic}” uses nep {version}, which is not compatible with any other version"
+                "{programs} on “{topic}” uses nep {version}, which isn't compatible with any other version"
             )
         else:
             words = _(
-                "One of {programs} on “{topic}” uses nep {version}, which is not compatible with any other "
+                "One of {programs} on “{topic}” uses nep {version}, which isn't compatible with any other "
                 "version"
             )
         self._alerts.report(

@@ -63,7 +63,7 @@ def checked_origin(origin: str) -> str:
     is_origin = parts.scheme in _DEFAULT_PORTS and bool(parts.hostname) and parts.path in {"", "/"}
     if not is_origin or parts.query or parts.fragment or parts.username:
         raise NepError(
-            _("'{origin}' is not a valid origin; use an origin such as 'http://192.168.1.5:8000'").format(
+            _("'{origin}' isn't a valid origin; use an origin such as 'http://192.168.1.5:8000'").format(
                 origin=quotable(origin)
             )
         )
@@ -99,9 +99,9 @@ class Access:
                 return ""
         except NepError:
             pass
-        return _(
-            "pages from '{origin}' are not allowed to connect; allow them with --origin {option}"
-        ).format(origin=quotable(origin), option=quotable(origin))
+        return _("pages from '{origin}' aren't allowed to connect; allow them with --origin {option}").format(
+            origin=quotable(origin), option=quotable(origin)
+        )
 
     def check_token(self, path: str, authorization: str | None) -> bool | None:
         """Return True if a handshake contains the valid token, False if it is wrong, None if there is none.

@@ -565,7 +565,7 @@ def check_installed() -> None:
         import websockets.asyncio.server  # noqa: F401, PLC0415 - installed and recent enough
     except ImportError as error:
         raise NepError(
-            _("the web server is not installed; install it with: pip install 'nep-studio[web]'")
+            _("the web server isn't installed; install it with: pip install 'nep-studio[web]'")
         ) from error
 
 

@@ -71,7 +71,7 @@ class RecordingService:
                 "is_too_large": isinstance(error, RecordingTooLargeError),
             }
         except MemoryError:
-            return {"error": _("it takes too much memory to read"), "path": path, "is_too_large": True}
+            return {"error": _("reading the file takes too much memory"), "path": path, "is_too_large": True}
         except NepError as error:
             return {"error": str(error), "path": path}
         except (TypeError, ValueError, KeyError, OSError) as error:
@@ -116,7 +116,7 @@ class RecordingService:
         # The cursor is 0 after the last message.
         number = request["cursor"]
         if number not in self._cursors:
-            raise ValueError(_("too many readers use it at the same time"))
+            raise ValueError(_("too many readers of the recording at the same time; try again later"))
         self._cursors.move_to_end(number)
         cursor, batch, size = self._cursors[number], list[RawMessage](), 0
         for raw in islice(cursor, min(request["most"], _MAX_BATCH)):

@@ -117,7 +117,7 @@ class _Pipe:
                 start_new_session=True,  # Ctrl+C in the terminal is for the parent
             )
         except OSError as error:
-            reason = _("the process that reads it can't start: {error}")
+            reason = _("the process that reads the file can't start: {error}")
             raise RecordingError(str(path), reason.format(error=error)) from error
         self._lock = threading.Lock()
         self._was_ended = False
@@ -158,12 +158,12 @@ class _Pipe:
                     answer = self._answers.get(timeout=timeout_s)
                 except queue.Empty:
                     self._kill()
-                    raise RecordingTooLargeError(str(path), _("it takes too long to read")) from None
+                    raise RecordingTooLargeError(str(path), _("reading the file takes too long")) from None
                 if answer is None:
                     self._answers.put(None)
                     self._check(path)
                     self._kill()
-                    reason = _("the process that reads it stopped; the file may be damaged")
+                    reason = _("the process that reads the file stopped; the file may be damaged")
                     raise RecordingError(str(path), reason)
                 if "progress" not in answer:
                     break

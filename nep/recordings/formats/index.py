@@ -118,7 +118,7 @@ class RecordCounter:
             return
         self._count += 1
         if self._count > _MAX_OTHER_RECORDS:
-            said = _("it has more than {most} records other than messages")
+            said = _("the file contains more than {most} records other than messages")
             raise RecordingTooLargeError(str(self._path), said.format(most=_MAX_OTHER_RECORDS))
 
 
@@ -227,7 +227,7 @@ def read_index(
     size = file.seek(0, io.SEEK_END)
     file.seek(0)
     if file.read(len(MAGIC)) != MAGIC:
-        raise RecordingError(str(path), _("it is not an MCAP file"))
+        raise RecordingError(str(path), _("not an MCAP file"))
     work = budget or open_budget(path, size)
     footer = _footer(file, size)
     index = None if footer is None else _Summary(file, path, size, work).read(footer)

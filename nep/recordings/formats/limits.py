@@ -60,9 +60,9 @@ class ReadBudget:
         """Subtract work from the budget. Raises `RecordingTooLargeError` if the budget is exceeded."""
         self._left -= work_bytes
         if self._left < 0:
-            raise RecordingTooLargeError(str(self._path), _("it is too large to read"))
+            raise RecordingTooLargeError(str(self._path), _("the file is too large to read"))
         if self._until is not None and self._clock() > self._until:
-            raise RecordingTooLargeError(str(self._path), _("it takes too long to read"))
+            raise RecordingTooLargeError(str(self._path), _("reading the file takes too long"))
 
 
 def open_budget(path: Path, size_bytes: int) -> ReadBudget:

@@ -114,7 +114,7 @@ def test_absent_robot_and_missing_time_limit_are_reported_as_problems():
     program = compile_behaviour(picture(), [robot()], absent=[nao()])
     first, second = program.problems
     assert (first.severity, first.block_id, first.category, first.icon) == ("warning", "n", "robot", "hand")
-    assert (first.subject, first.message) == ("wave", "NAO is not connected, so wave will be skipped.")
+    assert (first.subject, first.message) == ("wave", "NAO isn't connected, so wave will be skipped.")
     assert (first.fix, first.fix_action) == ("Show the robots", "connect:NAO")
     assert (second.severity, second.block_id, second.category) == ("info", "w", "control")
     assert second.message == "wait until waits forever if no one appears."
@@ -129,7 +129,7 @@ def sentences(saved, robots=None) -> list[tuple[str, str]]:
 
 def test_robot_never_seen_before_is_named_in_problem():
     saved = workspace(started(block("robot_nao_do_wave", ROBOT="NAO", HAND="left"), say("Hi")))
-    assert sentences(saved) == [("warning", "NAO is not connected, so wave will be skipped.")]
+    assert sentences(saved) == [("warning", "NAO isn't connected, so wave will be skipped.")]
     assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
 
 
@@ -138,7 +138,10 @@ def test_unknown_block_is_kept_and_skipped():
     assert sentences(saved) == [
         (
             "warning",
-            "“magic wave wand” belongs to another program and can't run here. It is kept but skipped.",
+            (
+                "“magic wave wand” belongs to another program and can't run here. "
+                "It stays in the file but is skipped."
+            ),
         )
     ]
     assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
@@ -147,7 +150,7 @@ def test_unknown_block_is_kept_and_skipped():
 def test_block_with_sensor_of_absent_robot_is_skipped_entirely():
     condition = block("robot_nao_get_battery", ROBOT="NAO")
     saved = workspace(started(block("control_if", CONDITION=condition, BODY=[say("no")]), say("Hi")))
-    assert sentences(saved) == [("warning", "NAO is not connected, so if with battery will be skipped.")]
+    assert sentences(saved) == [("warning", "NAO isn't connected, so if with battery will be skipped.")]
     assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
 
 
@@ -165,7 +168,7 @@ def test_all_blocks_of_absent_robot_are_listed_even_outside_scripts():
 def test_script_of_absent_robot_does_not_start():
     saved = workspace(stack(block("robot_nao_when_touched", ROBOT="NAO"), say("Hi")))
     found = sentences(saved)
-    assert ("warning", "NAO is not connected, so touched will be skipped.") in found
+    assert ("warning", "NAO isn't connected, so touched will be skipped.") in found
     assert compile_behaviour(saved, [robot()]).starts == 0
 
 

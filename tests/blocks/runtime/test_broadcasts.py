@@ -201,7 +201,7 @@ def test_broadcast_needs_a_name(name):
         for p in compile_behaviour(workspace(started(broadcast(name))), []).problems
         if p.severity == "error"
     ]
-    assert problem.message == "broadcast needs the name of a message. It is kept but skipped."
+    assert problem.message == "broadcast needs the name of a message. It stays in the file but is skipped."
 
 
 @pytest.mark.parametrize(

@@ -198,9 +198,13 @@ def test_inputs_and_returns_outside_their_function_are_skipped_and_reported() ->
         [],
     )
     sentences = [problem.message for problem in program.problems]
-    assert "“who” only works inside its own function. It is kept but skipped." in sentences
+    assert "“who” only works inside its own function. It stays in the file but is skipped." in sentences
     assert (
-        sum(sentence.endswith("can't be used here. It is kept but skipped.") for sentence in sentences) == 2
+        sum(
+            sentence.endswith("can't be used here. It stays in the file but is skipped.")
+            for sentence in sentences
+        )
+        == 2
     )
     assert "write('after')" in program.source
 

@@ -93,7 +93,7 @@ def test_robot_that_does_not_answer_is_named(monkeypatch):
     run = play(workspace(started(say("Hi") | {"id": "x"})), link)
     assert run.runtime.error is not None
     assert run.runtime.error.block == "x"
-    assert run.runtime.error.sentence == "Pepper is not responding. Start the virtual robot again."
+    assert run.runtime.error.sentence == "Pepper isn't responding. Start the virtual robot again."
 
 
 def test_action_that_never_ends_is_canceled(monkeypatch):
@@ -102,7 +102,7 @@ def test_action_that_never_ends_is_canceled(monkeypatch):
     link.held = {"say"}
     run = play(workspace(started(say("Hi"))), link)
     assert run.runtime.error is not None
-    assert run.runtime.error.sentence == "Pepper did not finish “say” within 30 s."
+    assert run.runtime.error.sentence == "Pepper didn't finish “say” within 30 s."
     assert link.canceled == link.calls
 
 
@@ -136,7 +136,7 @@ def test_computed_input_is_validated_before_invoking_robot():
 def test_unknown_value_as_action_input_is_an_error():
     run = play(workspace(started(say(block("messages_newest", FIELD="name", TOPIC="/faces")))))
     assert run.runtime.error is not None
-    assert run.runtime.error.sentence == "“say” needs a value for “text” that is not known yet."
+    assert run.runtime.error.sentence == "Can't run “say”: the value for “text” isn't known yet."
 
 
 def test_sensor_values_and_fields_are_read(running):
@@ -213,9 +213,7 @@ def test_skipped_events_of_slow_script_are_counted(running):
     link.poke()
     until(lambda: len(link.calls) == 17)
     until(
-        lambda: (
-            run.lines == ["“when a message arrives on /x” could not keep up: 4 of its events were skipped"]
-        )
+        lambda: run.lines == ["“when a message arrives on /x” couldn't keep up: 4 of its events were skipped"]
     )
 
 
@@ -332,11 +330,11 @@ def test_wait_until_treats_unknown_value_as_false(running):
                 RELATION="<",
                 B=number(0),
             ),
-            "“is below” needs a value that isn't known yet.",
+            "“is below” can't run: one of its values isn't known yet.",
         ),
         (
             block("values_arithmetic", "v", A=text("a"), SIGN="+", B=text("b")),
-            "“+” needs numbers, not a text.",
+            "“+” needs numbers, not text.",
         ),
         (
             block("values_arithmetic", "v", A=number(-8), SIGN="**", B=number(0.5)),

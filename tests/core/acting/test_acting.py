@@ -62,7 +62,7 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
         assert acting.outbox.all_repeated == ()
         while heard.receive(0.0) is not None:
             pass
-        assert acting.repeat(sent.number) == "Sending to /cmd_vel is not armed. Arm it first."
+        assert acting.repeat(sent.number) == "Sending to /cmd_vel isn't armed. Arm it first."
         assert not acting.arming.is_on
         assert heard.receive(0.1) is None
         tick_until(session, lambda: any(" sent" in each.result_text for each in acting.sent.records))

@@ -103,7 +103,7 @@ def test_behaviour_in_another_unicode_encoding_opens(tmp_path: Path, encoding: s
 
 
 @pytest.mark.parametrize(("version", "reason"), [
-    (2, "newer NEP Studio (version 2) and is unchanged; update this one"),
+    (2, "newer NEP Studio (version 2) and is unchanged; update NEP Studio"),
     (99, "newer NEP Studio"), (0, "has no format version"), (-1, "has no format version"),
     (True, "has no format version"), ("1", "has no format version"), (None, "has no format version"),
 ])  # fmt: skip

@@ -233,7 +233,7 @@ def test_oversized_file_is_rejected_without_reading(document: Document, tmp_path
 def test_behaviour_too_large_to_reopen_is_not_saved(document: Document, tmp_path: Path) -> None:
     path = tmp_path / "large.nepb"
     document.apply_edit({"blocks": {"x": "y" * MAX_BYTES}})
-    with pytest.raises(DocumentError, match="at most 10 MB can be read; use smaller images"):
+    with pytest.raises(DocumentError, match="the limit is 10 MB; use smaller images"):
         document.save(path)
     assert not path.exists()
 

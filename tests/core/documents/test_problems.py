@@ -31,7 +31,7 @@ def lines(saved, missing: list[Robot], connected: list[Robot]):
 
 def test_all_blocks_of_missing_robot_are_one_problem() -> None:
     (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [])
-    assert line.problem.message == "Pepper is not connected, so 3 blocks will be skipped."
+    assert line.problem.message == "Pepper isn't connected, so 3 blocks will be skipped."
     assert line.problem.subject == "3 blocks"
     assert line.problem.block_id, "a press leads to the first"
     assert line.fixes == (Fix("Start a virtual Pepper", "robot.virtual:Pepper"),)
@@ -47,7 +47,7 @@ def test_missing_robot_problem_counts_nested_and_unstarted_blocks() -> None:
     (line,) = lines(saved, missing, [])
     assert len(program.absent) == 3
     assert line.block_count == 3
-    assert line.problem.message == "Nao 3 is not connected, so 3 blocks will be skipped."
+    assert line.problem.message == "Nao 3 isn't connected, so 3 blocks will be skipped."
 
 
 def test_problem_button_describes_its_action() -> None:
@@ -60,7 +60,7 @@ def test_problem_button_describes_its_action() -> None:
 
 def test_problem_with_one_block_names_it() -> None:
     (line,) = lines(speaks("Pepper", 1), [pepper("Pepper")], [])
-    assert line.problem.message == "Pepper is not connected, so say will be skipped."
+    assert line.problem.message == "Pepper isn't connected, so say will be skipped."
 
 
 def test_connected_robot_with_same_abilities_is_suggested_first() -> None:

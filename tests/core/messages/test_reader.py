@@ -57,7 +57,7 @@ def test_large_json_is_indexed_lazily_and_other_messages_are_decoded() -> None:
     assert found.index is not None
     assert read(message(b"text", "string")).value == "text"
     assert read(message(b"\xff", "string")).error is not None
-    assert read(message(large(b'{"a": '))).error == "its brackets do not match"
+    assert read(message(large(b'{"a": '))).error == "unbalanced brackets"
 
 
 def test_reader_runs_in_another_thread(reader: Reader, monkeypatch) -> None:

@@ -47,7 +47,7 @@ def test_doctor_reports_firewall_that_drops_packets() -> None:
     done = alone(
         "-m", "nep", "doctor", up=True, timeout_s=60, silent="10.9.9.1/24", NEP_MASTER="10.9.9.2:7780"
     )  # fmt: skip
-    assert "10.9.9.2:7780 does not respond, so the master can't be reached." in done.stdout, done.stderr
+    assert "10.9.9.2:7780 doesn't respond, so the master can't be reached." in done.stdout, done.stderr
     assert FIREWALL in " ".join(done.stdout.split())
     assert "Traceback" not in done.stderr
 
@@ -58,8 +58,8 @@ def test_firewall_between_studio_and_master_is_reported(tmp_path: Path) -> None:
     )  # fmt: skip
     assert "Traceback" not in done.stderr
     alert, lines = done.stdout.splitlines()
-    said = "10.9.9.2:7780 does not respond, so the master can't be reached."
-    assert alert.startswith(f"companion:master The master does not respond. {said} {FIREWALL}")
+    said = "10.9.9.2:7780 doesn't respond, so the master can't be reached."
+    assert alert.startswith(f"companion:master The master doesn't respond. {said} {FIREWALL}")
     assert alert.endswith("help.doctor")
     assert lines == "1 line"
 

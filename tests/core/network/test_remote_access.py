@@ -86,7 +86,7 @@ def test_remote_access_choice_is_sent_once_to_each_new_master(world, make):
 
 def test_rejected_remote_access_is_an_alert_with_fix_until_resolved(world, make):
     reach, alerts = make()
-    world.refusal = "'192.168.1.20' is not an address of this computer; its addresses: 10.0.0.7"
+    world.refusal = "'192.168.1.20' isn't an address of this computer; its addresses: 10.0.0.7"
     reach.listen_on(["192.168.1.20"])
     world.answer(reach)
     (alert,) = alerts.active

@@ -119,7 +119,7 @@ def test_occupied_port_names_its_program_and_suggests_a_free_port(studio: Studio
 
 def test_start_without_optional_libraries_gives_install_advice(studio: Studio) -> None:
     def start(_settings: object) -> FakeWebServer:
-        raise NepError("the web server is not installed; install it with: pip install 'nep-studio[web]'")
+        raise NepError("the web server isn't installed; install it with: pip install 'nep-studio[web]'")
 
     web = WebPages(master_address(), studio.events.put, start=start, addresses=tuple)
     web.set_protocol_enabled("rosbridge", on=True)

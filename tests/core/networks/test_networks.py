@@ -80,12 +80,12 @@ def test_invalid_network_settings_are_ignored(kept: object, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("kind", "address", "said"),
     [
-        ("ros2", "-1", "is not a ROS 2 domain; use a number from 0 to 232"),
+        ("ros2", "-1", "isn't a ROS 2 domain; use a number from 0 to 232"),
         ("ros2", "233", "is not a ROS 2 domain"),
         ("ros2", str(2**64 - 1), "is not a ROS 2 domain"),
         ("zenoh", "somewhere", "is not a zenoh address; use 'local'"),
-        ("ros", "::", "is not a valid address of a ROS master"),
-        ("ros", "http://", "is not a valid address of a ROS master"),
+        ("ros", "::", "isn't a valid address of a ROS master"),
+        ("ros", "http://", "isn't a valid address of a ROS master"),
     ],
 )
 def test_invalid_address_is_rejected_with_reason_and_choice_stays(

@@ -87,7 +87,7 @@ def test_parameter_is_set_and_rejection_has_message_of_node(
     assert shown.setting == "speed"
     assert settled(session, shown) == ""
     assert (robot.parameters["speed"], type(robot.parameters["speed"])) == (1.0, float), (
-        "its type must be kept"
+        "the type must be kept"
     )
     tick_until(session, lambda: values(_refreshed(shown))["speed"] == 1.0)
     for text, said in (
@@ -139,7 +139,7 @@ def test_node_that_ends_during_request_is_reported(
     robot.close()
     tick_until(session, lambda: entry_of(session, robot).gone_s is not None)
     shown.set("speed", "1")
-    assert (shown.refusal, shown.setting) == ("its node has disappeared", "")
+    assert (shown.refusal, shown.setting) == ("the node has disappeared", "")
     assert values(shown)["serial"] == "7", "what was known stays to be read"
 
 
@@ -172,7 +172,7 @@ def test_foreign_messages_on_parameter_topic_are_decoded_or_reported(
         for payload in ("words", 7, {"parameters": None}, {}):
             loud.publish(payload)
         tick_until(session, lambda: _refreshed(shown).problem)
-        assert shown.problem == "this is not a list of parameters"
+        assert shown.problem == "this isn't a list of parameters"
         assert "speed" in values(shown), "what the node told stays"
         loud.publish({"parameters": [1, {"name": ["x"], "type": 5, "min": "a", "choices": 3, "value": None}]})
         tick_until(session, lambda: not _refreshed(shown).problem)

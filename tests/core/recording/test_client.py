@@ -129,7 +129,7 @@ def test_disk_alerts_appear_and_are_resolved(made):
         made.say("figures", recording=status(unkept=3), ring=None, free_bytes=900_000_000)
     assert made.told() == {
         "recorder:low": ("warn", "The disk is nearly full."),
-        "recorder:unkept": ("warn", "3 messages were not recorded: the disk is too slow."),
+        "recorder:unkept": ("warn", "3 messages weren't recorded: the disk is too slow."),
     }
     made.say("figures", recording=status(unkept=3), ring=None, free_bytes=2_000_000_000)
     assert "recorder:low" not in made.told()

@@ -59,9 +59,9 @@ def path(tmp_path: Path) -> Path:
 
 def test_file_too_expensive_to_read_is_listed_as_not_scanned(path: Path) -> None:
     plain = RecordingFacts(path, path.stat().st_size, 1.0)
-    made = read_facts(plain, Failing(RecordingTooLargeError(str(path), "it takes too long to read")))
+    made = read_facts(plain, Failing(RecordingTooLargeError(str(path), "reading the file takes too long")))
     assert (made.path, made.is_read, made.problem) == (path, True, "")
-    assert "it takes too long to read" in made.scan_problem
+    assert "reading the file takes too long" in made.scan_problem
     made = read_facts(plain, Failing(RecordingError(str(path), "the process has ended")))
     assert "the process has ended" in made.problem
 

@@ -151,7 +151,7 @@ def test_crash_before_an_update_is_reported_with_its_version(reports: CrashRepor
     alerts = Alerts()
     show_crash_alert(alerts, reports)
     assert alerts.active[0].detail == (
-        f"That was NEP Studio 0.0.9; this is {__version__}. "
+        f"The crash happened in NEP Studio 0.0.9; this is {__version__}. "
         "A report helps us fix the problem. Nothing is sent automatically."
     )
 

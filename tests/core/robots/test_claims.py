@@ -226,7 +226,7 @@ def test_new_program_with_name_of_a_moving_robot_does_not_prove_its_stop(
         tick_until(session, lambda: thief._answer.subscribers)
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "unanswered")
-        assert session.runs.view().title == "Pepper (“Pepper”) did not reply"
+        assert session.runs.view().title == "Pepper (“Pepper”) didn't reply"
         assert thief.heard("stop")
         session.runs.confirm_stopped()
         session.tick()  # 33 ms later nobody waits for the old one any more

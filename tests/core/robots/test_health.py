@@ -160,7 +160,7 @@ def test_virtual_robot_is_reported_only_while_its_process_runs_here(case: Case) 
     case.health.check(started={"Rover"})
     alert = case.alert()
     assert alert is not None
-    assert (alert.title, alert.action) == ("Rover is not responding.", "connect:Rover")
+    assert (alert.title, alert.action) == ("Rover isn't responding.", "connect:Rover")
 
 
 @pytest.mark.parametrize("kind", ["rejected", "errors"])

@@ -316,7 +316,7 @@ def test_late_stop_reply_updates_the_result(session: Session, pepper: WireRobot)
     the_link(session, "Pepper")
     pepper.silent = {"stop"}
     session.runs.stop()
-    tick_until(session, lambda: session.runs.view().title == "Pepper did not reply")
+    tick_until(session, lambda: session.runs.view().title == "Pepper didn't reply")
     pepper._say(pepper.heard("stop")[0], "failed", "the brake is stuck")
     tick_until(session, lambda: session.runs.view().title == "Pepper may still move: the brake is stuck")
     pepper._say(pepper.heard("stop")[0], "succeeded")
@@ -336,7 +336,7 @@ def test_silent_robots_of_the_program_are_asked_again(session: Session, pepper: 
     assert runner is not None
     session.runs.on_runner(RunnerEvent("ended", runner.run, unresponsive_robots=("Pepper",)))
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    assert session.runs.view().title == "Pepper did not reply"
+    assert session.runs.view().title == "Pepper didn't reply"
     runner.close()
 
 
@@ -345,5 +345,5 @@ def test_stop_without_network_names_every_robot(session: Session, pepper: WireRo
     stopper, session.stopper = session.stopper, None
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    assert session.runs.view().title.startswith("Stop was not sent to Pepper: ")
+    assert session.runs.view().title.startswith("Stop wasn't sent to Pepper: ")
     session.stopper = stopper

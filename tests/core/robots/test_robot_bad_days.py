@@ -257,12 +257,12 @@ def test_feedback_flood_is_handled(session: Session, liar: Liar, tried: Invocati
 
 def test_robot_that_never_replies_is_reported(session: Session, liar: Liar, tried: Invocation) -> None:
     tick_until(session, lambda: not tried.is_running, SAID_S)
-    assert tried.error == "Turtle is not responding. Check that it is switched on."
+    assert tried.error == "Turtle isn't responding. Check that it is switched on."
     assert session.fleet.link("Turtle").state == "not stopped"  # type: ignore[union-attr]
     tick_until(session, lambda: liar.commands[-1]["op"] == "cancel")
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
-    assert session.runs.view().title == "Turtle did not reply"
+    assert session.runs.view().title == "Turtle didn't reply"
 
 
 def test_robot_that_falls_silent_during_an_action_is_reported(

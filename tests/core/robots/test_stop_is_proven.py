@@ -164,10 +164,10 @@ def test_robot_that_stop_was_not_sent_to_is_named() -> None:
     report = StopReport((RobotStop("Pepper", True, 3.0),), 3.0)
     whole = report.with_unreached(["Pepper", "Turtle"], "no master answers")
     assert (whole.is_proven, whole.unconfirmed_names) == (False, ("Turtle",))
-    said = "Stop was not sent to Turtle: no master answers. Switch it off by hand."
+    said = "Stop wasn't sent to Turtle: no master answers. Switch it off by hand."
     assert whole.robots[1].message == said
     assert report.with_unreached(["Pepper"]) is report
-    assert not_reached("Turtle").problem == "Stop was not sent to Turtle"
+    assert not_reached("Turtle").problem == "Stop wasn't sent to Turtle"
 
 
 class Broken:

@@ -26,7 +26,7 @@ def lab(tmp_path: Path) -> Iterator[SimulatedLab]:
 
 
 def start_unreachable_robot(lab: SimulatedLab) -> SimulatedRobot:
-    """Start a robot that Studio sees and whose command subscriber is not connected yet."""
+    """Start a robot that Studio sees and whose command subscriber isn't connected yet."""
     pepper = lab.start_robot("Pepper")
     pepper.node.is_subscribing = True
     lab.wait_for_link("Pepper")

@@ -74,7 +74,7 @@ def test_robot_lost_during_a_program_is_named_until_it_replies(session: Session)
             session.runs.stop()
             tick_until(session, lambda: session.runs.view().state == "stopping")
             tick_until(session, lambda: session.runs.view().state != "stopping")
-            assert session.runs.view().title == "Lamp did not reply"
+            assert session.runs.view().title == "Lamp didn't reply"
             assert not session.runs.view().can_run
             tick_until(session, lambda: not is_needed(session))
         driver = Driver(LAMP, "Lamp", node)

@@ -83,7 +83,7 @@ def test_trial_fails_after_three_seconds_without_reply(bench) -> None:
     bench.pass_time(FIRST_REPLY_TIMEOUT_S - 0.1)
     assert made.is_running
     bench.pass_time(0.2)
-    assert (made.state, made.error) == ("failed", "Turtle is not responding. Check that it is switched on.")
+    assert (made.state, made.error) == ("failed", "Turtle isn't responding. Check that it is switched on.")
     assert bench.sent[-1]["op"] == "cancel"  # should it wake up
     assert (bench.link.state, bench.link.chip_text) == ("silent", "virtual, not responding")
     bench.tries.apply_reply(bench.link, {"op": "alive", "id": ""})

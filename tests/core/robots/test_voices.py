@@ -112,7 +112,7 @@ def test_queue_of_waiting_utterances_is_bounded_and_drops_are_logged(case) -> No
     for count in range(MAX_WAITING + 1):
         case.tell("Ginger", f"word {count}", 0.95)
     lines = [line.text for line in case.session.console.records if line.origin == "Ginger"]
-    assert lines == ["“word 0” was shown but not spoken: others were speaking"]
+    assert lines == ["“word 0” was shown but not spoken: too many texts were waiting"]
     heard = []
     for _turn in range(MAX_WAITING + 2):
         case.speaker.is_busy = False

@@ -69,7 +69,7 @@ def test_stop_is_unproven_when_stopper_and_runner_raise(monkeypatch: pytest.Monk
     (_, done) = posted
     assert isinstance(done, StopDone)
     assert (done.number, done.report.unconfirmed_names) == (2, ("Arm",))
-    assert done.report.robots[0].problem == "Stop was not sent to Arm: OSError: out of order"
+    assert done.report.robots[0].problem == "Stop wasn't sent to Arm: OSError: out of order"
 
 
 def test_stop_of_one_robot_is_unproven_when_the_stopper_raises(monkeypatch: pytest.MonkeyPatch) -> None:

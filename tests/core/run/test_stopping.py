@@ -70,7 +70,7 @@ def test_only_named_robots_are_stopped(stopper, robots):
 def test_unknown_robot_name_is_in_the_report(stopper, robots):
     report = stopper.stop_all(["Turtle", "Nobody"], timeout_s=LONG_S)
     assert (report.is_proven, report.unconfirmed_names) == (False, ("Nobody",))
-    assert report.robots[1].message == "Stop was not sent to Nobody. Switch it off by hand."
+    assert report.robots[1].message == "Stop wasn't sent to Nobody. Switch it off by hand."
 
 
 def test_stop_without_robots_proves_nothing(stopper):

@@ -92,7 +92,7 @@ def test_reply_below_one_millisecond_is_not_shown_as_zero() -> None:
 def test_unanswered_stop_names_the_robot_and_manual_action() -> None:
     view = view_of(after(PEPPER, SILENT), [], 0)
     assert (view.title, view.detail) == (
-        "Turtle did not reply",
+        "Turtle didn't reply",
         "Pepper stopped (38 ms). Switch Turtle off by hand.",
     )
     assert (view.result, view.result_status) == ("1 of 2 robots stopped", "error")
@@ -104,7 +104,7 @@ def test_unanswered_stop_names_the_robot_and_manual_action() -> None:
 def test_robot_message_is_shown_first() -> None:
     stuck = RobotStop("Arm", False, 9.0, error="Arm may still move: the brake is stuck", is_refused=True)
     view = view_of(after(PEPPER, stuck, SILENT), [], 0)
-    assert view.title == "Arm may still move: the brake is stuck; Turtle did not reply"
+    assert view.title == "Arm may still move: the brake is stuck; Turtle didn't reply"
     assert view.detail == "Pepper stopped (38 ms). Switch Arm and Turtle off by hand."
     assert view.confirm_label == "Arm and Turtle aren't moving"
     twin = RobotStop("Arm", False, 9.0, error=stuck.error, is_refused=True, program="arm 2")
@@ -115,7 +115,7 @@ def test_robot_message_is_shown_first() -> None:
 def test_long_list_of_silent_robots_is_shortened() -> None:
     many = [RobotStop("Pepper", False, None, program=f"copy {number}") for number in range(30)]
     title = view_of(after(*many), [], 0).title
-    assert title.endswith("Pepper (“copy 3”) and 26 more did not reply")
+    assert title.endswith("Pepper (“copy 3”) and 26 more didn't reply")
     refused = [
         RobotStop(f"R{n}", False, 1.0, error=f"R{n} may still move: no", is_refused=True) for n in range(9)
     ]
@@ -132,7 +132,7 @@ def test_confirm_button_is_shortened_for_long_names() -> None:
 def test_stop_result_counts_robots_not_their_programs() -> None:
     twin = RobotStop("Pepper", False, None, program="pepper 2")
     view = view_of(after(PEPPER, twin, TURTLE), [], 0)
-    assert view.title == "Pepper (“pepper 2”) did not reply"
+    assert view.title == "Pepper (“pepper 2”) didn't reply"
     assert view.result == "1 of 2 robots stopped"
     assert view.detail == "Turtle stopped (41 ms). Switch Pepper off by hand."
     ears = RobotStop("Pepper", False, None, can_confirm=False, program="nep-topic-echo")

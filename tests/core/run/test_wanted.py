@@ -39,7 +39,7 @@ def test_stack_with_block_of_disconnected_robot_cannot_be_tried() -> None:
     wanted = RequestedRun(document("Pepper"), stack=Stack("ada", state=say("Hi", "Ada") | {"id": "ada"}))
     program = wanted.program()
     assert program is not None
-    assert wanted.problems(program) == {"ada": "Ada is not connected, so these blocks can't be tried."}
+    assert wanted.problems(program) == {"ada": "Ada isn't connected, so these blocks can't be tried."}
 
 
 def test_requested_value_has_its_unit() -> None:

@@ -84,12 +84,12 @@ def test_report_is_valid_at_any_moment(tmp_path: Path) -> None:
 def test_first_failure_is_the_reported_reason(tmp_path: Path) -> None:
     report = Report(tmp_path / "report.json", {})
     report.start_step("robot", "the virtual robot", 5.0)
-    report.fail("The robot does not exist.")
+    report.fail("The robot doesn't exist.")
     report.fail("The window did not close.")
     assert not report.finish()
     whole = told(tmp_path)
-    assert (whole["ok"], whole["why"]) == (False, "The robot does not exist.")
-    assert (whole["steps"][0]["ok"], whole["steps"][0]["said"]) == (False, "The robot does not exist.")
+    assert (whole["ok"], whole["why"]) == (False, "The robot doesn't exist.")
+    assert (whole["steps"][0]["ok"], whole["steps"][0]["said"]) == (False, "The robot doesn't exist.")
 
 
 def test_unwritable_report_is_a_failure(tmp_path: Path) -> None:
@@ -150,7 +150,7 @@ def test_hanging_process_is_ended_with_its_children(tmp_path: Path) -> None:
     assert done.returncode == 1, done.stderr
     whole = told(tmp_path)
     assert not whole["ok"]
-    assert whole["why"] == "Studio did not respond in time and was stopped. It was waiting for: the window"
+    assert whole["why"] == "Studio didn't respond in time and was stopped. It was waiting for: the window"
     assert not whole["steps"][0]["ok"]
     assert "in show" in (tmp_path / "crash.txt").read_text("utf-8")  # where it stood
     assert not psutil.pid_exists(int(done.stdout))

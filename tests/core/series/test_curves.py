@@ -336,7 +336,7 @@ def test_misspelled_field_is_reported_with_suggestion() -> None:
     sped = case.curve("/a.sped")
     assert case.curves.no_values_reason(sped) == ""
     case.send("/a", (0.0, {"speed": 1, "pose": {"x": 1}}))
-    assert case.curves.no_values_reason(sped) == "/a.sped does not exist. Did you mean /a.speed?"
+    assert case.curves.no_values_reason(sped) == "/a.sped doesn't exist. Did you mean /a.speed?"
     assert "Choose one" in case.curves.no_values_reason(case.curve("/a.pose"))
     with pytest.raises(CurveError, match="did you mean /a"):
         case.curves.add("/aa.x")

@@ -164,7 +164,7 @@ def test_behaviour_of_a_newer_version_is_rejected_with_a_message_and_not_modifie
     with pytest.raises(DocumentError) as raised:
         read_file(path)
     assert str(raised.value) == (
-        "Mine.nepb was saved by a newer NEP Studio (version 2) and is unchanged; update this one"
+        "Mine.nepb was saved by a newer NEP Studio (version 2) and is unchanged; update NEP Studio"
     )
     assert path.read_bytes() == before
 

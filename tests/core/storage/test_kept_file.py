@@ -74,5 +74,5 @@ def test_file_of_a_newer_version_is_not_modified(path: Path) -> None:
     path.write_bytes(b"9")
     found = read(path)
     assert (found.value, found.is_newer) == (None, True)
-    assert found.problem.startswith("Your changes are not being saved: it is of")
+    assert found.problem.startswith("Your changes aren't being saved: it is of")
     assert (path.read_bytes(), beside(path).exists()) == (b"9", False)

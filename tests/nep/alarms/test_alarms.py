@@ -48,7 +48,7 @@ def test_actions_run_once_in_order_and_are_recorded() -> None:
     assert hands.done == [("on", "stop"), ("on", "banner")]
     (record,) = scene.alarms.history
     assert [deed.kind for deed in record.action_results] == ["stop", "banner", "sound"]
-    assert record.action_results[-1].text == "this action is not available here"  # nobody carries out a sound
+    assert record.action_results[-1].text == "this action isn't available here"  # nobody carries out a sound
     assert record.cause == "r of /d is 0, below 1"
     assert not scene.alarms.is_busy
 

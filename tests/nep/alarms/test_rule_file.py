@@ -77,7 +77,7 @@ def test_example_file_is_valid() -> None:
         ({"when": {"topic": "/t", "is": "below", "value": "x", "than": "1"}}, "must be a number"),
         (
             {"when": {"topic": "/t", "is": "below", "value": "x[", "than": 1}},
-            "'x[' is not a valid field path; use a path such as 'pose.x' or 'joints[3]'",
+            "'x[' isn't a valid field path; use a path such as 'pose.x' or 'joints[3]'",
         ),
         ({"when": {"topic": "/t", "is": "above", "value": "", "than": 1}}, "needs a name"),
         ({"when": {"topic": "/a b", "is": "silent"}}, "'topic'"),
@@ -113,8 +113,8 @@ def test_invalid_alarm_is_rejected_with_its_line(alarm: object, said: str) -> No
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "'f.json' is not valid JSON: line 1"),
-        ('{"alarms": [\n{"when": }]}', "'f.json' is not valid JSON: line 2, column 9"),
+        ("", "'f.json' isn't valid JSON: line 1"),
+        ('{"alarms": [\n{"when": }]}', "'f.json' isn't valid JSON: line 2, column 9"),
         ("[]", "it is not an alarm file"),
         ('{"format": 2, "alarms": []}', "newer version"),
         ('{"format": true, "alarms": []}', "'format': it must be 1"),
@@ -137,7 +137,7 @@ def test_invalid_alarm_file_is_rejected_also_in_lenient_mode(text: str, said: st
 def test_non_utf_8_missing_and_oversized_files_are_rejected(tmp_path) -> None:
     with pytest.raises(NepError, match=r"line 2 of 'f' .*UTF-8"):
         parse_alarms(b'{\n"\xff": 1}', "f")
-    with pytest.raises(NepError, match="cannot be read"):
+    with pytest.raises(NepError, match="can't be read"):
         read_alarms(tmp_path / "none.json")
     with pytest.raises(NepError, match="too large for an alarm file"):
         parse_alarms(b" " * 4_000_001, "f")

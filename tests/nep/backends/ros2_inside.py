@@ -374,7 +374,7 @@ def test_reliable_subscriber_does_not_receive_from_a_best_effort_publisher(make:
     (alert,) = node.graph().alerts
     assert (
         alert.sentence
-        == "“b” does not receive “t” from “a”: it requests “reliable”, but the publisher offers “best effort”"
+        == "“b” doesn't receive “t” from “a”: it requests “reliable”, but the publisher offers “best effort”"
     )
     wants.close()
     assert node.graph().alerts == ()
@@ -388,7 +388,7 @@ def test_type_mismatch_on_a_topic_raises_an_alert_and_delivers_nothing(make: Mak
     with nep_program(code) as other:
         assert other.line() == "ready"
         said = "it requests “std_msgs/msg/Int64”, but the publisher offers “std_msgs/msg/Float64”"
-        said = f"“a” does not receive “t” from “/other”: {said}"
+        said = f"“a” doesn't receive “t” from “/other”: {said}"
         eventually(lambda: [each.sentence for each in node.graph().alerts] == [said])
         assert sub.listen() == (False, {})
     eventually(lambda: node.graph().alerts == ())

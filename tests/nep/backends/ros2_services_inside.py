@@ -297,7 +297,7 @@ def test_server_of_unknown_type_is_reported_at_the_call(make: Make) -> None:
 def test_surveys_are_rejected(make: Make) -> None:
     node = make("node")
     for new in (node.new_surveyor, node.new_respondent):
-        with pytest.raises(nep.NepError, match="the back end 'ros2' does not support surveys; use 'zeromq'"):
+        with pytest.raises(nep.NepError, match="the back end 'ros2' doesn't support surveys; use 'zeromq'"):
             new("/who")
 
 

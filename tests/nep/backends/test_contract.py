@@ -145,7 +145,7 @@ def test_payload_that_cannot_be_encoded_is_rejected_with_and_without_a_subscribe
     bad = {"pose": {"x": 1}, "joints": [0, {"angle": {1, 2}}]}
     pub.publish(bad)
     assert (pub.subscribers, pub.count, pub.refused) == (0, 0, 1)
-    assert "a message on 'topic' cannot be sent (1 so far): cannot encode a 'dict' as 'json'" in caplog.text
+    assert "a message on 'topic' can't be sent (1 so far): can't encode a 'dict' as 'json'" in caplog.text
     assert "it is at 'joints[1].angle'" in caplog.text
     sub = make("b").new_sub("topic")
     assert pub.subscribers == 1
@@ -153,7 +153,7 @@ def test_payload_that_cannot_be_encoded_is_rejected_with_and_without_a_subscribe
     assert (pub.count, pub.refused) == (0, 2)
     eventually(lambda: [each.id for each in node.graph().alerts] == ["encode:topic"])
     (alert,) = node.graph().alerts
-    assert alert.sentence.startswith("“a” can't send on “topic”: cannot encode a 'dict' as 'json'")
+    assert alert.sentence.startswith("“a” can't publish on “topic”: can't encode a 'dict' as 'json'")
     pub.publish(1)
     assert sub.listen(timeout_s=30.0) == (True, 1)
     assert (sub.lost, pub.count, pub.refused) == (0, 1, 2)
@@ -183,13 +183,13 @@ def test_rejected_payload_does_not_replace_the_latched_message(make: Make) -> No
 @pytest.mark.parametrize(
     ("msg_type", "payload", "sentence"),
     [
-        ("string", 5, "cannot encode a 'int' as 'string'; publish a 'str', or use the type 'json'"),
-        ("bytes", "text", "cannot encode a 'str' as 'bytes'; publish 'bytes'"),
-        ("image", "text", "cannot encode a 'str' as 'image'; publish a 'uint8' array"),
+        ("string", 5, "can't encode a 'int' as 'string': publish a 'str', or use the type 'json'"),
+        ("bytes", "text", "can't encode a 'str' as 'bytes': publish 'bytes'"),
+        ("image", "text", "can't encode a 'str' as 'image': publish a 'uint8' array"),
         ("image", np.zeros((4, 4, 3), np.complex64), "'complex64'"),
         ("image", np.zeros((4, 0, 3), np.uint8), "(4, 0, 3)"),
-        ("json", nep.Encoded("text"), "cannot encode a 'str' as 'json'; its data must be 'bytes'"),  # type: ignore[arg-type]
-        ("json", nep.Encoded(b"1", [1]), "cannot encode a 'list' as 'json'; an extension must be a map"),  # type: ignore[arg-type]
+        ("json", nep.Encoded("text"), "can't encode a 'str' as 'json': the data must be 'bytes'"),  # type: ignore[arg-type]
+        ("json", nep.Encoded(b"1", [1]), "can't encode a 'list' as 'json': an extension must be a map"),  # type: ignore[arg-type]
     ],
 )
 def test_payload_of_a_wrong_type_raises_with_and_without_a_subscriber(
@@ -246,10 +246,10 @@ def test_strict_publisher_raises_with_and_without_a_subscriber(make: Make, is_he
     sub = make("b").new_sub("topic") if is_heard else None
     for payload, sentence in (
         ({"joints": [0, {"angle": {1, 2}}]}, "it is at 'joints[1].angle'"),
-        ({"a": "\ud800"}, "cannot encode a 'dict' as 'json'"),
-        (2**70, "cannot encode a 'int' as 'json'"),
-        ({Treacherous(): Treacherous()}, "cannot encode a 'dict' as 'json'"),
-        (nep.Encoded(b"1", {"a": object()}), "cannot encode a 'Encoded' as 'json'"),
+        ({"a": "\ud800"}, "can't encode a 'dict' as 'json'"),
+        (2**70, "can't encode a 'int' as 'json'"),
+        ({Treacherous(): Treacherous()}, "can't encode a 'dict' as 'json'"),
+        (nep.Encoded(b"1", {"a": object()}), "can't encode a 'Encoded' as 'json'"),
     ):
         for _ in range(2):  # each of them, not only now and then
             with pytest.raises(nep.EncodeError, match=re.escape(sentence)):
@@ -374,7 +374,7 @@ def test_callback_with_message_receives_the_whole_message(
     assert (message.topic, message.seq, message.publisher) == ("example", seq(2), pub.id)
     assert (message.payload, message.msg_type) == ({"n": 1}, "json")
     assert message.stamp_ns is not None
-    assert "a message on 'example' cannot be read (1 so far): cannot decode 8 bytes" in caplog.text
+    assert "a message on 'example' can't be read (1 so far): can't decode 8 bytes" in caplog.text
 
 
 def test_timers_run_in_the_spinning_thread_between_callbacks(make: Make) -> None:

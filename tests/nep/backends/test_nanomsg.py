@@ -94,7 +94,7 @@ def test_missing_pynng_is_reported_with_the_install_command() -> None:
     def missing(_name: str) -> object:
         raise ImportError
 
-    with pytest.raises(nep.NepError, match="'nanomsg' is not installed; install it with 'pip install"):
+    with pytest.raises(nep.NepError, match="'nanomsg' isn't installed; install it with 'pip install"):
         load_pynng(missing)  # type: ignore[arg-type]
 
 
@@ -114,8 +114,8 @@ def test_nanomsg_and_zeromq_subscribers_ignore_publishers_of_the_other_back_end(
         for n, sub in enumerate(subs):
             assert sub.listen(timeout_s=30.0) == (True, n)
             assert sub.listen() == (False, {})
-    assert "of 'a': it is an endpoint of 'nanomsg'" in caplog.text
-    assert "of 'b': it is not an endpoint of 'nanomsg'" in caplog.text
+    assert "of 'a': the endpoint belongs to 'nanomsg'" in caplog.text
+    assert "of 'b': not an endpoint of 'nanomsg'" in caplog.text
 
 
 def test_stale_hellos_are_evicted(master: Master) -> None:

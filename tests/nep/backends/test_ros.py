@@ -310,7 +310,7 @@ def test_missing_rospy_is_reported_with_the_install_command() -> None:
         raise ImportError
 
     with pytest.raises(
-        nep.NepError, match="'ros' is not installed; install it with 'sudo apt install python3-rospy"
+        nep.NepError, match="'ros' isn't installed; install it with 'sudo apt install python3-rospy"
     ):
         load_rospy(missing)  # type: ignore[arg-type]
 

@@ -190,7 +190,7 @@ def test_missing_packages_are_reported_with_the_install_command(monkeypatch: pyt
 
     monkeypatch.setattr("platform.machine", lambda: "x86_64")
     for library in (load_dds, load_typesys):
-        with pytest.raises(nep.NepError, match=r"'ros2' is not installed; install it with 'pip install"):
+        with pytest.raises(nep.NepError, match=r"'ros2' isn't installed; install it with 'pip install"):
             library(missing)  # type: ignore[operator]
 
 
@@ -240,7 +240,7 @@ def test_compatible_endpoints_raise_no_alert() -> None:
 
 
 def test_incompatible_endpoints_raise_alerts_in_plain_words() -> None:
-    heard = "“c” does not receive “t” from “a”: it requests "
+    heard = "“c” doesn't receive “t” from “a”: it requests "
     assert alerts([party("a", is_reliable=False)], [party("c")]) == {
         "ros2-reliability:t": heard + "“reliable”, but the publisher offers “best effort”"
     }
@@ -376,7 +376,7 @@ def test_invalid_definitions_are_rejected(types: MessageTypes, tmp_path: Path) -
     types.add("mine/msg/Arm", "float64[2] joints\n")  # the same again
     with pytest.raises(nep.NepError, match=r"'mine/msg/Arm' .*other fields"):
         types.add("mine/Arm", "float64[3] joints\n")
-    with pytest.raises(nep.NepError, match="the definition of 'mine/msg/Leg' cannot be read"):
+    with pytest.raises(nep.NepError, match="the definition of 'mine/msg/Leg' can't be read"):
         types.add("mine/Leg", "nonsense\n")
     with pytest.raises(nep.NepError, match=r"'mine/msg/Leg' .*'no/msg/Thing' .*'a'"):
         types.add("mine/Leg", "no/Thing a\n")
@@ -428,7 +428,7 @@ def test_every_kind_of_field_round_trips(types: MessageTypes) -> None:
     ("payload", "sentence"),
     [
         ({"two": [{}]}, "'two' has 1 items; expected 2"),
-        ({"more": [{}, {"s": ["abcd"]}]}, "'more\\[1\\].s\\[0\\]' has 4 bytes; at most 3 are allowed"),
+        ({"more": [{}, {"s": ["abcd"]}]}, "'more\\[1\\].s\\[0\\]' is 4 bytes; at most 3 are allowed"),
         ({"more": [{"s": [""] * 3}]}, "'more\\[0\\].s' has 3 items; at most 2 are allowed"),
         ({"more": [{"f": [0]}]}, r"'more\[0\].f' has 1 items; expected 2"),
         ({"flags": [1]}, "'flags\\[0\\]' is a 'int'; expected True or False"),
@@ -474,7 +474,7 @@ def test_corrupted_bytes_are_decoded_or_raise_decode_error(types: MessageTypes) 
 
 def test_unknown_ros_distribution_is_rejected() -> None:
     pytest.importorskip("rosbags", reason=NEEDS)
-    with pytest.raises(nep.NepError, match="ROS_DISTRO is 'jazy', which rosbags does not know; did you mean"):
+    with pytest.raises(nep.NepError, match="ROS_DISTRO is 'jazy', which rosbags doesn't know; did you mean"):
         MessageTypes("jazy")
 
 

@@ -99,7 +99,7 @@ def test_nep_calls_a_ros_server(ros: str) -> None:
             assert client.line() == "{'success': True, 'message': 'switched'}"
             assert "EncodeError" in (said := client.line())
             assert "field 'data' is 5; expected a 'bool'" in said
-            assert "field 'dat' does not exist; did you mean 'data'?" in client.line()
+            assert "field 'dat' doesn't exist; did you mean 'data'?" in client.line()
             assert client.line() == "{'success': True, 'message': 'switched'}"
             assert "publish a 'dict' with the fields 'data'" in client.line()
             assert client.line() == (
@@ -161,7 +161,7 @@ def test_ros_client_calls_a_nep_server(ros: str) -> None:
             assert client.line() == 'success: True message: "done"'
             assert client.line() == ""
             assert "md5sums do not match" in client.line()
-            assert "field 'succes' does not exist; did you mean 'success'?" in client.line()
+            assert "field 'succes' doesn't exist; did you mean 'success'?" in client.line()
             client.end()
         assert [server.line() for _ in range(3)] == ["{'data': False}", "{'data': True}", "{'data': False}"]
         assert server.line() == "3 1 1"

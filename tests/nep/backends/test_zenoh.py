@@ -274,7 +274,7 @@ def test_invalid_puts_and_replies_are_rejected_and_counted(
         token.undeclare()
         calls.undeclare()
     assert sub.received == 0
-    assert "it has no header; the publisher is not a nep program" in caplog.text
+    assert "the message has no header; its publisher isn't a nep program" in caplog.text
     pub = node.new_pub("t")
     pub.publish(1)
     assert sub.listen(timeout_s=30.0) == (True, 1)
@@ -442,7 +442,7 @@ def test_missing_zenoh_is_reported_with_the_install_command() -> None:
     def missing(_name: str) -> object:
         raise ImportError
 
-    with pytest.raises(nep.NepError, match="'zenoh' is not installed; install it with 'pip install"):
+    with pytest.raises(nep.NepError, match="'zenoh' isn't installed; install it with 'pip install"):
         load_zenoh(missing)  # type: ignore[arg-type]
 
 

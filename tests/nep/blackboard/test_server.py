@@ -83,12 +83,12 @@ def test_invalid_request_is_rejected_with_a_message(ask: Ask, board: nep.Blackbo
         "'key' and 'value'": ("set", {}),
         "'key' and 'value', or": ("set", {"key": "a"}),
         "or a map 'values'": ("set", {"values": [1]}),
-        "'' is not a valid key": ("set", {"key": "", "value": 1}),
+        "'' isn't a valid key": ("set", {"key": "", "value": 1}),
         "lives_s must be .*, not 0": ("set", {"key": "a", "value": 1, "lives_s": 0}),
         "lives_s must be .*, not 'x'": ("set", {"key": "a", "value": 1, "lives_s": "x"}),
-        "'5' is not a valid key": ("get", {"key": 5}),
+        "'5' isn't a valid key": ("get", {"key": 5}),
         "max_age_s must be .*, not -1": ("get", {"key": "a", "max_age_s": -1}),
-        "'None' is not a valid key": ("keys", {"pattern": None}),
+        "'None' isn't a valid key": ("keys", {"pattern": None}),
     }
     for sentence, (what, request) in refusals.items():
         with pytest.raises(nep.ServiceError, match=sentence):

@@ -229,7 +229,7 @@ def test_terminal_table_updates_in_place_with_warnings_above(file, nodes):
         eventually(lambda: "/t" in on_a.graph().topics)
         pub = on_a.new_pub("/t")
         pub.publish({"no": "text"})
-        shown.shows("a message on '/t' cannot be sent (1 so far): cannot encode a 'dict' as 'string'")
+        shown.shows("a message on '/t' can't be sent (1 so far): can't encode a 'dict' as 'string'")
         shown.shows("! zeromq → zenoh  /t: cannot encode")
         shown.shows("\x1b[1A")  # up again: the next report takes its place
         rest, code = shown.end()
@@ -253,8 +253,8 @@ def test_terminal_table_updates_in_place_with_warnings_above(file, nodes):
         (("zeromq:/t", "zenoh:/t", "--direction", "a-b"), "unknown direction 'a-b'; did you mean 'a->b'?"),
         (("zenoh@nowhere:/t", "zeromq:/t"), "'nowhere' is not a zenoh address; use 'local'"),
         (("zeromq:/t", "memory:/t"), "the back end 'memory' connects nodes of one program only"),
-        (("zeromq:/a b", "zenoh:/t"), "'/a b' is not a valid topic name; the character ' ' is not allowed"),
-        (("missing.toml",), "'missing.toml' cannot be read: no such file or directory; 'nep bridge --ex"),
+        (("zeromq:/a b", "zenoh:/t"), "'/a b' isn't a valid topic name: the character ' ' isn't allowed"),
+        (("missing.toml",), "'missing.toml' can't be read: no such file or directory; 'nep bridge --ex"),
         (("missing.toml", "--rate", "3"), "--direction and --rate can't be used with a file"),
     ],
 )  # fmt: skip

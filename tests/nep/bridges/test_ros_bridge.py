@@ -75,7 +75,7 @@ def test_command_line_bridge_joins_a_robot_without_duplicates(ros: str, master: 
             report = when(bridge, lambda it: any(each["failed"] for each in it["routes"]))
             (way,) = (each for each in report["routes"] if each["from"]["side"] == "a")
             assert (way["received"], way["sent"], way["failed"], way["lost"]) == (4, 3, 1, 0)
-            assert "field 'message' does not exist; known names: 'data'" in way["problem"]
+            assert "field 'message' doesn't exist; known names: 'data'" in way["problem"]
             assert hears.receive(30.0).payload == {"message": "no"}
             assert silent(hears)
 

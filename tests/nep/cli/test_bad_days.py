@@ -128,7 +128,7 @@ def test_master_names_the_foreign_program_that_holds_its_port():
         done = run("master", "--no-gateway", NEP_MASTER=f"127.0.0.1:{port}")
     assert done.returncode == 1
     assert done.stderr.startswith("nep: “")
-    assert f"(process {os.getpid()}) uses port {port} but is not a master; close that program" in done.stderr
+    assert f"(process {os.getpid()}) uses port {port} but isn't a master; close that program" in done.stderr
     assert f"NEP_MASTER=127.0.0.1:{port + 1}" in done.stderr
     assert "Traceback" not in done.stderr
 
@@ -146,7 +146,7 @@ def test_doctor_reports_an_unwritable_state_folder(tmp_path):
 def test_invalid_master_address_is_reported():
     done = run("node", "list", NEP_MASTER="no address at all")
     assert done.returncode == 1
-    assert done.stderr.startswith("nep: 'no address at all:7780' is not a valid address of a master")
+    assert done.stderr.startswith("nep: 'no address at all:7780' isn't a valid address of a master")
 
 
 def test_address_in_use_error_for_any_port_names_the_host():

@@ -72,7 +72,7 @@ def test_blackboard_command_watches_topics_and_shows_values(master: Master, run:
         assert "no matching values" in none.stderr
         refused = run("show", "")
         assert refused.returncode == 1
-        assert "'' is not a valid key" in refused.stderr
+        assert "'' isn't a valid key" in refused.stderr
         assert board.call({"key": "touched.head"})["value"] == 1  # type: ignore[index]
         if sys.platform != "win32":
             process.send_signal(signal.SIGTERM)

@@ -139,7 +139,7 @@ def test_unknown_host_name_is_reported(type_in):
     assert "Can't find a computer named “nosuchhost.invalid”" in doctor.stdout
     assert "Start a master" not in doctor.stdout
     assert type_in("--master", "not an address", "topic", "list").stderr.startswith(
-        "nep: 'not an address:7780' is not a valid address of a master"
+        "nep: 'not an address:7780' isn't a valid address of a master"
     )
 
 
@@ -162,7 +162,7 @@ def test_non_utf_8_input_is_rejected_with_its_position(running_master):
         check=False,
     )
     assert done.returncode == 1
-    assert done.stderr.startswith(b"nep: byte 1 of line 2 is not valid UTF-8; ")
+    assert done.stderr.startswith(b"nep: byte 1 of line 2 isn't valid UTF-8; ")
 
 
 def test_unknown_command_exits_with_code_2():
@@ -350,8 +350,8 @@ def test_command_line_imports_only_its_own_command():
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("topic", "echo", "t", "--timeout", "nan"), "nan is not a valid duration"),
-        (("topic", "hz", "t", "--timeout", "-1"), "-1 is not a valid duration"),
+        (("topic", "echo", "t", "--timeout", "nan"), "nan isn't a valid duration"),
+        (("topic", "hz", "t", "--timeout", "-1"), "-1 isn't a valid duration"),
         (("topic", "pub", "t", "1", "--type", "a\x01"), "it is 'a\\x01'; use at most 200 characters"),
         (("topic", "pub", "t", "1", "--type", "a" * 300), "(300 characters)'; use at most 200 characters"),
     ],

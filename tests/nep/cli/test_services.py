@@ -112,7 +112,7 @@ def test_errors_are_reported_in_one_sentence(arm, type_in, tmp_path):
             ("/arm/mov", "{}", "--timeout", "0.1"),
             "no server for '/arm/mov' within 0.1 s; did you mean '/arm/move'?",
         ),
-        ((SERVICE, "{oops"), "'{oops' is not valid JSON: line 1, column 2: "),
+        ((SERVICE, "{oops"), "'{oops' isn't valid JSON: line 1, column 2: "),
         (("bad name", "{}"), "topic"),
         ((SERVICE, f"@{tmp_path / 'none'}"), "can't read"),
     ):

@@ -150,7 +150,7 @@ OUT = "nep: can't write the output: it is closed\n"
 @pytest.mark.parametrize(
     ("closed", "words", "code", "said"),
     [
-        ("0<&-", "topic pub new -", 1, "nep: can't read the standard input: it is closed\n"),
+        ("0<&-", "topic pub new -", 1, "nep: can't read standard input: it is closed\n"),
         ("0<&-", "topic list", 0, ""), ("0<&- 1>&-", "topic list", 1, OUT), ("1>&-", "--version", 1, OUT),
         ("1>&-", "topic list --json", 1, OUT), ("1>&-", "topic echo big --json", 1, OUT),
         ("1>&-", "topic echo text", 1, OUT), ("0<&- 1>&- 2>&-", "topic list", 1, ""),

@@ -194,4 +194,4 @@ def test_removed_or_renamed_topic_is_reported(master, capsys):
         node.new_pub("/odom2")
         running.join()
     assert len(ended) == 1
-    assert "'/odom' has no publisher any more; did you mean '/odom2'? waiting" in capsys.readouterr().err
+    assert "'/odom' no longer has a publisher; did you mean '/odom2'? waiting" in capsys.readouterr().err

@@ -101,7 +101,7 @@ def test_alarm_saves_the_last_seconds_through_any_available_flight_recorder(mast
     assert asked == [{"seconds": 30, "note": "range of /distance is 0.3, below 0.4"}]
     assert "need Studio" not in done.stderr
     told = [json.loads(line)["what"] for line in refused.stdout.splitlines()]
-    assert told[1] == "nothing saved: 'nep recording ring' is not running"
+    assert told[1] == "nothing saved: 'nep recording ring' isn't running"
 
 
 def test_message_is_published_and_a_misspelt_topic_reported(master, type_in, file) -> None:
@@ -112,7 +112,7 @@ def test_message_is_published_and_a_misspelt_topic_reported(master, type_in, fil
     with Talker(master.address, "/distance", {"range": 0.3}) as node, node.new_sub("/say", "json") as heard:
         done = type_in("watch", name, "-n", "1", "--master", master.address)
         assert heard.listen(timeout_s=5.0) == (True, {"say": "near"})
-    assert "'/distanse' does not exist yet; waiting. did you mean '/distance'?" in done.stderr
+    assert "'/distanse' doesn't exist yet; waiting. did you mean '/distance'?" in done.stderr
     assert "sent to /say" in done.stdout
 
 
@@ -195,7 +195,7 @@ def test_lost_master_is_waited_for(type_in, file, monkeypatch) -> None:
     ("words", "code", "said"),
     [
         ((), 1, "specify an alarm file"),
-        (("none.json",), 1, "'none.json' cannot be read"),
+        (("none.json",), 1, "'none.json' can't be read"),
         (("FILE", "--check"), 0, "the file is valid"),
         (("OFF",), 1, "are switched off"),
         (("BAD",), 1, "line 1 of"),

@@ -186,7 +186,7 @@ def test_text_output_has_a_sentence_and_the_next_step(foreign):
     assert "Traceback" not in done.stderr
     lines = done.stdout.splitlines()
     assert lines[0].startswith("✗ “")
-    assert lines[0].endswith(f" uses port {foreign} but is not a master.")
+    assert lines[0].endswith(f" uses port {foreign} but isn't a master.")
     assert lines[2].strip() == f"nep master --port {foreign + 1}"
 
 

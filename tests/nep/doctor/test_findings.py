@@ -120,7 +120,7 @@ def test_no_start_command_is_suggested_for_a_network_address():
     [
         (
             "timeout",
-            "10.0.0.5:7780 does not respond, so the master can't be reached.",
+            "10.0.0.5:7780 doesn't respond, so the master can't be reached.",
             "10.0.0.5 is off",
         ),
         (
@@ -129,7 +129,7 @@ def test_no_start_command_is_suggested_for_a_network_address():
             "allow other computers to connect",
         ),
         ("unknown", "This computer has no route to 10.0.0.5:7780", "on the same network"),
-        ("", "10.0.0.5 responds at port 7780, but the master does not.", "another program uses that port"),
+        ("", "10.0.0.5 responds on port 7780, but the master doesn't.", "another program uses that port"),
     ],
 )
 def test_unreachable_remote_master_is_reported_with_the_kind_of_failure(reach, sentence, fix):
@@ -153,7 +153,7 @@ def test_no_start_command_is_suggested_for_an_unknown_host():
 
 def test_foreign_program_on_the_master_port_is_named_with_a_workaround():
     one = found(view=None, master_port=PortFact(7780, "", True, OTHER))["master:foreign"]
-    assert one.sentence == "“python3 server.py” (process 77) uses port 7780 but is not a master."
+    assert one.sentence == "“python3 server.py” (process 77) uses port 7780 but isn't a master."
     assert "7781" in one.fix
     assert one.command == "nep master --port 7781"
     unknown = found(view=None, master_port=PortFact(7780, "", True))["master:foreign"]

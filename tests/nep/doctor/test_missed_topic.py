@@ -107,7 +107,7 @@ def test_missing_publisher_is_reported_with_the_published_topics():
         ("elsewhere", "“camera_driver” can be reached only from its own computer, lab.", "NEP_MASTER"),
         (
             "timeout",
-            "“camera_driver” publishes at 10.0.0.7:41000 (lab), but that address does not respond.",
+            "“camera_driver” publishes at 10.0.0.7:41000 (lab), but that address doesn't respond.",
             "firewall",
         ),
         (

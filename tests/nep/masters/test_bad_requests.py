@@ -20,14 +20,14 @@ def test_each_sender_is_counted_and_reported_for_some_seconds() -> None:
     bad = BadRequests()
     assert bad.alerts(0.0) == ()
     for _ in range(3):
-        bad.add("a", "“A”", "the body is not a map", 10.0)
-    bad.add("b", "“B”", "the body is not valid msgpack", 10.0)
+        bad.add("a", "“A”", "the body isn't a map", 10.0)
+    bad.add("b", "“B”", "the body isn't valid msgpack", 10.0)
     first, second = bad.alerts(10.0)
     assert (first.id, second.id) == ("request:a", "request:b")
-    assert first.sentence == ("“A” sent 3 requests that the master can't read: the body is not a map")
-    assert second.sentence == "“B” sent a request that the master can't read: the body is not valid msgpack"
+    assert first.sentence == ("“A” sent 3 requests that the master can't read: the body isn't a map")
+    assert second.sentence == "“B” sent a request that the master can't read: the body isn't valid msgpack"
     assert first.hint
-    bad.add("a", "“A”", "the body is not a map", 19.0)
+    bad.add("a", "“A”", "the body isn't a map", 19.0)
     (alert,) = bad.alerts(21.0)
     assert " 4 requests " in alert.sentence
     assert bad.alerts(29.5) == ()

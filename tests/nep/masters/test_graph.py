@@ -235,7 +235,7 @@ def test_unresponsive_node_is_an_alert_until_it_renews(graph: Graph) -> None:
     ask(graph, AddPublisher(node("p"), publisher(2)))
     ask(graph, ReportMissing("p", 2, (1, 99)))
     (alert,) = graph.view().alerts
-    assert (alert.id, alert.sentence) == ("missing:s", "“S” does not respond to “P”")
+    assert (alert.id, alert.sentence) == ("missing:s", "“S” doesn't respond to “P”")
     _push, reply = ask(graph, AddPublisher(node("p"), publisher(3)))
     assert isinstance(reply.body, Added)
     assert (reply.body.expected, reply.body.hung) == ((), (ExpectedSubscriber(1, "s", "S"),))

@@ -146,7 +146,7 @@ def test_conflicting_or_invalid_echo_options_are_rejected(odom):
     with pytest.raises(typer.BadParameter, match="choose one"):
         echo("/odom", ["x"], 1, None, odom, as_json=True, as_csv=True)
     with pytest.raises(
-        NepError, match=r"'x\[' is not a valid field path; use a path such as 'pose\.x' or 'joints\[3\]'"
+        NepError, match="'x\\[' isn't a valid field path; use a path such as 'pose\\.x' or 'joints\\[3\\]'"
     ):
         echo("/odom", ["x["], 1, None, odom, as_csv=True)
 

@@ -146,8 +146,8 @@ def test_image_that_does_not_fit_the_format_is_rejected_and_logged(
 @pytest.mark.parametrize(
     ("msg_type", "image", "sentence"),
     [
-        ("json", ImageFormat(), "image applies only to images; publish them as 'image'"),
-        ("image", "jpeg", "image must be a 'nep.ImageFormat', not 'str'"),
+        ("json", ImageFormat(), "'image' requires the message type 'image'"),
+        ("image", "jpeg", "'image' must be a 'nep.ImageFormat', not 'str'"),
     ],
 )
 def test_image_format_is_rejected_for_other_message_types(

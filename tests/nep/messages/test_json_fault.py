@@ -30,7 +30,7 @@ LINES = """{
         ("{\n'a': 1}", 2, 1, "double quotes"),
         ("{speed: 1}", 1, 2, "speed needs double quotes"),
         ('{"a": True}', 1, 7, "true instead of True"),
-        ('{"a": NaN}', 1, 7, "NaN is not JSON; use null"),
+        ('{"a": NaN}', 1, 7, "NaN isn't JSON; use null"),
         ('["NaN", -Infinity]', 1, 9, "-Infinity is not JSON"),
         ('{"a": "x\n}', 1, 9, "no closing quote"),
         ('["a\tb"]', 1, 4, "a tab"),

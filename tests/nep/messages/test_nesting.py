@@ -20,7 +20,7 @@ from nep.messages.codecs import codec
 from nep.messages.nesting import MAX_LEVELS, json_is_too_deep, packed_is_too_deep
 from nep.messages.packing import pack
 
-SENTENCE = "it has more than 64 levels of lists and maps"
+SENTENCE = "the value has more than 64 levels of lists and maps"
 
 
 def nested(levels: int, kind: str) -> object:

@@ -137,7 +137,7 @@ def test_known_euler_rotations_and_invalid_quaternions() -> None:
     assert Quaternion(0, 0, 3, 3).to_euler() == pytest.approx((0.0, 0.0, math.pi / 2))
     for bad in (Quaternion(0, 0, 0, 0), Quaternion(w=math.nan), Quaternion(x=math.inf)):
         with pytest.raises(
-            ValueError, match="is not a rotation; its length must be finite and greater than 0"
+            ValueError, match="isn't a rotation; its length must be finite and greater than 0"
         ):
             bad.to_euler()
 

@@ -258,7 +258,7 @@ def test_recursive_type_round_trips_and_rejects_cycles() -> None:
     tree = Tree([Tree(), Tree([Tree()])])
     assert read(Tree, sent(tree)) == tree
     tree.parent = tree
-    assert unsent(tree) == ("it contains itself, or has too many levels", "")
+    assert unsent(tree) == ("the value contains itself, or has too many levels", "")
     deep = b'{"children":[' * 500 + b"]}" * 500
     with pytest.raises(nep.DecodeError):
         read_bytes(Tree, deep * 4)
@@ -364,8 +364,8 @@ def test_error_in_post_init_is_reported_as_decode_error_with_its_path() -> None:
          "header.stamp.sec"),
         (Pose(position=Vector3()), "position is a 'Vector3'; expected a 'Point'", "position"),
         (Pose(position={"x": 1}), "position is a 'dict'; expected a 'Point'", "position"),
-        (Part(1 << 64), "number does not fit into 64 bits; expected a 'int'", "number"),
-        (Part(-(1 << 63) - 1), "number does not fit into 64 bits; expected a 'int'", "number"),
+        (Part(1 << 64), "number doesn't fit into 64 bits; expected a 'int'", "number"),
+        (Part(-(1 << 63) - 1), "number doesn't fit into 64 bits; expected a 'int'", "number"),
         (Part(word="\ud800"), "word contains an unpaired surrogate; use valid Unicode text", "word"),
         (Vector3(10**400), "x is too large; expected a 'float'", "x"),
         (Vector3(y=True), "y is a 'bool'; expected a 'float'", "y"),
@@ -382,7 +382,7 @@ def test_unencodable_typed_value_is_reported_with_its_path(payload: object, reas
 def test_dict_published_on_a_typed_topic_is_validated() -> None:
     encode = typed_codec(message_type(Strict), JSON).encode
     assert json.loads(bytes(encode({"b": "x", "a": 3}).data)) == {"b": "x", "a": 3}
-    assert unsent({"b": "x", "aa": 1}, Strict) == ("aa is not a field of 'Strict'; did you mean 'a'?", "aa")
+    assert unsent({"b": "x", "aa": 1}, Strict) == ("aa isn't a field of 'Strict'; did you mean 'a'?", "aa")
     assert unsent({"a": 1}, Strict) == ("b is missing; expected a 'str'", "b")
     assert unsent({"b": 1}, Strict) == ("b is a 'int'; expected a 'str'", "b")
     assert unsent([], Strict) == ("publish a 'Strict'", "")

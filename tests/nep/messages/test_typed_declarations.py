@@ -153,7 +153,7 @@ class Plain:
             "TwoLists.inner is a 'list[int] | tuple[str, int]', whose types can't be distinguished in JSON",
         ),
         (Unknown, "the type hints of 'Unknown' can't be resolved: name 'NowhereToBeFound' is not defined"),
-        (Private, "Private._inner is not sent; add a default value"),
+        (Private, "Private._inner isn't sent; add a default value"),
         (
             Image,
             (
@@ -167,7 +167,7 @@ class Plain:
         ),
         (
             OwnConstructor,
-            "OwnConstructor.another is required by the constructor but is not a field of the message",
+            "OwnConstructor.another is required by the constructor but isn't a field of the message",
         ),
         (Empty, "MSG_TYPE is empty"),
         (Numbered, "MSG_TYPE must be a 'str', not 'int'"),

@@ -56,7 +56,7 @@ def test_unencodable_unsubscribed_payload_is_reported_until_one_can_be_encoded()
     assert unsendable.count == 1
     told.now += 1.0
     assert unsendable.is_valid(1)
-    assert told.problems == ["cannot encode a 'object' as 'json'; 'object' can't be encoded as JSON", ""]
+    assert told.problems == ["can't encode a 'object' as 'json': 'object' can't be encoded as JSON", ""]
 
 
 def test_alternating_valid_and_invalid_payloads_are_logged_at_growing_intervals(

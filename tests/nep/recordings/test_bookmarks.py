@@ -80,7 +80,7 @@ def test_bookmark_that_cannot_be_saved_raises_and_changes_nothing(path, monkeypa
         with pytest.raises(RecordingError, match=r"name .*characters"):
             marks.add(recording.start_ns, "\ud800")
         marks.path.mkdir()  # nothing can take its place
-        with pytest.raises(RecordingError, match="cannot use the recording"):
+        with pytest.raises(RecordingError, match="can't use the recording"):
             marks.add(recording.start_ns, "new")
         assert len(marks.all) == 1
         marks.path.rmdir()

@@ -309,7 +309,7 @@ def test_recording_modules_are_imported_lazily_and_a_missing_package_is_reported
     )
     assert done.returncode == 1
     assert done.stderr == (
-        "nep: recordings need packages that are not installed; pip install 'nep-studio[recordings]'\n"
+        "nep: recordings need packages that aren't installed; pip install 'nep-studio[recordings]'\n"
     )
     assert issubclass(RecordingsUnavailableError, NepError)
 
@@ -361,5 +361,5 @@ def test_clock_time_after_midnight_is_on_the_next_day():
     ],
 )
 def test_invalid_time_is_rejected(text):
-    with pytest.raises(typer.BadParameter, match="is not a valid"):
+    with pytest.raises(typer.BadParameter, match="isn't a valid"):
         parse_time_ns(text, START, START + HOUR)

@@ -294,7 +294,7 @@ def test_existing_file_or_missing_folder_raises_recording_error(tmp_path):
     with pytest.raises(RecordingError, match=r"a\.mcap'; .*already exists"):
         RecordingWriter(path)
     assert path.read_bytes() == b"mine"
-    with pytest.raises(RecordingError, match="cannot use the recording"):
+    with pytest.raises(RecordingError, match="can't use the recording"):
         RecordingWriter(tmp_path / "nowhere" / "a.mcap")
 
 

@@ -79,7 +79,7 @@ def test_rize_answers_are_parsed(robot):
     good = rize.from_reply({**sent, "state": "success"})
     assert (good["id"], good["op"], good["state"], good["error"]) == ("1", "invoke", "succeeded", None)
     bad = rize.from_reply({**sent, "primitives": [sent["primitives"]], "state": "failure"})
-    assert (bad["state"], bad["error"]) == ("failed", "Pepper could not say")
+    assert (bad["state"], bad["error"]) == ("failed", "Pepper couldn't say")
     assert rize.from_reply(sent) is None
     assert rize.from_reply("noise") is None
     assert rize.from_reply({"state": "success"}) is None

@@ -74,7 +74,7 @@ def test_valid_driver_is_accepted(tmp_path):
         ('{"side": str}', '{"side": complex}', "table.py, line 5: unsupported type complex; use float"),
         ('unit="deg"', 'unit="°"', "table.py, line 4: unknown unit '°'; write 'deg'"),
         ("turn %far", "turn %wide",
-         USED + "table.py, line 9: actions.turn.rb:block.text.en uses %wide, which is not defined"),
+         USED + "table.py, line 9: actions.turn.rb:block.text.en uses %wide, which isn't defined"),
         ("    @safe_stop()", f"{AGAIN}    @safe_stop()",
          USED + "table.py, line 12: 'turn' is defined twice, first in line 9"),
         ("    def __init__", "    angle = 3\n    def __init__", None),

@@ -287,6 +287,6 @@ def test_only_blocks_of_a_mixed_selection_are_stored_and_the_user_is_notified(
     them.until(lambda: len(window.backpack.items) == 1, "the block is in the backpack")
     assert window.types == [["wait"]]
     assert window.said == [
-        "Added 1 block to the backpack. Notes were not added: the backpack can only hold blocks."
+        "Added 1 block to the backpack. Notes weren't added: the backpack can only hold blocks."
     ]
     assert them.newest() == before

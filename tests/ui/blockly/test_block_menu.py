@@ -151,7 +151,7 @@ def test_double_click_collapses_a_block_that_still_shows_running_and_error_state
     view.highlight(["b"])
     them.wait_for(outlined("running"), ["loop"])
     looked_at(them, "folded")
-    view.set_errors({"b": "The robot is not responding."})
+    view.set_errors({"b": "The robot isn't responding."})
     view.highlight([])
     them.wait_for(outlined("error"), ["loop"])
     them.wait_for("document.querySelector('.nepBubble').getBoundingClientRect().left > 250")

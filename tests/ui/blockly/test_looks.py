@@ -77,8 +77,8 @@ def test_frequent_highlights_are_cheap(qtbot, view, person):
 
 def test_error_is_shown_in_a_bubble_next_to_its_block(view, person):
     them = person(state=PICTURE)
-    view.set_errors({"say_touch": "Pepper is not responding."})
-    them.wait_for("document.querySelector('.nepBubble')?.textContent", "Pepper is not responding.")
+    view.set_errors({"say_touch": "Pepper isn't responding."})
+    them.wait_for("document.querySelector('.nepBubble')?.textContent", "Pepper isn't responding.")
     assert them.ask(outlined("error")) == ["say_touch"]
     block = them.box("[data-id=say_touch] > .blocklyPath")
     bubble = them.box(".nepBubble")
@@ -98,8 +98,8 @@ def test_warning_is_shown_in_a_bubble_without_an_outline(view, person):
     assert 0 < bubble["left"] - block["right"] < 30
     view.highlight(["wave"])
     them.wait_for(outlined("running"), ["wave"])
-    view.set_errors({"say_touch": "Pepper is not responding."})
-    them.wait_for("document.querySelector('.nepBubble')?.textContent", "Pepper is not responding.")
+    view.set_errors({"say_touch": "Pepper isn't responding."})
+    them.wait_for("document.querySelector('.nepBubble')?.textContent", "Pepper isn't responding.")
     view.set_errors({})
     them.wait_for("document.querySelector('.nepBubble')?.textContent", "“say” was replaced by “turn”")
     view.set_warnings({})
@@ -109,11 +109,11 @@ def test_warning_is_shown_in_a_bubble_without_an_outline(view, person):
 def test_error_outline_appears_together_with_its_message(view, person):
     them = person(state=PICTURE)
     them.ask(
-        "(() => { window.seen = []; new MutationObserver(() => document.querySelector('.nepState-error') &&"
-        " seen.push(document.body.textContent.includes('Pepper is not responding.')))"
-        ".observe(document.body, {subtree: true, childList: true}); })()"
+        "(() => { window.seen = []; new MutationObserver(() => document.querySelector('.nepState-error') "
+        "&& seen.push(document.body.textContent.includes(`Pepper isn't "
+        "responding.`))).observe(document.body, {subtree: true, childList: true}); })()"
     )
-    view.set_errors({"say_touch": "Pepper is not responding."})
+    view.set_errors({"say_touch": "Pepper isn't responding."})
     them.wait_for("seen.length > 0")
     assert them.ask("seen[0]") is True
 

@@ -185,4 +185,4 @@ def test_doctor_keeps_its_findings(look: Callable[[object], Doctor]) -> None:
 def test_doctor_that_crashes_reports_the_error(look: Callable[[object], Doctor]) -> None:
     (finding,) = look(None).findings
     assert (finding.id, finding.severity) == ("doctor", "error")
-    assert finding.sentence.startswith("The doctor could not finish: TypeError")
+    assert finding.sentence.startswith("The doctor couldn't finish: TypeError")

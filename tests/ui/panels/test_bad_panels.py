@@ -212,7 +212,7 @@ def test_panel_that_fails_at_startup_does_not_lose_the_layout(
     last = with_bad(qtbot, theme, home)
     dock = seen(qtbot, last)
     assert isinstance(dock.panel, Bad)
-    assert dock.panel.state == {"kept": "yes"}, "what it had is kept also while it could not be made"
+    assert dock.panel.state == {"kept": "yes"}, "what it had is kept also while it couldn't be made"
     last.close()
 
 

@@ -318,7 +318,7 @@ def test_file_that_is_no_image_is_reported_and_not_sent(qtbot, theme, tmp_path) 
     choice = child(form, PictureChoice)
     (tmp_path / "not.png").write_text("hello")
     choice.use_file(tmp_path / "not.png")
-    assert choice.sentence == "“not.png” can't be used: it is neither a JPEG nor a PNG image."
+    assert choice.sentence == "“not.png” can't be used: not a JPEG or PNG image."
     assert choice.thumbnail.image is None
     assert read_picture(tmp_path / "none.png")[1] == "“none.png” can't be read: no such file or directory."
     with (tmp_path / "big.png").open("wb") as big:
@@ -361,7 +361,7 @@ def test_folder_and_pipe_are_not_opened_as_an_image(tmp_path) -> None:
     assert read_picture(tmp_path)[1] == f"“{tmp_path.name}” is not a file."
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe.png")
-        assert read_picture(tmp_path / "pipe.png")[1] == "“pipe.png” is not a file."
+        assert read_picture(tmp_path / "pipe.png")[1] == "“pipe.png” isn't a file."
 
 
 @pytest.mark.parametrize("orientation", range(1, 9))
@@ -394,7 +394,7 @@ def test_cameras_are_offered_in_a_menu(qtbot, theme, monkeypatch) -> None:
     QTest.mouseClick(choice.camera, Qt.MouseButton.LeftButton)
     (camera,) = dropped[0].actions()
     camera.trigger()
-    assert choice.field.text() == "newest picture of /Pepper/camera"
+    assert choice.field.text() == "newest image of /Pepper/camera"
 
 
 def test_try_sends_the_newest_image_of_the_chosen_topic(qtbot, theme) -> None:

@@ -256,7 +256,7 @@ def test_open_recording_is_reported_as_hiding_the_live_topic(qtbot, panel, windo
         window.session.doctor.expect_topic("/robot/camera")
         panel.refresh()
         said = panel.rows[0].accessibleName()
-        assert said.startswith("error: A recording is open and /robot/camera is not in it.")
+        assert said.startswith("error: The open recording doesn't contain /robot/camera.")
         qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
         assert window.commands == ["replay.live"]
     finally:

@@ -495,7 +495,7 @@ def test_whole_image_is_copied_and_encoded_in_another_thread(qtbot, qapp, monkey
     panel = made(qtbot, window)
     QTest.keyClick(panel.view, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
     qtbot.waitUntil(lambda: bool(window.toasts))
-    assert window.toasts == ["Copied the picture, 320\u00d7240"]
+    assert window.toasts == ["Copied the image, 320×240"]  # noqa: RUF001
     assert QGuiApplication.clipboard().image().size().width() == 320
     assert threads
     assert threading.get_ident() not in threads
@@ -555,7 +555,7 @@ def test_topic_without_images_offers_the_inspector(qtbot, qapp) -> None:
     panel = made(qtbot, window)
     window.session.images.streams[0].error = "they are no picture"
     panel.refresh()
-    assert panel.empty._title.text() == "Can't be shown as an image"
+    assert panel.empty._title.text() == "Can't show the message as an image"
     next(each for each in panel.empty._buttons).click()
     assert window.commands == ["inspect:/cam"]
     assert panel.fit.isHidden()

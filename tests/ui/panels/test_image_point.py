@@ -86,7 +86,7 @@ def test_panel_names_what_to_arm_and_one_click_publishes_one_message(qtbot, wind
     assert points.isVisible()
     assert panel.actions_of["point"].isChecked()
     assert points.target == Target("topic", POINTS)
-    assert points.strip.words.text() == "Clicks are not sent until you arm sending"
+    assert points.strip.words.text() == "Clicks aren't sent until you arm sending"
     assert unsaid(panel) == []
     QTest.mouseClick(panel.view, LEFT, Qt.KeyboardModifier.NoModifier, at(panel, 16, 8))
     press(points.close_button)
@@ -116,7 +116,7 @@ def test_panel_names_what_to_arm_and_one_click_publishes_one_message(qtbot, wind
     session.runs.stop()
     ticks(window, panel)
     assert not panel.view.accepts_clicks
-    assert session.acting.repeat(entry.number).endswith(" is not armed. Arm it first.")
+    assert session.acting.repeat(entry.number).endswith(" isn't armed. Arm it first.")
 
 
 def test_keys_move_the_pixel_cursor_and_enter_publishes_it(qtbot, window, panel) -> None:

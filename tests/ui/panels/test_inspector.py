@@ -96,7 +96,7 @@ def test_latched_message_shows_when_it_was_sent(panel, window) -> None:
         (3_200_000, ClockDifference(10**12, 900), "latency 3.2 ms ± 0.1 ms"),
         (3_200_000, SAME_CLOCK, "latency 3.2 ms"),
         (3_200_000, None, "latency 3.2 ms"),
-        (-3_600_000_000_000, None, "clocks of two computers, uncorrected"),
+        (-3_600_000_000_000, None, "latency unknown: clocks not synchronized"),
         (-3_600_000_000_000, ClockDifference(10**12, 400_000), "412 B"),
     ],
 )
@@ -216,7 +216,7 @@ def test_undecodable_message_is_shown_as_bytes_with_the_reason(panel, window) ->
     assert panel.body.page == RAW
     assert panel.mode.value == "raw"
     assert panel.body.sentence.isVisible()
-    assert panel.body.sentence.text().startswith("Can't be decoded as json: ")
+    assert panel.body.sentence.text().startswith("Can't decode the message as json: ")
     assert "6e 6f 74" in panel.bytes.text()
     window.session.send("/faces", {"good": 1})
     panel.refresh()
@@ -261,7 +261,7 @@ def test_frozen_undecodable_message_is_shown_as_bytes_in_both_views(panel, windo
     ticks(window, panel)
     press(button(panel.mode, "Tree"))
     assert panel.body.page == RAW
-    assert panel.body.sentence.text().startswith("Can't be decoded as json: ")
+    assert panel.body.sentence.text().startswith("Can't decode the message as json: ")
     assert "6e 6f 74" in panel.bytes.text()
     panel.freeze.setChecked(False)
     assert panel.model.value() == {"good": 1}
@@ -360,7 +360,7 @@ def test_large_text_that_is_not_json_is_shown_as_bytes(qtbot, panel, window) -> 
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", b"[" * 1_100_000)
     qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == RAW)[1])
-    assert panel.body.sentence.text() == "Can't be decoded as json: its brackets do not match."
+    assert panel.body.sentence.text() == "Can't decode the message as json: unbalanced brackets."
 
 
 def test_images_are_summarised() -> None:
@@ -624,5 +624,5 @@ def test_value_is_plotted_by_menu_shortcut_footer_and_drag_and_drop(panel, windo
         assert dragged[-1] == ("/blackboard", said)
     choose(panel, "robots", "Pepper", "pose")
     panel.own.plot()
-    assert window.toasts[-1] == "robots.Pepper.pose is not a number, text or boolean"
+    assert window.toasts[-1] == "robots.Pepper.pose isn't a number, text or boolean"
     assert len(plotted) == 8

@@ -30,7 +30,7 @@ def panel(qtbot, window) -> ProblemsPanel:
 
 def test_each_problem_is_shown_with_its_sentence_and_fix(panel, window) -> None:
     assert [row.problem.subject for row in panel.rows] == ["wave", "wait until"]
-    assert panel.rows[0].accessibleName() == "warning: NAO is not connected, so wave will be skipped."
+    assert panel.rows[0].accessibleName() == "warning: NAO isn't connected, so wave will be skipped."
     assert (panel.chip.text, panel.chip.status) == ("2", "warn")
     press(panel.rows[1].buttons[0])
     assert window.commands == ["add_time_limit"]
@@ -78,7 +78,7 @@ def test_panel_without_problems_shows_an_empty_state(qtbot, qapp) -> None:
 def test_missing_robot_is_one_row_with_the_robots_that_can_replace_it(panel, window, monkeypatch) -> None:
     document = window.session.document
     absent = [
-        Problem("warning", f"b{n}", "robot", "say", "Pepper 2 is not connected, so say will be skipped.",
+        Problem("warning", f"b{n}", "robot", "say", "Pepper 2 isn't connected, so say will be skipped.",
                 "Show the robots", "connect:Pepper 2", icon="message-circle")
         for n in range(3)
     ]  # fmt: skip
@@ -88,7 +88,7 @@ def test_missing_robot_is_one_row_with_the_robots_that_can_replace_it(panel, win
     document.workspace = {"blocks": {"blocks": [{**say, "id": f"b{n}"} for n in range(3)]}}
     panel.refresh()
     (row,) = panel.rows
-    assert row.accessibleName() == "warning: Pepper 2 is not connected, so 3 blocks will be skipped."
+    assert row.accessibleName() == "warning: Pepper 2 isn't connected, so 3 blocks will be skipped."
     assert [button.text() for button in row.buttons] == ["Use Pepper"]
     press(row.buttons[0])
     assert window.commands == ["robot.use:Pepper 2:Pepper"]

@@ -93,7 +93,7 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
     assert (again.text(), again.isEnabled()) == ("Send again (not armed)", False)
     panel.table.select_key(key)
     panel.repeat()
-    assert window.toasts[-1] == "Sending to /words is not armed. Arm it first."
+    assert window.toasts[-1] == "Sending to /words isn't armed. Arm it first."
     assert heard.receive(0.0) is None
     panel.filter.setText("image words")
     assert rows(panel) == []

@@ -337,7 +337,7 @@ def test_external_files_open_and_unsupported_ones_raise_one_alert(commands, wind
     commands.files.open_all(paths)
     assert names(window) == ["A", "B"]
     alert = window.session.alerts.active[0]
-    assert alert.title == "photo.png and 1 more are not behaviours."
+    assert alert.title == "photo.png and 1 more aren't behaviours."
     assert ".nepb" in alert.detail
 
 

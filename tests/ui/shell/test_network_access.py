@@ -83,7 +83,7 @@ def test_access_is_revoked_in_the_same_sheet(make):
 def test_without_a_network_the_sheet_explains_what_to_do_first(make):
     sheet, reach, _asked = make(here=())
     sheet.open()
-    assert sheet.heading.text() == "This computer is not connected to a network"
+    assert sheet.heading.text() == "This computer isn't connected to a network"
     assert not sheet.yes.isVisible()
     assert access_status(reach)[1] == "This computer only"
 

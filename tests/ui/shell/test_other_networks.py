@@ -79,7 +79,7 @@ def test_invalid_address_is_reported_and_kept_as_typed(sheet: OtherNetworksSheet
     row.switch.click()
     assert not row.switch.isChecked()
     assert (row.address.text(), row.address.property("wrong")) == ("999", "true")
-    assert states(sheet)[1] == "'999' is not a ROS 2 domain; use a number from 0 to 232."
+    assert states(sheet)[1] == "'999' isn't a ROS 2 domain; use a number from 0 to 232."
     row.address.setText("9")
     row.switch.click()
     assert (row.switch.isChecked(), row.address.property("wrong")) == (True, "false")

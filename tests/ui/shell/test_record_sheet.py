@@ -243,7 +243,7 @@ def test_saving_the_last_seconds_offers_to_enable_the_flight_recorder(window, re
     sheet.ring_topics.show_patterns(("/b\x01",), ())
     sheet.ring_topics.settled.emit()
     assert recorder.session.recordings.wish.patterns == ("/arm/*",)
-    assert "is not a valid topic name" in sheet.ring_words.text()
+    assert "isn't a valid topic name" in sheet.ring_words.text()
     sheet.ring.click()
     assert recorder.ops()[-1] == "end_ring"
 

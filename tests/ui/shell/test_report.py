@@ -134,7 +134,7 @@ def test_behaviours_are_included_only_when_enabled_each_time(
     assert sheet.work.isVisible()
     assert not sheet.work.isChecked()
     assert "Your behaviours, unless you include them below" in lines(sheet)
-    assert sheet.names.text() == "Current settings: “New behaviour”"
+    assert sheet.names.text() == "Open behaviours: “New behaviour”"
     answers.path = tmp_path / "without.zip"
     written(qtbot, sheet)
     sheet.work.click()

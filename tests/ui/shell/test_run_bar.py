@@ -41,7 +41,7 @@ VIEWS = {
         can_run=True, can_step=True, result="all 2 robots stopped (41 ms)", result_status="ok",
     ),
     "unanswered": RunView(
-        "unanswered", "Turtle did not reply", "Pepper stopped (38 ms). Switch Turtle off by hand.",
+        "unanswered", "Turtle didn't reply", "Pepper stopped (38 ms). Switch Turtle off by hand.",
         "Turtle did not reply; switch it off by hand", stop_label="Stop again",
         result="1 of 2 robots stopped", result_status="error", confirm_label="Turtle isn't moving",
     ),

@@ -186,15 +186,15 @@ def test_unwritable_layout_is_reported_as_not_saved(shown: MainWindow, commands:
     path.unlink()
     path.mkdir()  # as a disk that can't be written
     keep_as(shown, commands, "Two")
-    assert shown.toast.text == "Can't save “Two”: it is kept only until Studio closes"
+    assert shown.toast.text == "Can't save layout “Two”. It will be lost when Studio closes."
     assert "Two" in menu(shown, commands)
     shown.session.tick()
     alert = next(each for each in shown.session.alerts.active if each.id == "settings")
     assert alert.title == "Settings you change now are lost when Studio closes."
     commands.run("layout.delete")
-    assert shown.toast.text == "Can't save this change: “Two” will return at the next start"
+    assert shown.toast.text == "Can't save this change: “Two” will reappear when Studio restarts"
     commands.behaviours.clear_recent()
-    assert shown.toast.text == "Can't save this change: the recent files will return at the next start"
+    assert shown.toast.text == "Can't save this change: the recent files will reappear when Studio restarts"
     commands.run("robots.ask")
     assert shown.toast.text == "Until you close Studio, it will ask again before a real robot moves"
     path.rmdir()

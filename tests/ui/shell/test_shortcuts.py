@@ -317,7 +317,7 @@ def test_shortcuts_are_removed_and_reset(sheet: ShortcutSheet, commands: Command
     assert keys.keys_of("file.save") == ("Ctrl+S",)
     choose(sheet, "Stop the program and all robots")
     sheet._remove_shortcut()
-    assert sheet.said.text() == "Stop has only the shortcut F12 now."
+    assert sheet.said.text() == "F12 is now the only shortcut for Stop."
     assert keys.keys_of("run.stop") == ("F12",)
     sheet._remove_shortcut()
     assert sheet.said.text() == "F12 can't be removed: it always triggers Stop."

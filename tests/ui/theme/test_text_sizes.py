@@ -51,7 +51,7 @@ VIEWS = (
     ),
     RunView(
         "unanswered",
-        "Turtle did not reply",
+        "Turtle didn't reply",
         "Pepper stopped (38 ms). Switch Turtle off by hand.",
         "Turtle did not reply; switch it off by hand",
         stop_label="Stop again",

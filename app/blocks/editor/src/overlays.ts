@@ -180,6 +180,6 @@ function sensorKey(block: Blockly.Block): string {
 
 function absentSentence(block: Blockly.Block): string {
   const robot = block.getField('ROBOT')?.getText();
-  return robot ? t('{robot} is not connected. This block is skipped when the program runs.', {robot}) :
-    t('The robot is not connected. This block is skipped when the program runs.');
+  return robot ? t('{robot} isn\'t connected. This block is skipped when the program runs.', {robot}) :
+    t('The robot isn\'t connected. This block is skipped when the program runs.');
 }

@@ -39,7 +39,7 @@ export class SearchItem extends Blockly.ToolboxItem {
     this.field.type = 'search';
     this.field.placeholder = t('Find a block');
     this.field.spellcheck = false;
-    this.field.setAttribute('aria-label', t('Find a block: type words and press Enter to take the first result'));
+    this.field.setAttribute('aria-label', t('Find a block: type words and press Enter to select the first result'));
     this.field.title = t('Find a block');
     this.field.onfocus = () => this.dress();
     this.field.onblur = () => {

@@ -161,7 +161,7 @@ function atGap(block: Blockly.BlockSvg, other: Blockly.BlockSvg, gap: Blockly.Re
     return block.outputConnection ? {by: other, place, sentence: isValue(name)} : null;
   }
   if (!block.outputConnection) {
-    return {by: other, place, sentence: t('“{block}” has no value, so it doesn\'t fit into a slot for values. Place it below another block.', {block: name})};
+    return {by: other, place, sentence: t('“{block}” doesn\'t return a value, so it doesn\'t fit into a value slot. Place it below another block.', {block: name})};
   }
   const check = gap.getCheck();
   const gives = block.outputConnection.getCheck();

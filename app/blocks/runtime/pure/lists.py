@@ -212,9 +212,9 @@ def _as_list(of: object) -> Sequence[object]:
         return of
     if of is None:
         raise BehaviourError(_("This list has no value yet."), unknown=True)
-    said = _("This needs a list, not {kind}.")
+    said = _("This block needs a list, not {kind}.")
     if of == 0 and isinstance(of, int):
-        said = _("This needs a list, not {kind}. Set the variable to an empty list first.")
+        said = _("This block needs a list, not {kind}. Set the variable to an empty list first.")
     raise BehaviourError(said.format(kind=type_name(of)))
 
 

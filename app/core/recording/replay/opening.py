@@ -43,10 +43,10 @@ def open_recording(path: Path, progress: Progress, opener: RecordingOpener | Non
     recording = (opener or LocalOpener()).open(path, progress=report_progress)
     try:
         if len(recording.topics) > MAX_TOPICS:
-            template = _("it has {count} topics; at most {most} can be shown")
+            template = _("the recording has {count} topics; at most {most} can be shown")
             raise RecordingError(str(path), template.format(count=len(recording.topics), most=MAX_TOPICS))
         if not recording.message_count:
-            raise RecordingError(str(path), _("it has no message that can be decoded"))
+            raise RecordingError(str(path), _("no message can be decoded"))
         return OpenedRecording(recording, Bookmarks(recording), recording.stats())
     except BaseException:
         recording.close()

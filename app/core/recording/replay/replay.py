@@ -366,10 +366,10 @@ class Replay:
         recording = opened.recording
         if recording.is_complete:
             return
-        title = _("{name} was not closed properly. Everything up to {seconds} s was recovered.").format(
+        title = _("{name} wasn't closed properly. Everything up to {seconds} s was recovered.").format(
             name=self.name, seconds=number(recording.duration_s, ".1f")
         )
-        detail = _("To make a repaired copy: nep recording repair {file}").format(file=self.path)
+        detail = _("To create a repaired copy, run: nep recording repair {file}").format(file=self.path)
         self._alerts.raise_alert(NOT_CLOSED, "info", title, detail)
 
     def _apply_seek(self, messages: Sequence[Message], now: float) -> None:

@@ -184,8 +184,8 @@ def _rejection_text(topic: str, names: Sequence[str]) -> str:
     if not names:
         return ""
     if names == [topic]:
-        return _("a message on {topic} would move a robot that is not allowed to move").format(topic=topic)
-    template = _("it would move {robots}, which is not allowed")
+        return _("a message on {topic} would move a robot that isn't allowed to move").format(topic=topic)
+    template = _("the message would move {robots}, which isn't allowed")
     return template.format(robots=format_list(list(names)))
 
 

@@ -176,7 +176,7 @@ class StopLine:
         """Reason why the robot can't have received a message; "" if it was connected at any time."""
         if any(way.was_connected for way in self.channels.values()):
             return ""
-        return _("{robot} is not connected yet").format(robot=self.name)
+        return _("{robot} isn't connected yet").format(robot=self.name)
 
     @property
     def send_problem(self) -> str:

@@ -25,20 +25,20 @@ MAX_MOTIONS = 64
 """Maximum number of motions of one robot that are tracked by id. Further motions end only with a Stop."""
 
 _MESSAGES = {
-    "form": lazy("{robot} received a command from a form and has not responded since"),
-    "behaviour": lazy("{robot} received a command from a behaviour and has not responded since"),
-    "shelf": lazy("{robot} received a command from a saved message and has not responded since"),
-    "key": lazy("{robot} received a command from the keyboard and has not responded since"),
-    "alarm": lazy("{robot} received a command from an alarm and has not responded since"),
-    "replay": lazy("{robot} received a command from a replayed recording and has not responded since"),
-    "bridge": lazy("{robot} received a command from a bridge and has not responded since"),
-    "image": lazy("{robot} received a command from a click on an image and has not responded since"),
-    "program": lazy("{robot} received a command from a Python program and has not responded since"),
-    "action": lazy("{robot} could not stop an action and has not responded since"),
-    "stop": lazy("{robot} has not confirmed Stop"),
+    "form": lazy("{robot} received a command from a form and hasn't responded since"),
+    "behaviour": lazy("{robot} received a command from a behaviour and hasn't responded since"),
+    "shelf": lazy("{robot} received a command from a saved message and hasn't responded since"),
+    "key": lazy("{robot} received a command from the keyboard and hasn't responded since"),
+    "alarm": lazy("{robot} received a command from an alarm and hasn't responded since"),
+    "replay": lazy("{robot} received a command from a replayed recording and hasn't responded since"),
+    "bridge": lazy("{robot} received a command from a bridge and hasn't responded since"),
+    "image": lazy("{robot} received a command from a click on an image and hasn't responded since"),
+    "program": lazy("{robot} received a command from a Python program and hasn't responded since"),
+    "action": lazy("{robot} couldn't stop an action and hasn't responded since"),
+    "stop": lazy("{robot} hasn't confirmed Stop"),
 }
 """Reason for each kind of sender. `_OTHER_MESSAGE` is used for other kinds."""
-_OTHER_MESSAGE = lazy("{robot} received a command and has not responded since")
+_OTHER_MESSAGE = lazy("{robot} received a command and hasn't responded since")
 
 
 def ignore_moved(_names: Sequence[str], _by: str) -> None:

@@ -56,7 +56,7 @@ class RobotStop:
             return ""
         if self.program and self.is_refused:
             return _("{error} (from “{program}”)").format(error=self.error, program=self.program)
-        return self.error or _("{robot} did not reply").format(robot=self.full_name)
+        return self.error or _("{robot} didn't reply").format(robot=self.full_name)
 
     @property
     def message(self) -> str:
@@ -175,7 +175,7 @@ def not_reached(name: str, why: str = "") -> RobotStop:
         name: Name of the robot.
         why: Reason.
     """
-    words = _("Stop was not sent to {robot}: {why}") if why else _("Stop was not sent to {robot}")
+    words = _("Stop wasn't sent to {robot}: {why}") if why else _("Stop wasn't sent to {robot}")
     return RobotStop(name, False, None, error=words.format(robot=name, why=why))
 
 

@@ -180,7 +180,7 @@ class SessionActing:
             self.revision += 1
             return ""
         if not self.arming.allow(target, is_confirmed=is_sure):
-            return _("Sending is not armed, or too many names are armed. Arm sending, or remove a name.")
+            return _("Sending isn't armed, or too many names are armed. Arm sending, or remove a name.")
         self.revision += 1
         if then is not None:
             then()
@@ -351,7 +351,7 @@ class SessionActing:
         if record is None or record.repeat is None:
             return _("This can't be sent again.")
         if not self.arming.allows(record.target):
-            return _("Sending to {name} is not armed. Arm it first.").format(name=record.name)
+            return _("Sending to {name} isn't armed. Arm it first.").format(name=record.name)
         return record.repeat()
 
     def stop_sending(self, message_id: str) -> None:
@@ -510,7 +510,7 @@ class SessionActing:
         kept = read_stored(path, parse, NewerShelfError, MAX_BYTES)
         self._is_newer = kept.is_newer
         if kept.problem:
-            title = _("Saved messages could not be read.")
+            title = _("Saved messages couldn't be read.")
             self._session.alerts.raise_alert("messages:file", "warn", title, kept.problem)
         return kept.value if kept.value is not None else Shelf()
 

@@ -198,12 +198,12 @@ def parse_shelf(data: bytes) -> tuple[Shelf, int]:
     try:
         value = json.loads(data.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
-        raise NepError(_("it is not JSON")) from error
+        raise NepError(_("the file isn't valid JSON")) from error
     listed = value.get("messages") if isinstance(value, dict) else None
     if not isinstance(value, dict) or not isinstance(listed, list):
-        raise NepError(_("it has no list of messages"))
+        raise NepError(_("the file has no list of messages"))
     if isinstance(number := value.get("format"), int) and number > FORMAT:
-        raise NewerShelfError(_("it was saved by a newer Studio"))
+        raise NewerShelfError(_("the file was saved by a newer version of Studio"))
     messages = [_parse_message(each) for each in listed[:MAX_MESSAGES]]
     good = {each.id: each for each in messages if each is not None}
     requests = value.get("requests")

@@ -19,7 +19,7 @@ from nep.programs.alarms.sentences import current_value_text
 
 TROUBLE_TEXTS = {
     "missing": lazy("the newest message has no such field"),
-    "no_number": lazy("the value is not a number"),
+    "no_number": lazy("the value isn't a number"),
     "unreadable": lazy("the newest message can't be decoded"),
 }
 

@@ -117,7 +117,7 @@ class AlarmsPanel(PanelWidget):
             columns, lambda record: f"{record.rule_id} {record.at_s}"
         )
         self.table = TableView(self.theme, self.model)
-        self.table.setAccessibleName(_("History of the alarms"))
+        self.table.setAccessibleName(_("Alarm history"))
         self.table.order_changed.connect(self._show_history)
         self.table.filter_requested.connect(self.focus_filter)
         self.table.opened.connect(self._open_record)
@@ -141,7 +141,7 @@ class AlarmsPanel(PanelWidget):
         hint = ElidedLabel("small", "textTertiary")
         hint.setText(_("Right-click a value, topic or node to create an alarm"))
         self.line = LinkButton(self.theme, _("nep watch"))
-        self.line.setToolTip(plain.tip(_("Copies the command that watches these alarms without a window")))
+        self.line.setToolTip(plain.tip(_("Copies the command that monitors these alarms without a window")))
         self.line.setAccessibleName(_("Copy the command for a terminal: nep watch"))
         self.line.clicked.connect(self._copy_command)
         foot.addWidget(hint, 1)
@@ -474,7 +474,9 @@ class AlarmsPanel(PanelWidget):
         menu.addSeparator()
         group = QActionGroup(menu)
         for calm_s in CALM_CHOICES_S:
-            said = _("Stay active until the condition is false for {time}").format(time=duration_text(calm_s))
+            said = _("Stay active until the condition has been false for {time}").format(
+                time=duration_text(calm_s)
+            )
             action = menu.addAction(said)
             action.setCheckable(True)
             action.setChecked(rule.calm_s == calm_s)

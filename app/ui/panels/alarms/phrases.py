@@ -54,8 +54,8 @@ KIND_TEXTS: Mapping[str, str] = {
 KIND_MENU: Sequence[Sequence[tuple[str, str]]] = (
     (
         ("silent", lazy("A topic is silent")),
-        ("rate_below", lazy("A topic has too few messages")),
-        ("rate_above", lazy("A topic has too many messages")),
+        ("rate_below", lazy("A topic's message rate is too low")),
+        ("rate_above", lazy("A topic's message rate is too high")),
         ("loses", lazy("A topic loses messages")),
         ("appears", lazy("A topic appears")),
     ),
@@ -93,7 +93,7 @@ NEW_ACTIONS: Sequence[AlarmAction] = (
 ACTION_MENU: Mapping[str, str] = {
     "banner": lazy("Show a banner"),
     "sound": lazy("Play a sound"),
-    "keep": lazy("Keep the last 60 s"),
+    "keep": lazy("Save the last 60 s"),
     "run": lazy("Run a behaviour"),
     "call": lazy("Call a service"),
     "send": lazy("Send a message"),

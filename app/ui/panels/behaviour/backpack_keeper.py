@@ -87,7 +87,7 @@ class BackpackController:
             ids = [item.id for item in made]
             said = words.format(count=count)
             if left:
-                said = _("{what}. Notes were not added: the backpack can only hold blocks.").format(what=said)
+                said = _("{what}. Notes weren't added: the backpack can only hold blocks.").format(what=said)
             self._context.toast(said, _("Undo"), lambda: self._try(lambda: self._backpack.remove(ids)))
 
     def _remove(self, take: Callable[[], list[BackpackStack]], *, emptied: bool) -> None:

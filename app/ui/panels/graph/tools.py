@@ -87,7 +87,7 @@ class GraphLegend(QWidget):
         for kind, words in (
             ("topic", _("topic; thicker line: more data")),
             ("service", _("service")),
-            ("chosen", _("chosen topic")),
+            ("chosen", _("selected topic")),
             ("gone", _("gone or quiet")),
         ):
             flow.addWidget(_Entry(theme, kind, words))

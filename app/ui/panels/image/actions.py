@@ -47,7 +47,7 @@ ROWS: tuple[ImageActionSpec, ...] = (
         "freeze", lazy("Freeze this image"), ("Space",), "snowflake", has_separator=True, is_checkable=True
     ),
     ImageActionSpec("save", lazy("Save as PNG"), ("S",), "download"),
-    ImageActionSpec("copy", lazy("Copy the picture"), ("Ctrl+C",), "copy"),
+    ImageActionSpec("copy", lazy("Copy the image"), ("Ctrl+C",), "copy"),
     ImageActionSpec(
         "point",
         lazy("Publish a point on click"),

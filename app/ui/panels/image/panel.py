@@ -184,7 +184,9 @@ class ImagePanel(PanelWidget):
         if self._stream.picture is not None:
             self._show_page(there=True)
         elif self._stream.error:
-            self.empty.set_texts(_("Can't be shown as an image"), f"{self._stream.error}.", "circle-x")
+            self.empty.set_texts(
+                _("Can't show the message as an image"), f"{self._stream.error}.", "circle-x"
+            )
             look = EmptyAction(_("Open the message"), self._inspect, "list-tree")
             self.empty.set_actions([look, self.doctor_action(self._topic)])
         # the playhead is before the topic's first image
@@ -285,7 +287,7 @@ class ImagePanel(PanelWidget):
     def _copied(self, image: QImage) -> None:
         QGuiApplication.clipboard().setImage(image)
         size = f"{image.width()}\u00d7{image.height()}"
-        self.context.toast(_("Copied the picture, {size}").format(size=size))
+        self.context.toast(_("Copied the image, {size}").format(size=size))
 
     def _failed(self, sentence: str) -> None:
         said = _("can't save the image: {reason}").format(reason=sentence)

@@ -40,7 +40,7 @@ class PointStrip(ArmedStrip):
         super().__init__(context)
 
     def disarmed_text(self) -> str:
-        return _("Clicks are not sent until you arm sending")
+        return _("Clicks aren't sent until you arm sending")
 
     def arm(self) -> str:
         return self._arm()

@@ -122,7 +122,7 @@ class InspectorActions(QObject):
         if path:
             self._plot(path)
         elif node is not None:
-            self._toast(_("{path} is not a number, text or boolean").format(path=node.path))
+            self._toast(_("{path} isn't a number, text or boolean").format(path=node.path))
 
     def copy_message(self) -> None:
         """Copy the whole message to the clipboard.

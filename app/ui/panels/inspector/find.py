@@ -50,7 +50,7 @@ class FindField(SearchField):
     exited = Signal()
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(theme, _("Find a key or value, or $ and a path"))
+        super().__init__(theme, _("Find a key, value or $ path"))
         self._count = ""
 
     @property

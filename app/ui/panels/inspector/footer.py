@@ -62,7 +62,7 @@ def _latency_facts(message: Message) -> list[str]:
     if uncertainty_s and -uncertainty_s <= latency_s < 0:
         return [_("latency under {latency}").format(latency=latency_text(uncertainty_s))]
     if not 0 <= latency_s < 3600:
-        return [] if uncertainty_s is not None else [_("clocks of two computers, uncorrected")]
+        return [] if uncertainty_s is not None else [_("latency unknown: clocks not synchronized")]
     words = latency_text(latency_s)
     if uncertainty_s:
         words = _("{latency} ± {uncertainty}").format(
@@ -73,11 +73,11 @@ def _latency_facts(message: Message) -> list[str]:
 
 def _unreported_info(message: Message, network: str) -> Iterator[str]:
     if message.seq is None and message.stamp_ns is None:
-        yield _("{network} does not report sequence numbers or latency").format(network=network)
+        yield _("{network} doesn't report sequence numbers or latency").format(network=network)
     elif message.seq is None:
-        yield _("{network} does not report sequence numbers").format(network=network)
+        yield _("{network} doesn't report sequence numbers").format(network=network)
     elif message.stamp_ns is None:
-        yield _("{network} does not report latency").format(network=network)
+        yield _("{network} doesn't report latency").format(network=network)
 
 
 class Legend(QWidget):
@@ -90,7 +90,7 @@ class Legend(QWidget):
         self._theme = theme
         self._words = _(self.TEXT)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(_("A bar at the left marks changed values"))
+        self.setAccessibleName(_("A bar on the left marks changed values"))
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("small")

@@ -277,7 +277,9 @@ class InspectorPanel(PanelWidget):
         self._shown = message
         self.foot.show_facts(self._facts(message))
         self.bytes.show_bytes(message.data)
-        said = _("Can't be decoded as {codec}: {reason}.").format(codec=message.codec, reason=sentence)
+        said = _("Can't decode the message as {codec}: {reason}.").format(
+            codec=message.codec, reason=sentence
+        )
         self.body.sentence.setText(said if sentence else "")
         self._show_page(RAW)
 

@@ -21,7 +21,7 @@ PUBLISHES, SUBSCRIBES = lazy("publishes"), lazy("subscribes")
 INDENT = 19
 UNSUPPORTED_VERSIONS = frozenset({"0.5.4.6", "0.5.4.7"})
 UNSUPPORTED_TEXT = lazy(
-    "NEP {version} is not supported: other versions can't decode its messages. Install 0.5.4.8 or 0.5.4.5."
+    "NEP {version} isn't supported: other versions can't decode its messages. Install 0.5.4.8 or 0.5.4.5."
 )
 ORIGINAL_LIMITS = lazy(
     "A program that uses {nep}. It sends no sequence numbers or time stamps, so losses and "

@@ -24,9 +24,9 @@ from app.ui.widgets.file_dialogs import FileKind
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy
 
-CSV = FileKind(lazy("Values (CSV)"), ".csv")
+CSV = FileKind(lazy("Data (CSV)"), ".csv")
 PNG = FileKind(lazy("Image (PNG)"), ".png")
-SVG = FileKind(lazy("Drawing (SVG)"), ".svg")
+SVG = FileKind(lazy("Vector image (SVG)"), ".svg")
 PNG_SCALE = 2
 CLOSE_TIMEOUT_S = 3.0
 Part = tuple[QSize, Callable[[QPainter, QRectF], object]]

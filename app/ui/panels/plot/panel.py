@@ -505,9 +505,9 @@ class PlotPanel(PanelWidget):
         rows: tuple[tuple[str, str, Callable[[], object]], ...] = (
             (_("Add a curve"), "plus", self.focus_filter),
             (_("Show everything"), "maximize", self._show_all),
-            (_("Export numbers (CSV)"), "download", lambda: self.exporter.prompt_file(CSV)),
-            (_("Export a picture (PNG)"), "image", lambda: self.exporter.prompt_file(PNG)),
-            (_("Export a drawing (SVG)"), "spline", lambda: self.exporter.prompt_file(SVG)),
+            (_("Export data (CSV)"), "download", lambda: self.exporter.prompt_file(CSV)),
+            (_("Export image (PNG)"), "image", lambda: self.exporter.prompt_file(PNG)),
+            (_("Export vector image (SVG)"), "spline", lambda: self.exporter.prompt_file(SVG)),
         )
         for words, icon, does in rows:
             action = QAction(self.theme.icon(icon), words, self)

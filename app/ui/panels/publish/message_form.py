@@ -117,7 +117,7 @@ class MessageForm(QWidget):
         self.template = Button(theme, _("Use the last message"), "history", kind="ghost", size="small")
         self.template.setToolTip(plain.tip(_("Copies the topic's last message, or the fields of its type")))
         self.tidy = Button(theme, _("Format"), "wand-sparkles", kind="ghost", size="small")
-        self.tidy.setToolTip(plain.tip(_("One line per field")))
+        self.tidy.setToolTip(plain.tip(_("Puts each field on its own line")))
         for button in (self.template, self.tidy):
             button.allow_shrinking()
         self.edit = JsonEdit(theme, _("Message"))

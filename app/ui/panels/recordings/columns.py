@@ -23,7 +23,7 @@ GAP, CHIP_HEIGHT, CHIP_PADDING = 14, 18, 8
 BADGES = {
     "recording": (lazy("recording"), "error", "circle-dot"),
     "unreadable": (lazy("can't be read"), "error", "circle-x"),
-    "cut": (lazy("cut off"), "warn", "triangle-alert"),
+    "cut": (lazy("incomplete"), "warn", "triangle-alert"),
     "repaired": (lazy("repaired"), "info", "wrench"),
     "kept": (lazy("last seconds"), "off", "history"),
 }

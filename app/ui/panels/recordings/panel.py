@@ -192,7 +192,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             choose = EmptyAction(_("Choose a folder"), lambda: self.context.run("recording.folder"), "folder")
             self.empty.set_actions([choose])
         else:
-            said = _("Start recording, or save the last seconds when something happened.")
+            said = _("Start recording, or save the last seconds after something has happened.")
             self.empty.set_texts(_("No recordings yet"), said, "film")
             record = EmptyAction(
                 _("Record"), lambda: self.context.run("recording.toggle"), "circle-dot", is_primary=True

@@ -70,7 +70,7 @@ class TopicList(QWidget):
             return "text" if topic.name in self._names else "textTertiary"
 
         return (
-            Column("has", "", 40, included_cell, label=lazy("Is exported")),
+            Column("has", "", 40, included_cell, label=lazy("Export")),
             Column("topic", lazy("Topic"), 150, lambda topic: Cell(topic.name, role=text_role(topic),
                    mono=True),
                    key=lambda topic: topic.name, stretch=True, tip=lambda topic: topic.name),

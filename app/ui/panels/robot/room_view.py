@@ -93,9 +93,9 @@ class RoomView(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(_("Robots in their room"))
         words = _(
-            "Click a head, a hand or the small robot to touch it. Drag robots and things. Double-click "
-            "for full size.\nKeys: Tab selects, arrows move, Space touches, H, L and R touch head and "
-            "hands"
+            "Click a robot's head or hand, or a small robot, to touch it. Drag robots and objects to "
+            "move them. Double-click to enlarge the room.\nKeys: Tab selects, the arrow keys move, "
+            "Space touches, H, L and R touch the head and the hands"
         )
         self.setToolTip(plain.tip(words))
         theme.changed.connect(self.update)

@@ -79,7 +79,7 @@ class ActionCard(Card):
         self.try_button = Button(theme, _("Try"), "play")
         self.try_button.setAccessibleName(_("Try {action}").format(action=action.title))
         self.try_button.clicked.connect(self._press)
-        tries = _("Recent tries of {action}").format(action=action.title)
+        tries = _("Recent results of {action}").format(action=action.title)
         self.past = IconButton(theme, "history", tries, size=30)
         self.past.setCheckable(True)
         self.past.toggled.connect(self._set_tries_visible)

@@ -45,7 +45,7 @@ def _value_text(parameter: Parameter, value: object, *, texts: bool) -> str:
     if not texts:
         return ""
     if parameter.kind == "image" and value:
-        return _("a picture")
+        return _("an image")
     if parameter.kind == "text" and isinstance(value, str) and value:
         text = " ".join(value.split())
         return f"“{text if len(text) <= MAX_TEXT_LENGTH else text[: MAX_TEXT_LENGTH - 1] + '…'}”"

@@ -223,7 +223,7 @@ class TryList(QWidget):
         self._theme, self._action = theme, action
         self._shown: tuple[str, ...] = ()
         self.rows: list[TryRow] = []
-        self.setAccessibleName(_("Recent tries of {action}").format(action=action.title))
+        self.setAccessibleName(_("Recent results of {action}").format(action=action.title))
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(0, 2, 0, 0)
         self._column.setSpacing(0)

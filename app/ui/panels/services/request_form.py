@@ -90,7 +90,7 @@ class RequestForm(QWidget):
             said = _("This service doesn't describe its request. Studio sends {} or the JSON you write.")
             self.nothing.setText(said)
         elif len(given) > MAX_FIELDS:
-            self.nothing.setText(_("Some fields are not shown. Edit the request as JSON to see them all."))
+            self.nothing.setText(_("Some fields aren't shown. Edit the request as JSON to see them all."))
         self.nothing.setVisible(not given or len(given) > MAX_FIELDS)
 
     def _kind(self, name: str, value: object) -> str:

@@ -276,7 +276,7 @@ class TimelinePanel(PanelWidget):
 
     def _rejects_note(self, mark: Bookmark) -> bool:
         if mark.is_note:
-            self.context.toast(_("Notes made while recording are part of the file and can't be changed"))
+            self.context.toast(_("Notes added while recording are part of the file and can't be changed"))
         return mark.is_note
 
     def _try(self, change: Callable[[], object]) -> bool:

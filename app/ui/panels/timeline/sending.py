@@ -247,7 +247,7 @@ def _columns() -> tuple[Column[SendRow], ...]:
         )
 
     return (
-        Column("sent", "", 40, sent_cell, label=lazy("Is sent")),
+        Column("sent", "", 40, sent_cell, label=lazy("Send")),
         Column("topic", lazy("Topic"), 170, lambda row: Cell(row.topic, mono=True),
                key=lambda row: row.topic, stretch=True, tip=lambda row: row.topic),
         Column("moves", "", 40, moves_cell, label=lazy("Moves a robot"),

@@ -92,7 +92,7 @@ def _is_size_unknown(topic: Topic) -> bool:
 
 def _bandwidth_tip(topic: Topic) -> str:
     if _is_size_unknown(topic):
-        return _("No subscribers: messages are counted, their size is unknown")
+        return _("No subscribers: messages are counted, but their size is unknown")
     return _unreported_tip(topic)
 
 
@@ -154,7 +154,7 @@ def _network_tip(topic: Topic) -> str:
     if kind is None:
         return _("Studio's own network")
     if topic.is_stale:
-        return _("{network} does not respond; these are its last known values").format(
+        return _("{network} isn't responding; these are its last known values").format(
             network=kind.product_name
         )
     return _("On {network}, separate from Studio's own network").format(network=kind.product_name)

@@ -78,7 +78,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self._tree: TopicTree | None = None
         super().__init__(context, TABLE_TEXTS, "radio-tower")
         self.as_tree = IconButton(
-            self.theme, "list-tree", _("Group by the slashes in topic names"), checkable=True, size=26
+            self.theme, "list-tree", _("Group topics into folders by name"), checkable=True, size=26
         )
         self.as_tree.toggled.connect(lambda _on: self.rebuild())
         self.count = ElidedLabel("small", "textSecondary", least=60)

@@ -190,7 +190,7 @@ class Shortcuts(QObject):
         """Return the reason why a shortcut can't be assigned to a command, as a sentence, or "" if it can."""
         key = key_of(pressed)
         if key == STOP_KEY:
-            return "" if name == STOP else _("F12 always stops and can't be changed.")
+            return "" if name == STOP else _("F12 always triggers Stop and can't be changed.")
         held = pressed.keyboardModifiers() & MODIFIERS
         if not held and pressed.key() not in FUNCTION_KEYS:
             return _(NEEDS_MODIFIER)

@@ -36,7 +36,7 @@ class ActingCommands:
             False if the topic is in another network, to which Studio can't publish.
         """
         if split_key(key)[0]:
-            self._shell.show_toast(_("Only topics of Studio's own network can be published to"))
+            self._shell.show_toast(_("You can only publish to topics of Studio's own network"))
             return False
         return self._open("publish", key)
 

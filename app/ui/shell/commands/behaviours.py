@@ -396,7 +396,7 @@ class BehaviourCommands:
         before: list[RecentFile] = self._session.settings.all_recent
         words = _("Recent files cleared")
         if not self._set_recent([]):
-            words = _("Can't save this change: the recent files will return at the next start")
+            words = _("Can't save this change: the recent files will reappear when Studio restarts")
         self._shell.show_toast(words, _("Undo"), lambda: self._set_recent(before))
 
     def _set_recent(self, files: list[RecentFile]) -> bool:

@@ -83,7 +83,7 @@ class Printing:
                 self._shell.show_toast(_("Sent to the printer {name}").format(name=printer.printerName()))
             else:
                 self._shell.show_toast(
-                    _("The printer {name} does not respond").format(name=printer.printerName())
+                    _("The printer {name} isn't responding").format(name=printer.printerName())
                 )
 
         self._make(printer.pageLayout(), paint)

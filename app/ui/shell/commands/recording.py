@@ -69,7 +69,7 @@ class RecordCommands:
         """
         network, topic = split_key(key)
         if network:
-            self._shell.show_toast(_("Only topics of Studio's own network can be recorded"))
+            self._shell.show_toast(_("You can only record topics of Studio's own network"))
             return False
         if not self._start(RecordingChoice("chosen", (topic,))):
             return False

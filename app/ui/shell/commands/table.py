@@ -35,7 +35,7 @@ LOOK, RECORD = lazy("Appearance"), lazy("Record")
 MENUS = (lazy("File"), lazy("Edit"), lazy("View"), lazy("Run"), lazy("Robots"), lazy("Help"))
 RUN_DISABLED_REASONS = {
     "stopping": lazy("Stopping robots"),
-    "unanswered": lazy("Stop not confirmed by a robot"),
+    "unanswered": lazy("A robot hasn't confirmed Stop"),
 }
 NOTHING_TO_RUN = lazy("Nothing to run")
 

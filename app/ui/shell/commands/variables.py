@@ -132,7 +132,7 @@ class VariableCommands:
 
         def take(words: str) -> None:
             if not runs.set_variable(id, parse_value(words)):
-                self._shell.show_toast(_("The behaviour ended: “{name}” was not changed").format(name=name))
+                self._shell.show_toast(_("The behaviour ended: “{name}” wasn't changed").format(name=name))
 
         is_number = now is not None and now.kind == "number"
         self._get_name_sheet().ask(

@@ -318,11 +318,11 @@ class ViewCommands:
             words = (
                 _("Saved layout “{name}”")
                 if kept
-                else _("Can't save “{name}”: it is kept only until Studio closes")
+                else _("Can't save layout “{name}”. It will be lost when Studio closes.")
             )
             shell.show_toast(words.format(name=name))
 
-        self._get_name_sheet().ask(_("Save layout as"), _("Keep"), arrangements.rejection_reason, save)
+        self._get_name_sheet().ask(_("Save layout as"), _("Save"), arrangements.rejection_reason, save)
 
     def rename_layout(self) -> None:
         """Ask for a new name and rename the current custom layout."""
@@ -346,7 +346,7 @@ class ViewCommands:
             words = (
                 _("Deleted the layout “{name}”")
                 if kept
-                else _("Can't save this change: “{name}” will return at the next start")
+                else _("Can't save this change: “{name}” will reappear when Studio restarts")
             )
             shell.show_toast(words.format(name=name), _("Undo"), undo)
 
@@ -388,7 +388,7 @@ class ViewCommands:
         layouts, before = shell.saved_layouts, shell.saved_layouts.custom_name(found.base)
         if not layouts.can_restore(shell.show_layout(found.base), found.base, found.saved):
             shell.show_toast(
-                _("Can't open {file}: {reason}").format(file=path.name, reason=_("it is damaged"))
+                _("Can't open {file}: {reason}").format(file=path.name, reason=_("the file is damaged"))
             )
             return
         name, _is_kept = layouts.import_layout(found.name, found.base, found.saved)

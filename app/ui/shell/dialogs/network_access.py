@@ -114,14 +114,12 @@ class NetworkAccessSheet(Overlay):
             addresses = ", ".join(self._access.hosts)
             return _("Other computers can connect at {addresses}").format(addresses=addresses)
         return (
-            _("Let other computers connect?")
-            if can_open
-            else _("This computer is not connected to a network")
+            _("Let other computers connect?") if can_open else _("This computer isn't connected to a network")
         )
 
     def _message(self, *, is_open: bool, can_open: bool) -> str:
         if not self._access.is_local:
-            return _("Connections are controlled on that computer.")
+            return _("Connections are configured on that computer.")
         if is_open or can_open:
             return _(WARNING)
         return _("Join a Wi-Fi network or plug in a cable, then try again.")

@@ -208,7 +208,7 @@ class RecordSheet(Overlay):
     def _make_foot(self) -> None:
         theme = self.theme
         self.foot = label(
-            _("At most 1 s is lost in a power failure"), "small", role="textTertiary", wrap=True
+            _("At most 1 s of data is lost in a power failure"), "small", role="textTertiary", wrap=True
         )
         self.bookmark = Button(theme, _("Bookmark"), "bookmark", size="form")
         self.bookmark.clicked.connect(self._add_bookmark)
@@ -424,7 +424,7 @@ class RecordSheet(Overlay):
         self.foot.setText(
             _("Waiting for a master; recording starts when one appears")
             if no_master
-            else _("At most 1 s is lost in a power failure")
+            else _("At most 1 s of data is lost in a power failure")
         )
 
     def _show_meters(self) -> None:

@@ -153,7 +153,7 @@ class ShortcutSheet(Overlay):
         if entry is None:
             return
         if entry.kind != "command":
-            self._set_status(_("The shortcut of “{command}” was not changed.").format(command=entry.text))
+            self._set_status(_("The shortcut of “{command}” wasn't changed.").format(command=entry.text))
             return
         self._waiting, self._offer = entry.name, None
         self.rows.look.waiting = entry.id
@@ -245,7 +245,7 @@ class ShortcutSheet(Overlay):
             self._set_status(_("F12 can't be removed: it always triggers Stop."))
             return
         said = _("“{command}” no longer has a shortcut.").format(command=entry.text)
-        self._stop_recording(_("Stop has only the shortcut F12 now.") if entry.name == STOP else said)
+        self._stop_recording(_("F12 is now the only shortcut for Stop.") if entry.name == STOP else said)
         self._shortcuts.assign(entry.name, "")
 
     def _reset(self) -> None:

@@ -149,7 +149,7 @@ class VersionHistorySheet(Overlay):
 
     def _show_empty_state(self, name: str, path: Path | None) -> None:
         if path is None:
-            self.empty.set_texts(_("{name} is not saved to a file yet").format(name=name), _(SAVE_FIRST))
+            self.empty.set_texts(_("{name} isn't saved to a file yet").format(name=name), _(SAVE_FIRST))
             self.empty.set_actions([EmptyAction(_("Save"), self._save_behaviour, "save", is_primary=True)])
         else:
             self.empty.set_texts(_("No earlier versions yet"), _(NO_VERSIONS_TEXT))

@@ -83,10 +83,10 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
     except (ValueError, RecursionError) as error:
         raise LayoutFileError(_("it is damaged or not a Studio layout")) from error
     if not isinstance(told, dict) or told.get("format") != FORMAT:
-        raise LayoutFileError(_("it is not a Studio layout"))
+        raise LayoutFileError(_("it isn't a Studio layout"))
     version = told.get("version")
     if type(version) is not int or version < 1:
-        raise LayoutFileError(_("it is damaged"))
+        raise LayoutFileError(_("the file is damaged"))
     if version > VERSION:
         raise LayoutFileError(_("it was saved by a newer version of Studio; update Studio to open it"))
     base, saved = told.get("base"), told.get("arrangement")
@@ -94,9 +94,9 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
         raise LayoutFileError(_("it belongs to a layout that this version of Studio doesn't have"))
     opened = saved.get("open") if isinstance(saved, dict) else None
     if not isinstance(saved, dict) or not isinstance(opened, list) or not isinstance(saved.get("docks"), str):
-        raise LayoutFileError(_("it is damaged"))
+        raise LayoutFileError(_("the file is damaged"))
     if told.get("sum") != _sum(saved):
-        raise LayoutFileError(_("it is damaged"))
+        raise LayoutFileError(_("the file is damaged"))
     keys = list(dict.fromkeys(key for key in opened if isinstance(key, str)))
     known = [key for key in keys if parse_key(key)[0] in panels]
     unknown = tuple(dict.fromkeys(parse_key(key)[0] for key in keys if key not in known))

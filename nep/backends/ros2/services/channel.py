@@ -223,7 +223,7 @@ class ServiceChannel:
             self._writers[0].write(create_sample(self._sample_class, whole))
         except codes as error:
             if error.code == codes.DDS_RETCODE_TIMEOUT:
-                raise WireError(_("the other side is too slow to receive it"), len(cdr)) from error
+                raise WireError(_("the other side is too slow"), len(cdr)) from error
             raise
 
     def send_failure(self, call: CallId, reply: Reply) -> None:

@@ -180,7 +180,7 @@ class Ros2Client(ClientCalls[_Call]):
             self._finish(call, error)
         except self._participant.dds.core.DDSException as error:
             if not self.is_closed:
-                reason = _("the call cannot be sent: {reason}").format(reason=error)
+                reason = _("the call can't be sent: {reason}").format(reason=error)
                 self._finish(call, NepError(reason))
 
     # ---- outcomes

@@ -64,7 +64,7 @@ class _BodyCodec:
     def decode(self, data: bytes) -> dict[str, Any]:
         found = self.types.decode(self.name, data)
         if not isinstance(found, dict):
-            raise WireError(_("it is not a ROS message"), len(data))
+            raise WireError(_("not a ROS message"), len(data))
         return found
 
 
@@ -108,7 +108,7 @@ def _find_definition(name: str) -> tuple[str, str] | None:
             if len(bounds) != 1:
                 raise NepError(
                     _(
-                        "'{path}' is not a valid .srv file; write one line '---' between the request and "
+                        "'{path}' isn't a valid .srv file; write one line '---' between the request and "
                         "the response"
                     ).format(path=path)
                 )

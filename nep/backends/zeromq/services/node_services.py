@@ -180,7 +180,7 @@ class ZeromqServices:
         address = f"{direct.ip}:{direct.port}"
         if not is_endpoint(endpoint_of(address)):
             raise NepError(
-                _("cannot call '{address}'; use a computer's address and a port").format(address=address)
+                _("can't call '{address}'; use a computer's address and a port").format(address=address)
             )
         endpoint = endpoint_of(resolve_address(address))
         return self._new_client(

@@ -100,7 +100,7 @@ class TcpStream:
     def _check_end(self, available: int) -> None:
         if self.is_over and available:
             self._clear_input()
-            raise WireError(_("it is incomplete"), code="call-end")
+            raise WireError(_("the message is incomplete"), code="call-end")
 
     def _clear_input(self) -> None:
         self._input = bytearray()

@@ -145,7 +145,7 @@ class SharedSources:
         reader = self._readers.get(publisher)
         if len(part) != _NUMBER.size:
             raise WireError(
-                _("it does not refer to a payload in shared memory"), len(part), code="shared-memory"
+                _("the message doesn't refer to a payload in shared memory"), len(part), code="shared-memory"
             )
         return None if reader is None else reader.read(_NUMBER.unpack(part)[0], may_copy=may_copy)
 

@@ -23,7 +23,7 @@ def _close_without_bye(bench: Bench, publisher: ScriptedPublisher, last_seq: int
     bench.master.submit(RemovePublisher(publisher.node.id, publisher.id, last_seq))
     bench.wait(wait_s)
     if not _is_connected(publisher):
-        raise broken_rule(_("it disconnected before the bye"))
+        raise broken_rule(_("the subscriber disconnected before the bye"))
 
 
 @rule(
@@ -121,7 +121,7 @@ def _subscriber_closes(bench: Bench) -> None:
 
 @rule(
     "leave",
-    lazy("A closing node renews once more, sends 'leave' and its byes, and exits with code 0."),
+    lazy("A closing node renews its lease once more, sends 'leave' and its byes, and exits with code 0."),
     _SECTION,
     is_last=True,
 )

@@ -39,7 +39,9 @@ def _connect_once(bench: Bench) -> None:
 
 @rule(
     "several-publishers",
-    lazy("A subscriber receives from every publisher of its topic, also after another one has closed."),
+    lazy(
+        "A subscriber receives messages from every publisher of its topic, even after one of them has closed."
+    ),
     _SECTION,
 )
 def _several_publishers(bench: Bench) -> None:
@@ -110,7 +112,7 @@ def _endpoint_change(bench: Bench) -> None:
 
 @rule(
     "unusable-endpoint",
-    lazy("An unusable endpoint does not affect the connections to other publishers."),
+    lazy("An unusable endpoint doesn't affect the connections to other publishers."),
     "the-master",
 )
 def _unusable_endpoint(bench: Bench) -> None:
@@ -125,7 +127,7 @@ def _unusable_endpoint(bench: Bench) -> None:
 
 @rule(
     "subscriber-lost",
-    lazy("A killed subscriber causes no losses for others and does not delay a closing publisher."),
+    lazy("A killed subscriber causes no losses for others and doesn't delay a closing publisher."),
     _SECTION,
 )
 def _subscriber_lost(bench: Bench) -> None:

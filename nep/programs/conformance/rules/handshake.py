@@ -35,13 +35,13 @@ def _hello_after_topic(bench: Bench) -> None:
     filters = _filters(publisher)
     if topic_part(topic) not in filters:
         raise broken_rule(
-            _("its subscriptions are {seen}, without {wanted}").format(
+            _("the subscriptions are {seen}, without {wanted}").format(
                 seen=printable(filters), wanted=printable(topic_part(topic))
             )
         )
     hello = next(iter(publisher.hellos))
     if filters.index(hello) < filters.index(topic_part(topic)):
-        raise broken_rule(_("it subscribed to the hello before the topic"))
+        raise broken_rule(_("the subscriber subscribed to the hello before the topic"))
 
 
 @rule(
@@ -97,7 +97,7 @@ def _foreign_hello(bench: Bench) -> None:
     subscriber.socket.subscribe(hello_part(7, topic))
     bench.require(lambda: any(parts[0] == hello_part(7, topic) for parts in subscriber.received), "echo")
     if any(parts[0] == other for parts in subscriber.received):
-        raise broken_rule(_("it answered the hello {hello}").format(hello=printable(other)))
+        raise broken_rule(_("the publisher answered the hello {hello}").format(hello=printable(other)))
 
 
 @rule(
@@ -119,7 +119,7 @@ def _first_message(bench: Bench) -> None:
 
 @rule(
     "new-pub-bounded",
-    lazy("'new_pub' waits at most 0.5 s for a subscriber that does not connect."),
+    lazy("'new_pub' waits at most 0.5 s for a subscriber that doesn't connect."),
     _SECTION,
 )
 def _new_pub_bounded(bench: Bench) -> None:
@@ -162,7 +162,7 @@ def _new_sub_waits(bench: Bench) -> None:
         publisher.send_echo(hello)
     bench.close_sub(int(bench.finish(number, "subscriber")["sub"]))
     if has_returned:
-        raise broken_rule(_("it returned before the echo"))
+        raise broken_rule(_("'new_sub' returned before the echo"))
 
 
 @rule(
@@ -209,7 +209,7 @@ def _latched(bench: Bench) -> None:
     before = [each for each in subscriber.notices if each.at <= subscriber.echoes[0].at]
     latched = before[0]
     if latched.payload is None:
-        raise broken_rule(_("it sent no message before the echo"))
+        raise broken_rule(_("the publisher sent no message before the echo"))
     expect("latched.seq", latched.header.seq, 2)
     expect("latched.flags", latched.header.flags, LATCHED)
 

@@ -22,7 +22,10 @@ def _ids(request: RecordedRequest, kind: str) -> set[Any]:
 
 @rule(
     "renew",
-    lazy("A node renews every second with the epoch and exactly its publishers and subscribers."),
+    lazy(
+        "A node renews its lease every second. Each renewal contains the epoch and all of the "
+        "node's publishers and subscribers, and no others."
+    ),
     _SECTION,
 )
 def _renew(bench: Bench) -> None:
@@ -46,7 +49,10 @@ def _renew(bench: Bench) -> None:
 
 @rule(
     "statistics",
-    lazy("Renewals have count, bytes and last seq of each publisher and received count of each subscriber."),
+    lazy(
+        "Renewals contain the count, bytes and last seq of each publisher, and the received count "
+        "of each subscriber."
+    ),
     "publisher statistics",
     "statistics",
 )
@@ -71,7 +77,7 @@ def _statistics(bench: Bench) -> None:
     expect("received", received.get("received"), 1)
 
 
-@rule("next-s", lazy("A node obeys 'next_s' and does not renew earlier."), _SECTION)
+@rule("next-s", lazy("A node doesn't renew its lease before the time in 'next_s'."), _SECTION)
 def _next_s(bench: Bench) -> None:
     bench.new_sub(bench.new_topic())
     wanted_s = 2.5 * bench.scale
@@ -82,7 +88,7 @@ def _next_s(bench: Bench) -> None:
     second = bench.wait_for_renewal(bench.master.received.index(first) + 1, 10.0)
     if second.at - first.at < 0.8 * wanted_s:
         raise broken_rule(
-            _("it renewed after {seconds:.1f} s; 'next_s' was {wanted:g}").format(
+            _("the node renewed its lease after {seconds:.1f} s; 'next_s' was {wanted:g}").format(
                 wanted=wanted_s, seconds=second.at - first.at
             )
         )
@@ -141,10 +147,7 @@ def _rejoin_restarted_master(bench: Bench) -> None:
 
 @rule(
     "other-socket-at-master",
-    lazy(
-        "A node joins a master that starts on an address where a ZeroMQ socket of another program "
-        "rejected the node before."
-    ),
+    lazy("A node joins a master at an address where a ZeroMQ socket of another program rejected it before."),
     "a-failed-handshake",
 )
 def _other_socket_at_master(bench: Bench) -> None:
@@ -162,7 +165,7 @@ def _other_socket_at_master(bench: Bench) -> None:
 
 @rule(
     "renewed-topics",
-    lazy("A subscriber also connects to publishers that only the reply to a renewal lists."),
+    lazy("A subscriber also connects to publishers that are listed only in the reply to a renewal."),
     _SECTION,
 )
 def _renewed_topics(bench: Bench) -> None:

@@ -24,7 +24,7 @@ def _expect_working(bench: Bench, publisher: ScriptedPublisher, sub: int) -> Non
     bench.require(lambda: any(_seq(each) == 1 for each in bench.events(sub)), "message")
     others = [each for each in bench.events(sub) if each.get("publisher") != str(publisher.id)]
     if others:
-        raise broken_rule(_("it delivered {seen}").format(seen=printable(others[0])))
+        raise broken_rule(_("the subscriber delivered {seen}").format(seen=printable(others[0])))
 
 
 def _seq(event: object) -> int:
@@ -39,7 +39,7 @@ def _send_malformed(publisher: ScriptedPublisher) -> Iterator[str]:
 
 @rule(
     "malformed",
-    lazy("Malformed messages are not delivered, and the subscriber keeps reading."),
+    lazy("Malformed messages aren't delivered, and the subscriber keeps reading."),
     "order-of-checks",
 )
 def _malformed_messages(bench: Bench) -> None:
@@ -72,7 +72,7 @@ def _malformed_messages_are_reported(bench: Bench) -> None:
         expect("subscribers.problem", problem, "a sentence")
 
 
-@rule("deep", lazy("Deeply nested JSON and msgpack do not stop a subscriber."), "messages")
+@rule("deep", lazy("Deeply nested JSON and msgpack don't stop a subscriber."), "messages")
 def _deep_nesting(bench: Bench) -> None:
     for msg_type, payload, good in (
         ("json", b"[" * _NESTING_DEPTH + b"]" * _NESTING_DEPTH, b"[1]"),
@@ -85,7 +85,7 @@ def _deep_nesting(bench: Bench) -> None:
         bench.require(lambda: any(_seq(each) == 3 for each in bench.events(sub)), "message")  # noqa: B023
 
 
-@rule("undecodable", lazy("Payloads that can't be decoded do not stop a subscriber."), "messages")
+@rule("undecodable", lazy("Payloads that can't be decoded don't stop a subscriber."), "messages")
 def _undecodable_payloads(bench: Bench) -> None:
     for msg_type, payload in (("json", b'{"a":'), ("string", b"\xff\xfe"), ("msgpack", b"\xc1")):
         publisher, sub = bench.subscribed_publisher(bench.new_topic(), msg_type)
@@ -105,7 +105,7 @@ def _large_messages(bench: Bench) -> None:
 
 @rule(
     "unknown-filters",
-    lazy("Malformed subscriptions, and those of more than 4096 bytes, do not stop a publisher."),
+    lazy("Malformed subscriptions, and those of more than 4096 bytes, don't stop a publisher."),
     "bounds",
 )
 def _unknown_filters(bench: Bench) -> None:

@@ -39,7 +39,7 @@ def _report_last_seq(bench: Bench, publisher: int, seq: int) -> None:
 
 @rule(
     "lost-gap",
-    lazy("Gaps in seq count as lost; messages before the first received one do not."),
+    lazy("Gaps in seq count as lost; messages before the first received one don't."),
     _SECTION,
     "losses",
 )
@@ -128,7 +128,7 @@ def _lost_seq_jump(bench: Bench) -> None:
 
 @rule(
     "lost-new",
-    lazy("Losses of a publisher whose 'publisher+' has 'is_new' count from seq 1, those of others do not."),
+    lazy("Losses count from seq 1 only for publishers whose 'publisher+' has 'is_new'."),
     "how-a-publisher-ends",
     "losses",
 )

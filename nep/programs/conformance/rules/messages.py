@@ -82,7 +82,7 @@ def _plain_subscriber(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
 
 @rule(
     "three-parts",
-    lazy("A subscriber without a hello gets messages of three parts: topic, header of 32 bytes, payload."),
+    lazy("A subscriber that sends no hello receives three-part messages: topic, 32-byte header and payload."),
     "messages",
 )
 def _three_parts(bench: Bench) -> None:
@@ -110,7 +110,7 @@ def _batches_to_readers(bench: Bench) -> None:
     bench.require(lambda: bool(subscriber.raw) and _last_seq(subscriber) >= _BURST, "message")
     for parts in subscriber.raw:
         if len(parts) == 1 and unpack_header_at(parts[0], len(topic_part(topic)))[0] >> 16 & BATCH:
-            raise broken_rule(_("it sent a batch to a subscriber whose hello has level 1"))
+            raise broken_rule(_("the publisher sent a batch to a subscriber whose hello has level 1"))
 
 
 def _last_seq(subscriber: ScriptedSubscriber) -> int:
@@ -119,7 +119,7 @@ def _last_seq(subscriber: ScriptedSubscriber) -> int:
 
 @rule(
     "forms",
-    lazy("Messages can be sent in any form that the subscriber reads; none is lost or out of order."),
+    lazy("Messages arrive complete and in order in every form that the subscriber supports."),
     "one-part",
 )
 def _message_forms(bench: Bench) -> None:
@@ -132,7 +132,7 @@ def _message_forms(bench: Bench) -> None:
             raise broken_rule(_("the seqs are {seen}").format(seen=printable(seqs)))
         numbers = [json.loads(bytes(each.payload)).get("n") for each in messages_of(subscriber)]
         if numbers != list(range(1, _BURST + 1)):
-            raise broken_rule(_("the messages are not in order: {seen}").format(seen=printable(numbers)))
+            raise broken_rule(_("the messages aren't in order: {seen}").format(seen=printable(numbers)))
 
 
 @rule(
@@ -172,9 +172,7 @@ def _payload(bench: Bench) -> None:
                 expect("payload", data, wanted)
         except ValueError as error:
             raise broken_rule(
-                _("the payload {seen} is not valid {msg_type}").format(
-                    seen=printable(data), msg_type=msg_type
-                )
+                _("the payload {seen} isn't valid {msg_type}").format(seen=printable(data), msg_type=msg_type)
             ) from error
 
 

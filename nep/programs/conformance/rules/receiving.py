@@ -29,7 +29,7 @@ def _expect_seqs(bench: Bench, sub: int, count: int, first: int = 1) -> None:
     expect("seq", seqs, [str(number) for number in range(first, first + count)])
 
 
-@rule("reads-parts", lazy("A subscriber reads messages of three parts, of every codec."), "messages")
+@rule("reads-parts", lazy("A subscriber accepts three-part messages of every codec."), "messages")
 def _reads_parts(bench: Bench) -> None:
     for msg_type, (payload, value) in _SAMPLES.items():
         publisher, sub = bench.subscribed_publisher(bench.new_topic(), msg_type)
@@ -43,7 +43,7 @@ def _reads_parts(bench: Bench) -> None:
             expect("value", event["value"], value)
 
 
-@rule("reads-one-part", lazy("A subscriber reads messages of one part."), "one-part", "hello1")
+@rule("reads-one-part", lazy("A subscriber accepts single-part messages."), "one-part", "hello1")
 def _reads_one_part(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     for form in ("one", "parts", "one", "one"):
@@ -51,7 +51,7 @@ def _reads_one_part(bench: Bench) -> None:
     _expect_seqs(bench, sub, 4)
 
 
-@rule("reads-batches", lazy("A subscriber reads batches, of 1 to 256 messages."), "batches", "hello3")
+@rule("reads-batches", lazy("A subscriber accepts batches of 1 to 256 messages."), "batches", "hello3")
 def _reads_batches(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send_batch([b'{"a":1}', b'{"b":22}', b"[]"])
@@ -64,7 +64,7 @@ def _reads_batches(bench: Bench) -> None:
     expect("payload", payloads[260], b'{"n":255}')
 
 
-@rule("reads-alone", lazy("A subscriber reads messages whose first part is its hello."), "notices")
+@rule("reads-alone", lazy("A subscriber accepts messages whose first part is its hello."), "notices")
 def _reads_messages_under_hello(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     for form in ("alone", "parts", "alone"):
@@ -113,7 +113,7 @@ def _read_acknowledgement(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(topic)
     before = [parse_acknowledgement(each.prefix) for each in publisher.filters]
     if any(each is not None for each in before):
-        raise broken_rule(_("it answered the first echo"))
+        raise broken_rule(_("the subscriber answered the first echo"))
     publisher.send(b'{"a":1}')
     publisher.send(b'{"a":1}')
     publisher.send_echo(next(iter(publisher.hellos)))

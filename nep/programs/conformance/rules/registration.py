@@ -41,7 +41,7 @@ def _integer(what: str, value: object, least: int, most: int) -> int:
 
 @rule(
     "node-record",
-    lazy("The record of a node has its id, name, host, process, language and generation."),
+    lazy("The record of a node contains its id, name, host, process, language and generation."),
     "node",
 )
 def _node_record(bench: Bench) -> None:
@@ -91,7 +91,7 @@ def _node_key(bench: Bench) -> None:
 
 @rule(
     "publisher-record",
-    lazy("The record of a publisher has its id, topic, type, the codec's name and an endpoint."),
+    lazy("The record of a publisher contains its id, topic, type, the codec's name and an endpoint."),
     "publisher",
 )
 def _publisher_record(bench: Bench) -> None:
@@ -110,7 +110,7 @@ def _publisher_record(bench: Bench) -> None:
 
 @rule(
     "publisher-port",
-    lazy("A publisher does not use the ports of the original NEP."),
+    lazy("A publisher doesn't use the ports of the original NEP."),
     "who-connects",
 )
 def _publisher_port(bench: Bench) -> None:
@@ -119,12 +119,14 @@ def _publisher_port(bench: Bench) -> None:
     for endpoint in bench.record("publisher", topic).get("endpoints", ()):
         found = _ENDPOINT.fullmatch(str(endpoint))
         if found is not None and int(found.group(2)) in _ORIGINAL_PORTS:
-            raise broken_rule(_("its endpoint is {endpoint}").format(endpoint=printable(endpoint)))
+            raise broken_rule(
+                _("the publisher's endpoint is {endpoint}").format(endpoint=printable(endpoint))
+            )
 
 
 @rule(
     "subscriber-record",
-    lazy("The record of a subscriber has its id, topic and type."),
+    lazy("The record of a subscriber contains its id, topic and type."),
     "subscriber",
 )
 def _subscriber_record(bench: Bench) -> None:
@@ -138,7 +140,7 @@ def _subscriber_record(bench: Bench) -> None:
 
 @rule(
     "request-form",
-    lazy("A request is one part, a map with 'do', 'call' and 'what'; call numbers are unique."),
+    lazy("A request has one part: a map with 'do', 'call' and 'what'. Call numbers are unique."),
     "the-master",
 )
 def _request_form(bench: Bench) -> None:

@@ -138,7 +138,7 @@ def _reply_to_call(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: 
 
 @rule(
     "service-call",
-    lazy("A client calls the server that the master lists and returns its reply."),
+    lazy("A client calls the server listed by the master and returns its reply."),
     _SECTION,
     "services",
 )
@@ -189,7 +189,7 @@ def _service_error(bench: Bench) -> None:
                 )
             except AdapterError:
                 continue
-            raise broken_rule(_("it returned {seen} as the reply").format(seen=printable(value)))
+            raise broken_rule(_("the client returned {seen} as the reply").format(seen=printable(value)))
 
 
 @rule(
@@ -206,7 +206,7 @@ def _pattern(bench: Bench) -> None:
     for publisher in publishers:
         bench.require(lambda: bool(publisher.hellos), "hello")  # noqa: B023 - called immediately
         if topic_part(publisher.topic) not in [each.prefix for each in publisher.filters]:
-            raise broken_rule(_("it did not subscribe to {topic}").format(topic=publisher.topic))
+            raise broken_rule(_("the subscriber didn't subscribe to {topic}").format(topic=publisher.topic))
         publisher.send(b'{"a":1}')
     bench.require(lambda: len(bench.events(sub)) >= 2, "message")
     topics = {each.get("topic") for each in bench.events(sub)}

@@ -215,7 +215,7 @@ class FoxglovePage(PageConnection):
                 for each in wire.items(fields.get(member)):
                     await carry_out(each)
                 return
-        raise NepError(_("the operation '{op}' is not supported here").format(op=quotable(name)))
+        raise NepError(_("the operation '{op}' isn't supported here").format(op=quotable(name)))
 
     async def _subscribe(self, wish: object) -> None:
         if not isinstance(wish, dict):

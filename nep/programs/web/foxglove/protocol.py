@@ -83,7 +83,7 @@ def parse(data: bytes) -> ClientMessage | ServiceRequest | Mapping[str, object]:
             fields = orjson.loads(data)
             if isinstance(fields, dict):
                 return fields
-    raise NepError(_("this is not a message of Foxglove's WebSocket protocol"))
+    raise NepError(_("this isn't a message of Foxglove's WebSocket protocol"))
 
 
 def items(value: object) -> list[object]:

@@ -269,7 +269,7 @@ def parse_json(data: bytes) -> object:
     """Parse JSON from a page within the limits of an operation. Raises `OperationError`."""
     if len(data) > MAX_MESSAGE_BYTES:
         raise OperationError(
-            _("an operation has {count} bytes; at most {most} are allowed").format(
+            _("an operation is {count} bytes; at most {most} are allowed").format(
                 count=len(data), most=MAX_MESSAGE_BYTES
             )
         )
@@ -283,7 +283,7 @@ def parse_json(data: bytes) -> object:
         return orjson.loads(data)
     except orjson.JSONDecodeError as error:
         raise OperationError(
-            _("an operation is not valid JSON: {reason}").format(reason=quotable(str(error)))
+            _("an operation isn't valid JSON: {reason}").format(reason=quotable(str(error)))
         ) from None
 
 

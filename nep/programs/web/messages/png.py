@@ -51,7 +51,7 @@ def text_in_png(data: str) -> bytes:
             )
         return bytes(image_codec.read_file(file)[:, :, ::-1].tobytes().rstrip(b"\n"))
     except (binascii.Error, ValueError):
-        raise OperationError(_("the 'data' of a 'png' is not valid base64")) from None
+        raise OperationError(_("the 'data' of a 'png' isn't valid base64")) from None
     except (DecodeError, EncodeError) as error:
         raise OperationError(_("a 'png' can't be read: {reason}").format(reason=error.reason)) from None
     except ImportError:

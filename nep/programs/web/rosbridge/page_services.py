@@ -167,7 +167,7 @@ class PageServices:
         known = self._servers.pop(operation.service, None)
         if known is None:
             raise OperationError(
-                _("this page does not serve '{service}'").format(service=quotable(operation.service)),
+                _("this page doesn't serve '{service}'").format(service=quotable(operation.service)),
                 operation.id,
                 "warning",
             )
@@ -187,4 +187,6 @@ class PageServices:
         for id_, (name, answer) in list(self._pending.items()):
             if service in {"", name}:
                 del self._pending[id_]
-                answer.set_exception(ServiceFailedError(_("the page that serves it has disconnected")))
+                answer.set_exception(
+                    ServiceFailedError(_("the page that provides the service has disconnected"))
+                )

@@ -135,7 +135,7 @@ class PageTopics:
         msg_type = await self._context.run_in_thread(self._type_of, operation.topic)
         if not msg_type:
             raise OperationError(
-                _("topic '{topic}' is not advertised; advertise it before you publish").format(
+                _("topic '{topic}' isn't advertised; advertise it before you publish").format(
                     topic=quotable(operation.topic)
                 ),
                 operation.id,

@@ -61,7 +61,7 @@ class RosApi:
         known = _SERVICES.get(name)
         if known is None:
             raise NepError(
-                _("the rosapi service '{service}' is not supported here").format(service=quotable(service))
+                _("the rosapi service '{service}' isn't supported here").format(service=quotable(service))
             )
         return known[1](self, args if isinstance(args, Mapping) else {})
 
@@ -285,7 +285,7 @@ def _parameter(args: Mapping[str, object]) -> tuple[str, str]:
     node, colon, name = given.rpartition(":")
     if not colon or not node:
         raise NepError(
-            _("'{name}' is not a valid parameter name; use the form 'NODE:PARAMETER'").format(
+            _("'{name}' isn't a valid parameter name; use the form 'NODE:PARAMETER'").format(
                 name=quotable(given)
             )
         )

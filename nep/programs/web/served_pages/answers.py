@@ -211,5 +211,5 @@ def _test_page_texts() -> dict[str, str]:
         "picture": _("Latest image of {topic}"),
         "needs_json": _("The type of this topic is {type}. Write the message as JSON."),
         "sent": _("Sent at {time}"),
-        "not_sent": _("Not sent: the page is not connected."),
+        "not_sent": _("Not sent: the page isn't connected."),
     }

@@ -47,10 +47,10 @@ def test_list_items_are_counted_from_1_and_described_in_words() -> None:
         (lambda: lists.remove_item([], "random"), "The list is empty."),
         (lambda: lists.item([1, 2], 1.5), "“item number” needs a whole number, not 1.5."),
         (lambda: lists.item([1, 2], "two"), "“item number” needs a number, not a text."),
-        (lambda: lists.item("abc", 1), "This needs a list, not a text."),
+        (lambda: lists.item("abc", 1), "This block needs a list, not a text."),
         (
             lambda: lists.add_item(0, 1),
-            "This needs a list, not a number. Set the variable to an empty list first.",
+            "This block needs a list, not a number. Set the variable to an empty list first.",
         ),
         (lambda: lists.item(None, 1), "This list has no value yet."),
         (
@@ -202,7 +202,7 @@ def test_nested_list_is_deep_copied_when_added() -> None:
         ("sum_of", (["a"],), "“sum” needs a number, not a text."),
         ("sum_of", ([math.nan],), "“sum” needs a finite number."),
         ("sum_of", ([[1]],), "“sum” needs a number, not a list."),
-        ("sum_of", (0,), "This needs a list, not a number. Set the variable to an empty list first."),
+        ("sum_of", (0,), "This block needs a list, not a number. Set the variable to an empty list first."),
         ("average_of", ([1, 2],), 1.5),
         ("average_of", ([],), "The list is empty."),
         ("smallest_of", ([3, -1, 2],), -1),
@@ -223,7 +223,7 @@ def test_nested_list_is_deep_copied_when_added() -> None:
         ("part_of_list", ([1, 2, 3], "a", 1), "“items” needs a number, not a text."),
         ("is_empty_list", ([],), True),
         ("is_empty_list", ([0],), False),
-        ("is_empty_list", ("",), "This needs a list, not a text."),
+        ("is_empty_list", ("",), "This block needs a list, not a text."),
     ],
 )
 def test_list_calculation_results(name, given, expected):

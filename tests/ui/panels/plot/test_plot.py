@@ -177,7 +177,7 @@ def test_invalid_field_suggests_the_intended_one(panel) -> None:
     show(panel, "/odom.sped")
     send(panel, "/odom", sine(0, 3))
     look(panel)
-    assert panel.advice.text() == "/odom.sped does not exist. Did you mean /odom.speed?"
+    assert panel.advice.text() == "/odom.sped doesn't exist. Did you mean /odom.speed?"
     panel.remove("/odom.sped")
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(3, 4))
@@ -474,7 +474,7 @@ def test_typing_error_stays_in_the_field_with_a_suggestion(adding) -> None:
     panel = adding
     panel.add.setText("/odon.speed + 1")
     QTest.keyClick(panel.add, Qt.Key.Key_Return)
-    assert panel.add.sentence == "Topic /odon does not exist; did you mean /odom?"
+    assert panel.add.sentence == "Topic /odon doesn't exist; did you mean /odom?"
     assert panel.add.text() == "/odon.speed + 1"
     assert panel.shown == []
     QTest.keyClick(panel.add, Qt.Key.Key_Escape)

@@ -118,7 +118,7 @@ class HueStrip(QWidget):
         self._theme = theme
         self._hue, self._light = 0.55, 0.6
         self.setAccessibleName(name)
-        self.setToolTip(plain.tip(_("Choose a colour; use the arrow keys to move between them")))
+        self.setToolTip(plain.tip(_("Choose a colour; use the arrow keys to move between colours")))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setProperty("focusRadius", theme.radius("control"))

@@ -246,7 +246,7 @@ class PictureChoice(QWidget):
         self.close_stream()
         self._clear_image()
         self._stream = self._pictures.stream(topic)
-        self.field.setText(_("newest picture of {topic}").format(topic=topic))
+        self.field.setText(_("newest image of {topic}").format(topic=topic))
         self._timer.start()
         self.changed.emit()
 

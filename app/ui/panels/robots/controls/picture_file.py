@@ -31,7 +31,7 @@ def read_picture(path: Path) -> tuple[QImage | None, str]:
     """
     try:
         if not path.is_file() and path.exists():
-            return None, _("“{file}” is not a file.").format(file=path.name)
+            return None, _("“{file}” isn't a file.").format(file=path.name)
         with path.open("rb") as file:
             data = file.read(MAX_FILE_BYTES + 1)
     except OSError as error:

@@ -179,7 +179,7 @@ class AccessForm(QWidget):
         words = _("Other devices can't reach this address.")
         if host:
             words = _(
-                "Devices on the network of {address} can reach this address. Messages are not encrypted."
+                "Devices on the network of {address} can reach this address. Messages aren't encrypted."
             )
         self.reach.setText(words.format(address=host))
         self.works_with.setText(

@@ -273,7 +273,7 @@ class WebPagesSheet(Overlay):
         self.switch.setChecked(self._tab in web.protocols)
         for protocol in ("rosbridge", "foxglove"):
             self.tabs.set_dot(protocol, protocol in web.protocols and web.state == "on")
-        quiet = "" if is_foxglove else _("Off at each start")
+        quiet = "" if is_foxglove else _("Always off when Studio starts")
         said = web.sentence or (_("Starting…") if web.state == "starting" else quiet)
         set_role(self.state, "error" if web.sentence else "textTertiary")
         if said != self.state.text():

@@ -126,7 +126,7 @@ class RobotChoice(QWidget):
         """Update the names of the allowed robots, and the check boxes of all connected or allowed robots."""
         names = self._web.robots
         said = format_list(list(names)) if names else _("none")
-        words = _("May command robots: {robots}").format(robots=said)
+        words = _("Robots that pages can move: {robots}").format(robots=said)
         if words != self.words.text():
             self.words.setText(words)
         role = "warn" if names else "text"
