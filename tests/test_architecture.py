@@ -275,7 +275,7 @@ def test_files_are_replaced_only_by_the_helper_that_retries_on_windows() -> None
     assert found - {"nep.system.replace_file", "app.ui.blockly.view"} == set(), "the latter replaces a tab"
 
 
-def test_qt_does_not_lose_references_to_none() -> None:
+def test_qt_calls_do_not_change_the_reference_count_of_none() -> None:
     """PySide6 6.12.0 for Linux loses one at every void call; Python 3.10 and 3.11 then abort."""
     program = (
         "import sys\n"
@@ -396,7 +396,7 @@ def test_links_between_documents_resolve() -> None:
     assert missing == []
 
 
-def test_trust_page_states_what_is_and_is_not_guaranteed() -> None:
+def test_trust_page_lists_guaranteed_and_not_guaranteed_properties() -> None:
     page = (ROOT / "docs" / "trust.md").read_text(encoding="utf-8")
     for named in ("Programs of yours on this computer", "Other users of this computer", "after `--listen`"):
         assert named in page

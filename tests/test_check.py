@@ -24,7 +24,7 @@ def test_arguments_reach_pytest() -> None:
 
 
 @pytest.mark.parametrize("code", [0, 1, 3])
-def test_exit_code_decides_if_a_check_passed(code: int, capfd: pytest.CaptureFixture[str]) -> None:
+def test_check_passes_if_its_exit_code_is_zero(code: int, capfd: pytest.CaptureFixture[str]) -> None:
     command = (sys.executable, "-c", f"import sys; print('said'); sys.exit({code})")
     outcome = run(Check("one", command))
     assert outcome.passed is (code == 0)
@@ -67,7 +67,7 @@ def test_summary_names_failed_checks() -> None:
     assert lines[1].split() == ["pytest", "FAILED", "60.0", "s"]
 
 
-def test_last_of_surplus_test_workers_gets_no_window_tests() -> None:
+def test_last_surplus_test_worker_receives_no_window_tests() -> None:
     window, waiting = "tests/e2e/test_stop.py", "tests/nep/services/test_calls.py"
     assert not may_take("gw3", 4, 2, window)
     assert may_take("gw3", 4, 2, waiting)

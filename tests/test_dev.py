@@ -69,7 +69,7 @@ class FakeSystem:
         return dev.Computer(which=self.which, ask=self.ask, do=self.do, **(known | changes))
 
 
-def test_nothing_runs_when_no_package_is_missing() -> None:
+def test_no_command_runs_when_no_package_is_missing() -> None:
     system = FakeSystem(installed=set(PACKAGES))
     dev.bring_system_packages(system.computer())
     assert system.ran == []
@@ -103,7 +103,7 @@ def test_unavailable_package_is_named() -> None:
 
 
 @pytest.mark.parametrize("name", ["libasound2", "libasound2t64"])
-def test_package_is_recognized_by_its_old_and_new_name(name: str) -> None:
+def test_package_is_recognized_by_its_former_and_current_name(name: str) -> None:
     system = FakeSystem(installed=set(PACKAGES) - {"libasound2"} | {name})
     assert system_packages.missing_packages(system.computer()) == []
     found, unknown = system_packages.available(
@@ -112,7 +112,7 @@ def test_package_is_recognized_by_its_old_and_new_name(name: str) -> None:
     assert (found, unknown) == ([name], [])
 
 
-def test_user_without_root_gets_the_command_to_type() -> None:
+def test_user_without_root_is_shown_the_install_command() -> None:
     system = FakeSystem(installed=set(PACKAGES) - {"libnss3", "libgl1"}, listed={"libgl1"})
     with pytest.raises(dev.Trouble) as trouble:
         dev.bring_system_packages(system.computer(root=False))
@@ -138,7 +138,7 @@ def test_test_packages_are_installed_for_root_and_printed_for_others(
     assert len(system.ran) == ran
 
 
-def test_missing_test_packages_do_not_block_installing_others(
+def test_unavailable_test_packages_do_not_block_installing_the_available_packages(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     mono, *others = system_packages.TEST_PACKAGES.values()
@@ -231,7 +231,7 @@ def test_pip_is_used_if_uv_is_unavailable_or_offline(
     assert dev.is_fresh(folder, "studio")
 
 
-def test_dev_environment_satisfies_studio_but_not_the_reverse(folder: Path) -> None:
+def test_dev_environment_satisfies_studio_and_studio_environment_does_not_satisfy_dev(folder: Path) -> None:
     system = FakeSystem()
     dev.make_environment(fake_pip(system), folder, "studio")
     assert not dev.is_fresh(folder, "dev")
@@ -246,7 +246,7 @@ def test_failed_installation_is_retried(folder: Path) -> None:
     assert not dev.is_fresh(folder, "dev")
 
 
-def test_interpreter_path_of_the_environment_on_each_system() -> None:
+def test_interpreter_path_of_the_environment_depends_on_the_operating_system() -> None:
     assert dev.venv_python(Path("v"), "win32") == Path("v/Scripts/python.exe")
     assert dev.venv_python(Path("v"), "darwin") == Path("v/bin/python")
 
@@ -260,7 +260,7 @@ def test_sandbox_is_disabled_only_for_root() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux" or not shutil.which("Xvfb"), reason="no Xvfb")
-def test_virtual_screen_lives_as_long_as_its_context() -> None:
+def test_virtual_screen_is_closed_at_the_end_of_its_context() -> None:
     with dev.screen(FakeSystem().computer(environ={})) as environ:
         address = f"/tmp/.X11-unix/X{environ['DISPLAY'][1:]}"
         with socket.socket(socket.AF_UNIX) as client:
@@ -291,7 +291,7 @@ except KeyboardInterrupt:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="process groups of POSIX")
 @pytest.mark.parametrize("handler", ["", "signal.signal(signal.SIGINT, signal.SIG_IGN)"])
-def test_ctrl_c_ends_child_processes_even_if_they_ignore_it(handler: str) -> None:
+def test_ctrl_c_ends_child_processes_that_ignore_the_signal(handler: str) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", WATCHING.replace("{handler}", handler)],
         cwd=ROOT,
@@ -315,7 +315,9 @@ def test_missing_script_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
         dev.script(FakeSystem().computer(), "nothing", [], lacking)
 
 
-def test_trouble_exits_with_code_2_and_its_message(capsys: pytest.CaptureFixture[str]) -> None:
+def test_unsupported_python_exits_with_code_2_and_an_error_message(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
     previous = [(number, signal.getsignal(number)) for number in numbers]
     try:

@@ -44,7 +44,7 @@ class Fuzzing:
         return fuzz(computer, given, self.folder)
 
 
-def test_fuzz_time_is_divided_and_slow_targets_get_twice_as_much() -> None:
+def test_fuzz_time_is_divided_and_slow_targets_get_a_double_share() -> None:
     assert seconds_each({"a": 1, "b": 1, "c": 4}, 2) == {"a": 30, "b": 30, "c": 60}
     assert seconds_each({"a": 1}, 0.001) == {"a": 1}
     assert seconds_each({}, 5) == {}
@@ -59,7 +59,7 @@ def test_all_fuzz_targets_run_without_findings(tmp_path: Path, capsys: pytest.Ca
     assert Fuzzing(tmp_path).run("quick") == 0, "the environment is there"
 
 
-def test_new_findings_are_reported_and_earlier_ones_are_not(
+def test_new_findings_are_reported_and_earlier_findings_are_not(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     finds = {"quick-1.bin": b"x", "quick-1.txt": b"RecursionError", "slow-timeout-5": b"y"}

@@ -98,7 +98,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> str:
         ("test_events[11]", "descriptors are left behind: ['anon_inode:[eventfd]']"),
     ],
 )
-def test_leftover_resource_fails_the_test_that_created_it(report: str, test: str, words: str) -> None:
+def test_leaked_resource_fails_the_test_that_created_the_resource(report: str, test: str, words: str) -> None:
     assert f"ERROR test_inner.py::{test} - " in report
     assert words in report
 
@@ -106,12 +106,12 @@ def test_leftover_resource_fails_the_test_that_created_it(report: str, test: str
 @pytest.mark.parametrize(
     "test", ["test_tidy", "test_a_first_use_of_libzmq", "test_pipes[0]", "test_tidy_again"]
 )
-def test_clean_tests_and_library_resources_pass(report: str, test: str) -> None:
+def test_tests_without_leaks_and_resources_of_libraries_pass(report: str, test: str) -> None:
     assert f"PASSED test_inner.py::{test}\n" in report
     assert f"ERROR test_inner.py::{test} " not in report
 
 
-def test_grace_is_short_after_the_first_leak_of_a_file() -> None:
+def test_grace_period_is_short_after_the_first_leak_of_a_test_file() -> None:
     grace = Grace(20.0, 1.0)
     leaky, tidy = Path("test_leaky.py"), Path("test_tidy.py")
     assert grace.seconds(leaky) == 20.0

@@ -41,13 +41,13 @@ def test_changed_and_new_files_are_compared_with_the_last_release(repository: Pa
     assert changes(repository) == ("v0.1.0", {"first", "second", "third", "näw file"})
 
 
-def test_release_commit_is_compared_with_the_release_before(repository: Path) -> None:
+def test_release_commit_is_compared_with_the_previous_release(repository: Path) -> None:
     git(repository, "tag", "v0.1.0", "HEAD^")
     git(repository, "tag", "v0.2.0")
     assert changes(repository) == ("v0.1.0", {"third"})
 
 
-def test_without_tag_the_parent_or_the_branch_point_is_used(repository: Path) -> None:
+def test_changes_without_a_tag_are_compared_with_the_parent_or_branch_point(repository: Path) -> None:
     assert changes(repository).paths == {"third"}
     git(repository, "checkout", "--quiet", "-b", "topic")
     for name in ("fourth", "fifth"):
@@ -82,7 +82,7 @@ def test_changes_are_unknown_in_a_shallow_clone_and_outside_a_repository(
         ("README.md", set()),
     ],
 )
-def test_changed_file_runs_the_groups_that_depend_on_it(path: str, run: set[str]) -> None:
+def test_changed_file_runs_the_groups_that_depend_on_the_file(path: str, run: set[str]) -> None:
     assert set(NAMES) - set(skipped_groups([path])) == run
 
 
@@ -112,7 +112,7 @@ def test_only_tests_of_skipped_groups_are_skipped() -> None:
     assert not is_skipped(f"{ros2}[test_contract.py-]", ["ROS 2"])
 
 
-def test_report_names_skipped_groups_and_the_command_that_runs_them() -> None:
+def test_report_names_skipped_groups_and_the_command_to_run_them() -> None:
     line = report(("soak", "films"), "v0.1.0")
     assert "v0.1.0" in line
     assert "soak, films" in line

@@ -25,7 +25,7 @@ def test_contributing_has_the_markers_of_the_table() -> None:
     assert text.count(package_map.BEGIN) == text.count(package_map.END) == 1
 
 
-def test_implied_imports_are_left_out() -> None:
+def test_transitive_imports_are_omitted_from_the_map() -> None:
     given = {"a": frozenset("bcd"), "b": frozenset("c"), "c": frozenset("d"), "d": frozenset[str]()}
     assert package_map.transitive_reduction(given) == {
         "a": frozenset("b"), "b": frozenset("c"), "c": frozenset("d"), "d": frozenset(),

@@ -96,7 +96,7 @@ def found(again: float = 1.0, nep: float = 0.4, sizes: list[int] = SIZES) -> dic
     }
 
 
-def test_measurement_counts_only_if_the_plain_repetition_is_within_5_percent(figures: ModuleType) -> None:
+def test_measurement_is_valid_only_if_the_plain_repetition_is_within_5_percent(figures: ModuleType) -> None:
     assert "| does not count |" not in figures.report(found(again=1.049))
     assert figures.does_count(found(again=1.049))
     for again in (1.06, 0.94):
@@ -105,7 +105,7 @@ def test_measurement_counts_only_if_the_plain_repetition_is_within_5_percent(fig
         assert not figures.does_count(found(again=again))
 
 
-def test_goals_are_reached_missed_or_not_counted(figures: ModuleType) -> None:
+def test_goals_are_reached_missed_or_not_counted_by_measured_ratio(figures: ModuleType) -> None:
     assert [goal.is_reached for goal in figures.goals(found(nep=0.49))] == [True, True, True]
     assert [goal.is_reached for goal in figures.goals(found(nep=0.55))] == [True, False, True]
     assert [goal.is_reached for goal in figures.goals(found(nep=1.2))] == [False, False, False]
@@ -113,11 +113,11 @@ def test_goals_are_reached_missed_or_not_counted(figures: ModuleType) -> None:
     assert "does not count" in str(figures.goals(found(nep=0.4, again=1.1))[0])
 
 
-def test_goals_need_all_sizes(figures: ModuleType) -> None:
+def test_goals_are_omitted_unless_all_sizes_are_measured(figures: ModuleType) -> None:
     assert figures.goals(found(sizes=SIZES[:2])) == []
 
 
-def test_figures_have_the_numbers_of_the_paper(figures: ModuleType) -> None:
+def test_report_numbers_its_figures_as_in_the_paper(figures: ModuleType) -> None:
     """Figure 9 of the paper is R-remote, figure 10 is L-local."""
     run = found()
     run["scenarios"].append(run["scenarios"][0] | {"name": "remote"})
@@ -130,7 +130,7 @@ def test_figures_have_the_numbers_of_the_paper(figures: ModuleType) -> None:
     assert "### Figure 10: L-local" in said
 
 
-def test_remote_scenario_takes_200_trips_of_each_size(paper: ModuleType) -> None:
+def test_remote_scenario_measures_200_round_trips_of_each_size(paper: ModuleType) -> None:
     for size in paper.SIZES["remote"]:
         assert paper.REMOTE_BLOCKS * paper.trips("remote", size) == 200
 
@@ -163,13 +163,13 @@ def test_writing_replaces_only_the_measured_scenarios(figures: ModuleType, tmp_p
     assert (tmp_path / "images" / "figure-10.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_figures_document_matches_its_numbers(figures: ModuleType) -> None:
+def test_figures_document_matches_its_recorded_results(figures: ModuleType) -> None:
     numbers = json.loads((ROOT / "docs" / "figures.json").read_text(encoding="utf-8"))
     text = (ROOT / "docs" / "figures.md").read_text(encoding="utf-8")
     assert figures.report(numbers, "images") in text
 
 
-def test_cost_is_linear_up_to_a_factor_of_1_2_from_10_to_50_endpoints(
+def test_cost_per_endpoint_grows_at_most_by_a_factor_of_1_2_from_10_to_50_endpoints(
     fan: ModuleType, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def taken(factor: float, again: float = 1.0) -> dict:

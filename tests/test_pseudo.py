@@ -31,7 +31,7 @@ def test_lists_numbers_and_markup_are_recognized_as_translated(pseudo) -> None:
     assert untranslated("<b>3 ms</b> `nep topic list` Ctrl+Enter") == []
 
 
-def test_translatable_texts_of_sources_and_blocks_are_known() -> None:
+def test_translatable_texts_are_collected_from_sources_and_blocks() -> None:
     assert (None, "a word that nobody marked") not in marked()
     assert any(context == "block" for context, _english in marked())
     assert any(context is None for context, _english in marked())

@@ -57,7 +57,7 @@ def test_tag_must_match_the_version_of_the_sources() -> None:
             checked_version(tag, "1.2.3")
 
 
-def test_relative_links_become_absolute_and_others_stay() -> None:
+def test_relative_links_become_absolute_and_other_links_are_unchanged() -> None:
     text = "[guide](docs/web.md), [there](https://example.org/a.md), [below](#added), [x](mailto:a@b.org)"
     assert with_links(text, "https://example.org/blob/v1/") == text.replace(
         "](docs/", "](https://example.org/blob/v1/docs/"

@@ -71,7 +71,7 @@ def test_pythons_are_found_on_the_path_by_the_launcher_and_in_pyenv(tmp_path: Pa
 
 
 @pytest.mark.parametrize("said", ["", "3.9 cpython /bin/x\n", "pyenv: python3.12: command not found", "\0"])
-def test_program_that_does_not_report_the_expected_version_is_ignored(said: str, tmp_path: Path) -> None:
+def test_interpreter_that_does_not_report_the_expected_version_is_ignored(said: str, tmp_path: Path) -> None:
     system = Pythons({"/shim": said, sys.executable: said}, {f"python{each}": "/shim" for each in PROMISED})
     assert found(system.computer(), tmp_path) == {}
     with pytest.raises(Trouble, match="none of these Pythons is here; install one"):
@@ -126,7 +126,7 @@ def test_mac_package_uses_wheels_for_the_oldest_macos(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("platform", "is_for_oldest"), [("darwin", False), ("linux", True), ("win32", True)])
-def test_pip_chooses_the_wheels_on_other_systems(platform: str, is_for_oldest: bool, tmp_path: Path) -> None:
+def test_pip_selects_the_wheels_on_other_systems(platform: str, is_for_oldest: bool, tmp_path: Path) -> None:
     system = Pythons({})
     environment(
         system.computer(platform), "python3", tmp_path / "env", "package", is_for_oldest=is_for_oldest

@@ -149,7 +149,7 @@ def test_invalid_translation_falls_back_to_english_and_is_logged_once(spanish, c
     assert pgettext("block", "wait %SECONDS s") == "wait %SECONDS s"
 
 
-def test_plural_forms_and_contexts(spanish) -> None:
+def test_translations_depend_on_plural_form_and_context(spanish) -> None:
     said = [ngettext("a message", "{count} messages", count).format(count=count) for count in (0, 1, 2)]
     assert said == ["0 mensajes", "un mensaje", "2 mensajes"]
     many = ngettext("{count} message from {who}", "{count} messages from {who}", 2)
@@ -211,7 +211,7 @@ def test_damaged_catalogue_falls_back_to_english(data, spanish, tmp_path, caplog
     assert "can't load" in caplog.text
 
 
-def test_system_language_and_best_match() -> None:
+def test_system_language_is_read_from_the_environment_and_matched_to_known_languages() -> None:
     assert i18n.system_language({"LANG": "es_MX.UTF-8"}) == "es_MX.UTF-8"
     assert i18n.system_language({"LANGUAGE": "es:en", "LANG": "C.UTF-8"}) == "es"
     assert i18n.system_language({"LC_ALL": "C.UTF-8", "LANG": "es_MX"}) == "en"
@@ -225,14 +225,14 @@ def test_system_language_and_best_match() -> None:
     ]
 
 
-def test_nep_lang_overrides_the_chosen_language(monkeypatch) -> None:
+def test_nep_lang_overrides_the_language_setting(monkeypatch) -> None:
     monkeypatch.setenv("NEP_LANG", "en")
     i18n.set_initial_language("es")
     assert i18n.language() == "en"
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.9, "es"), (0.89, "en")])
-def test_system_language_is_used_if_it_is_offered(share, expected, spanish, monkeypatch) -> None:
+def test_system_language_is_used_if_its_translation_is_offered(share, expected, spanish, monkeypatch) -> None:
     monkeypatch.setenv("NEP_LANG", "")
     monkeypatch.setenv("LANGUAGE", "es_MX")
     known = {"en": {"share": 1.0}, "es": {"share": share}}

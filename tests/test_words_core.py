@@ -124,7 +124,7 @@ def test_robot_that_may_still_move_is_recognized_in_every_language() -> None:
     assert stop_error_text("Turtle", "Turtle may still move: Xx") == "Turtle may still move: Xx"
 
 
-def test_robot_facts_are_translated() -> None:
+def test_health_facts_of_robots_are_translated() -> None:
     topics = {sensor.topic: Topic(sensor.topic) for sensor in PEPPER.sensors}
     link = RobotLink("Pepper", PEPPER)
     sensors = tuple(sensor.title for sensor in PEPPER.sensors)

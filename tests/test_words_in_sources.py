@@ -49,7 +49,7 @@ def at_import(node: ast.AST) -> Iterator[ast.AST]:
         yield from at_import(part)
 
 
-def test_every_translated_text_gets_its_placeholders() -> None:
+def test_every_translated_text_is_formatted_with_all_its_placeholders() -> None:
     wrong = []
     for path, module in sources().items():
         for node in ast.walk(module):

@@ -89,7 +89,7 @@ def test_ci_runs_the_readme_command_on_three_systems_with_oldest_and_newest_pyth
     assert [runner.partition("-")[0] for runner in matrix["runner"]] == ["windows", "macos", "ubuntu"]
 
 
-def test_all_tests_run_nightly() -> None:
+def test_nightly_job_runs_all_tests() -> None:
     ci = workflow("ci")
     nightly = ci["jobs"]["nightly"]
     assert "schedule" in ci["on"]
@@ -198,7 +198,7 @@ def test_two_packages_with_the_same_name_are_not_drafted(place: Path) -> None:
     assert not (place / "said-to-gh").exists()
 
 
-def test_tag_that_is_not_the_version_stops_the_release(place: Path) -> None:
+def test_tag_that_differs_from_the_version_stops_the_release(place: Path) -> None:
     (place / "nep" / "version.py").write_text('__version__ = "99.0.0"\n', encoding="utf-8")
     assert drafted(place) == 1
     assert not (place / "release").exists()

@@ -114,7 +114,7 @@ def types(saved):
             yield from types(inner)
 
 
-def test_picture_behaviour_has_the_designed_problems():
+def test_sample_behaviour_has_the_expected_problems():
     saved = json.loads(Path("tests/data/behaviours/picture-02.nepb").read_text("utf-8"))
     pepper, absent = (parse(saved["robots"][name]) for name in ("Pepper", "NAO"))
     program = compile_behaviour(saved["workspace"], [pepper], absent=[absent], name=saved["name"])
@@ -139,7 +139,7 @@ def said(link: FakeLink) -> list[object]:
     return [given["text"] for _, action, given in link.invoked if action == "say"]
 
 
-def test_greeting_example():
+def test_greeting_example_speaks_and_turns():
     play, link = run(0)
     play.end()
     assert play.runtime.error is None
@@ -147,7 +147,7 @@ def test_greeting_example():
     assert [action for _, action, _ in link.invoked].count("turn") == 4
 
 
-def test_touch_reaction_example():
+def test_touch_reaction_example_counts_touches():
     play, link = run(1)
     until(lambda: len(said(link)) == 1)
     for times in (1, 2, 3):
@@ -161,7 +161,7 @@ def test_touch_reaction_example():
     assert play.runtime.error is None
 
 
-def test_tour_guide_example():
+def test_tour_guide_example_publishes_each_station():
     play, link = run(2)
     play.end()
     assert said(link)[-1] == "Thank you for coming."
@@ -206,7 +206,7 @@ def test_careful_walk_example_checks_distance_before_each_step(distance, steps, 
     assert said(link)[-1] == "My battery is low."
 
 
-def test_finder_example_reports_what_it_sees():
+def test_finder_example_reports_detected_ball_and_face():
     link = FakeLink()
     link.sensors |= {("Pepper", "sees_ball"): True, ("Pepper", "sees_face"): True}
     play, link = run(6, link)

@@ -52,7 +52,7 @@ def test_fix_adds_start_block_to_empty_workspace():
     assert compile_behaviour(fixed, []).starts == 1
 
 
-def test_action_that_is_not_a_block_fix_changes_nothing():
+def test_fix_action_without_matching_block_changes_nothing():
     assert fix(workspace(), "connect:NAO") is None
     assert fix(workspace(), "limit:nobody") is None
 

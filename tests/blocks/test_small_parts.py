@@ -27,7 +27,7 @@ def test_names_are_valid_python_identifiers_and_unique(words):
     assert all(name.isidentifier() and not keyword.iskeyword(name) and name != "taken" for name in made)
 
 
-def test_names_resemble_the_original_words():
+def test_python_names_are_derived_from_block_text():
     names = PythonNames(frozenset())
     assert names.new("when started", "x") == "when_started"
     assert names.new("When started!", "x") == "when_started_2"
@@ -52,7 +52,7 @@ def test_choice_field_returns_value_of_its_label():
     assert ChoiceField("ROBOT", (), source="robots:nao").read("NAO") == "NAO"
 
 
-def test_topic_colour_and_path_fields():
+def test_topic_colour_and_path_fields_are_validated():
     assert TopicField("T").read("/a/b") == "/a/b"
     for wrong in ("", "a b", "{", "\n", "x" * 201):
         with pytest.raises(FieldError):
@@ -75,7 +75,7 @@ def test_topic_colour_and_path_fields():
         ("x", "x"),
     ],
 )
-def test_values_as_text(value, expected):
+def test_values_are_converted_to_text(value, expected):
     assert values.text(value) == expected
 
 

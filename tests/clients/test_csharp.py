@@ -413,7 +413,7 @@ FAR_MASTER = """
 """
 
 
-def test_latency_is_corrected_by_the_clock_of_another_computer() -> None:
+def test_latency_is_corrected_for_the_clock_of_another_computer() -> None:
     """The clock of the other computer, on which the master and the publisher run, is a day late."""
     adapter_program = program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")
     with programs.running(FAR_MASTER) as far, running(adapter_program, NEP_MASTER=far.line()) as started:
@@ -471,7 +471,7 @@ def test_subscriber_with_wildcards_receives_all_matching_topics(adapter: Adapter
     assert heard == {("robots/one/state", 0), ("robots/two/state", 2)}
 
 
-def test_image_files_are_received_as_pictures(adapter: Adapter, node: Node) -> None:
+def test_image_files_are_received_as_images(adapter: Adapter, node: Node) -> None:
     subscriber = node.new_sub("camera", "image")
     pub = adapter.ask("publisher", topic="camera", type="image")["pub"]
     adapter.ask("publish", pub=pub, bytes=base64.b64encode(PICTURE).decode())

@@ -365,7 +365,7 @@ def test_backoff_grows_while_a_program_closes_each_connection(stack: ExitStack, 
     assert time.monotonic() - began >= (0.05 + 0.1 + 0.2 + 0.4) * 7 / 8
 
 
-def test_silent_peer_is_disconnected_and_answering_peer_is_kept(context, stack: ExitStack) -> None:
+def test_silent_peer_is_disconnected_and_responsive_peer_stays_connected(context, stack: ExitStack) -> None:
     with context.socket(zmq.DEALER) as peer, socket.create_server(("127.0.0.1", 0)) as silent:
         port = peer.bind_to_random_port("tcp://127.0.0.1")
         kept = started(stack, "dealer", f"tcp://127.0.0.1:{port}", "heartbeat_ms=50")

@@ -141,7 +141,7 @@ def free_port() -> int:
         return bound.getsockname()[1]
 
 
-def test_own_tests_of_the_package_pass(master):
+def test_javascript_package_passes_its_own_tests(master):
     tests = sorted(str(each) for each in (PACKAGE / "test").glob("*.test.mjs"))
     done = subprocess.run(
         [str(node), "--test", *tests],
@@ -155,13 +155,13 @@ def test_own_tests_of_the_package_pass(master):
     assert done.returncode == 0, done.stdout
 
 
-def test_lock_file_names_no_registry():
+def test_lock_file_contains_no_resolved_registry_urls():
     lock = json.loads((PACKAGE / "package-lock.json").read_text())
     assert not [name for name, each in lock["packages"].items() if "resolved" in each]
 
 
 @pytest.mark.parametrize("name", ["Node", "node"])
-def test_published_message_arrives_and_the_program_ends(python, master, tmp_path, name):
+def test_published_message_arrives_and_the_program_exits(python, master, tmp_path, name):
     subscriber = python.new_sub("test", "json")
     done = run_script(PUBLISHER.format(node=name), tmp_path, NEP_MASTER=master.address)
     assert (done.returncode, done.stderr) == (0, "")
@@ -206,7 +206,7 @@ def test_payloads_are_received_unchanged_in_both_directions(program, python, msg
     assert subscriber.listen(True) == (True, payload)
 
 
-def test_pictures_are_exchanged_in_both_directions(program, python):
+def test_images_are_exchanged_in_both_directions(program, python):
     numpy, cv2 = pytest.importorskip("numpy"), pytest.importorskip("cv2")
     picture = numpy.arange(48, dtype="uint8").reshape(4, 4, 3)
     program.do("subscriber", topic="to_js", type="image")

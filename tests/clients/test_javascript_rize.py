@@ -179,7 +179,7 @@ def test_action_converts_its_input_and_rejects_invalid_values(speaker: Speaker, 
     assert turtle.done() == [["rest", "sitting"]]
 
 
-def test_wait_primitive_runs_and_stop_is_answered(speaker: Speaker) -> None:
+def test_wait_primitive_runs_and_stop_receives_a_reply(speaker: Speaker) -> None:
     wait = speaker.command(primitive("wait", "0.01"), id="1")
     assert speaker.answered() == [{**wait, "state": "success"}]
     long = speaker.command([SAY, primitive("wait", "600")], id="2")

@@ -46,7 +46,7 @@ def test_resolved_alert_is_removed_and_shown_again_when_it_recurs() -> None:
     assert not alerts.is_dismissed("a")
 
 
-def test_cure_all_removes_alerts_by_prefix() -> None:
+def test_resolve_all_removes_alerts_by_id_prefix() -> None:
     alerts = Alerts(lambda: 1.0)
     for id in ("message:/a", "message:/b", "master"):
         alerts.raise_alert(id, "warn", id)

@@ -43,7 +43,7 @@ def test_removed_program_is_detected_and_a_new_one_counts_as_replaced(program: P
     assert own.executable_state() == "replaced"
 
 
-def test_running_from_source_has_no_program_to_watch() -> None:
+def test_run_from_source_has_no_executable_to_monitor() -> None:
     assert OwnProgram().executable_state() == ""
 
 

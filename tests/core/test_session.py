@@ -101,7 +101,7 @@ def test_undecodable_messages_raise_one_alert_that_a_valid_message_resolves(sess
         tick_until(session, lambda: not session.alerts.active)
 
 
-def test_virtual_robot_is_found_watched_tried_and_stopped(session: Session) -> None:
+def test_virtual_robot_connects_runs_an_action_and_stops(session: Session) -> None:
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected)
     link = session.fleet.link("Pepper")

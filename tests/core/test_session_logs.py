@@ -34,7 +34,9 @@ def listening(session: Session, node: nep.Node) -> None:
     tick_until(session, subscribed)
 
 
-def test_first_log_record_of_a_node_arrives_and_the_log_topic_is_not_announced(session: Session) -> None:
+def test_first_log_record_of_a_node_arrives_and_the_log_topic_is_not_reported_as_new(
+    session: Session,
+) -> None:
     with nep.node("driver") as node:
         listening(session, node)
         node.log.warning("low battery")

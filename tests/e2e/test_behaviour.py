@@ -39,7 +39,9 @@ def test_runtime_error_is_shown_as_a_sentence_on_its_block(with_robot: Callable[
     studio.says("because of an error")
 
 
-def test_pause_step_and_resume(with_robot: Callable[[dict], Studio], address: str) -> None:
+def test_behaviour_can_be_paused_stepped_and_resumed(
+    with_robot: Callable[[dict], Studio], address: str
+) -> None:
     studio = with_robot(started(forever(say("One", say("Two")))))
     studio.click("Run", kind="RunButton")
     studio.says("Pepper says “")

@@ -50,7 +50,7 @@ def studio(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     return made
 
 
-def test_blocks_dropped_on_another_tab_move_there(studio: Studio) -> None:
+def test_blocks_dropped_on_another_tab_are_moved_to_that_tab(studio: Studio) -> None:
     before, alone = shown(studio), {"started", "say Four", "text Four"}
     carry(studio, "say Two", *place_of(studio, "Quiz"))
     until(lambda: ringed(studio, "Quiz"), "a ring is round the tab that would take it")
@@ -72,7 +72,7 @@ def test_blocks_dropped_on_another_tab_move_there(studio: Studio) -> None:
     assert studio.quit() == 0
 
 
-def test_blocks_dropped_elsewhere_return_and_on_plus_create_a_behaviour(studio: Studio) -> None:
+def test_blocks_dropped_elsewhere_return_and_blocks_on_plus_create_a_behaviour(studio: Studio) -> None:
     before = shown(studio)
     studio.find("Quiz", kind="BehaviourTab")
     stack = studio.spot(PATH.format("say Two"))
@@ -95,7 +95,7 @@ def test_blocks_dropped_elsewhere_return_and_on_plus_create_a_behaviour(studio: 
     assert studio.quit() == 0
 
 
-def test_tab_opens_under_dragged_blocks_and_the_drag_continues_there(studio: Studio) -> None:
+def test_tab_opens_under_dragged_blocks_and_the_drag_continues_in_that_tab(studio: Studio) -> None:
     before = shown(studio)
     carry(studio, "say Two", *place_of(studio, "Quiz"))
     picture = studio.find(kind="DragImage")["rect"]

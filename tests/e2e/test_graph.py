@@ -35,7 +35,7 @@ def said(studio: Studio) -> str:
     return str(studio.find("Graph of nodes")["description"])
 
 
-def test_graph_leads_from_a_topic_publisher_to_its_subscribers(
+def test_graph_navigation_leads_from_a_topic_publisher_to_its_subscribers(
     start: Callable[..., Studio], tmp_path: Path
 ) -> None:
     studio = start()

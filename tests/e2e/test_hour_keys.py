@@ -25,7 +25,7 @@ BIN = f"{TAB}.querySelector('.nepSheet .blocklyBlock') !== null"
 FIGHT = "both move Pepper at the same time"
 
 
-def test_first_hour_of_a_teacher_by_keyboard(
+def test_first_hour_of_a_teacher_is_completed_by_keyboard(
     start: Callable[..., Studio], tmp_path: Path, address: str
 ) -> None:
     home = tmp_path / "person"

@@ -76,7 +76,7 @@ def hour(start: Callable[..., Studio], tmp_path: Path, address: str) -> Iterator
     mouse.close()
 
 
-def test_first_hour_of_a_teacher_by_mouse(hour: Hour, start: Callable[..., Studio]) -> None:
+def test_first_hour_of_a_teacher_is_completed_by_mouse(hour: Hour, start: Callable[..., Studio]) -> None:
     turn = move_the_robot(hour)
     go_the_first_steps(hour, turn)
     greet(hour)

@@ -33,7 +33,7 @@ def test_start_page_leads_to_a_connected_robot(studio: Studio) -> None:
     until(lambda: not robot.is_running(), "the virtual robot ends with its window")
 
 
-def test_topics_inspector_and_pictures_update_live(studio: Studio, address: str) -> None:
+def test_topics_inspector_and_images_update_live(studio: Studio, address: str) -> None:
     use_the_virtual_robot(studio)
     studio.click("Developer")
     with nep.node("weather", master=address) as node:

@@ -76,5 +76,5 @@ def test_failover_to_another_master_loses_no_message(
 @pytest.mark.timeout(300)
 @pytest.mark.usefixtures("_with_long")
 @pytest.mark.parametrize("scenario", [*scenarios.SIDE_BY_SIDE, *scenarios.ALONE])
-def test_long_lasting_fault(today: Day, scenario: scenarios.Scenario) -> None:
+def test_long_network_fault_causes_no_uncounted_loss(today: Day, scenario: scenarios.Scenario) -> None:
     _tell(scenario, scenario(today, _OUT_LONG_S))

@@ -90,7 +90,7 @@ def test_version_resource_is_a_valid_expression_with_all_fields() -> None:
     assert (texts["ProductName"], texts["ProductVersion"]) == ("NEP Studio", "1.2.3")
 
 
-def test_ico_file_holds_each_picture_at_its_offset() -> None:
+def test_ico_file_holds_each_image_at_its_offset() -> None:
     pictures = {side: b"\x89PNG" + bytes([side % 256]) * side for side in SIDES}
     made = ico(pictures)
     assert struct.unpack_from("<HHH", made) == (0, 1, len(SIDES))
@@ -170,7 +170,7 @@ def test_zip_is_sorted_and_reproducible(context: Context) -> None:
     assert make_zip(context).read_bytes() == first
 
 
-def test_dll_of_wine_is_rejected(context: Context) -> None:
+def test_wine_dll_is_rejected(context: Context) -> None:
     refuse_files_of_wine(context.frozen)
     (context.frozen / "_internal" / "version.dll").write_bytes(b"MZ" + bytes(62) + b"Wine builtin DLL\0")
     with pytest.raises(PackageError, match=r"files of Wine: version\.dll"):

@@ -48,7 +48,7 @@ def start(peers, master, tmp_path):
     return run
 
 
-def test_program_for_the_original_exchanges_messages_with_it(peers, start):
+def test_program_written_for_the_original_package_exchanges_messages_with_the_original(peers, start):
     program = (SCRIPTS / "javascript_peer.js").read_text(encoding="utf-8")
     subscribers = [
         peers.start("nep-js", "subscriber", "to_old"),

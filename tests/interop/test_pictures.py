@@ -31,7 +31,7 @@ def saw(subscriber, colour):
     )
 
 
-def test_pictures_are_exchanged_in_every_direction(peers, master):
+def test_images_are_exchanged_in_every_direction(peers, master):
     subscribers = [peers.start(kind, "subscriber", "camera", form) for kind, form in PEERS]
     publishers = [peers.start(kind, "publisher", "camera", form) for kind, form in PEERS]
     for program in (*subscribers, *publishers):

@@ -107,7 +107,9 @@ def test_roslib_decodes_every_compression(clients: Peers, server: WebServer, nod
     page.wait(lambda: "failed" in str(page.got[-1]), "the refusal of a parameter")
 
 
-def test_roslib_receives_the_close_of_the_server(clients: Peers, master: Master, node: nep.Node) -> None:
+def test_roslib_receives_a_close_frame_when_the_server_closes(
+    clients: Peers, master: Master, node: nep.Node
+) -> None:
     settings = WebSettings(port=0, master=master.address)
     with WebServer(settings) as first:
         page = started(clients, "roslib", first)

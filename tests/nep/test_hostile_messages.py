@@ -73,7 +73,7 @@ def test_echo_shows_every_hostile_message(master, type_in, words):
         assert len([json.loads(line) for line in done.stdout.splitlines()]) == len(PAYLOADS)
 
 
-def test_log_command_shows_every_hostile_record_and_the_next_one(master, type_in, capfd):
+def test_log_command_shows_every_hostile_record_and_the_next_valid_record(master, type_in, capfd):
     honest = json.dumps({"level": "info", "text": "honest", "node": "honest"}).encode()
     payloads = (*hostile.payloads(RECORD), honest)
     with (
@@ -116,7 +116,7 @@ def test_alarms_survive_hostile_values():
     }
 
 
-def test_bridge_forwards_the_message_after_hostile_ones():
+def test_bridge_forwards_the_next_message_after_hostile_messages():
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/pose", direction="both")) as bridge:
         publisher, subscriber = a.node("evil").new_pub("/pose"), b.node("ears").new_sub("/pose")
         for payload in PAYLOADS:
@@ -129,7 +129,7 @@ def test_bridge_forwards_the_message_after_hostile_ones():
         eventually(lambda: {"honest": True} in [payload for _is, payload in [subscriber.listen()]])
 
 
-def test_recorder_and_exports_keep_the_message_after_hostile_ones(tmp_path):
+def test_recorder_and_exports_keep_the_next_message_after_hostile_messages(tmp_path):
     payloads = [each for each in hostile.payloads(POSE, share=5) if len(each) < 1_000_000]
     with (
         nep.node("recorder", "memory", master="hostile") as node,
@@ -148,7 +148,7 @@ def test_recorder_and_exports_keep_the_message_after_hostile_ones(tmp_path):
     assert "honest" in written.path.read_text(encoding="utf-8")
 
 
-def test_blackboard_keeps_the_perception_after_hostile_ones():
+def test_blackboard_keeps_the_next_perception_after_hostile_messages():
     with nep.node("watcher", "memory", master="hostile") as node:
         board = nep.Blackboard(node)
         board.watch("/blackboard")

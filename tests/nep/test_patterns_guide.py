@@ -38,5 +38,5 @@ def test_guide_program_prints_the_documented_output(master: Master, head: str) -
     assert printed.splitlines() == said
 
 
-def test_each_pattern_has_its_program() -> None:
+def test_patterns_guide_has_one_program_per_pattern() -> None:
     assert len(_programs()) == 6

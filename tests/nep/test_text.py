@@ -64,12 +64,12 @@ class Endless(dict[str, object]):
     ],
     ids=lambda value: str(type(value)),
 )
-def test_bounded_text_of_any_value(value: object, text: str) -> None:
+def test_values_are_formatted_as_bounded_text(value: object, text: str) -> None:
     assert bounded_str(value) == text
     bounded_str(value).encode()
 
 
-def test_only_the_shown_part_of_a_value_is_read() -> None:
+def test_only_the_displayed_part_of_a_value_is_read() -> None:
     endless = Endless()
     assert len(bounded_str(endless)) <= 201
     assert endless.read < 1_000

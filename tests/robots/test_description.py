@@ -265,7 +265,7 @@ NUMBERS = {"type": "array", "items": {"type": "number"}}
         ({"type": "object"}, "[" * 100_000, "[" * 100_000),
     ],
 )
-def test_typed_text_is_parsed_to_a_list_or_object(described, words, value):
+def test_entered_text_is_parsed_to_a_list_or_object(described, words, value):
     made = parse_value(parameter(**described), words)
     assert made == value
     assert repr(made) == repr(value)  # 1 is not 1.0, and not True

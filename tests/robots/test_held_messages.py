@@ -10,7 +10,7 @@ def message(publisher: int, seq: int = 1) -> nep.Message:
     return nep.Message("/Pepper/answer", b"{}", "json", "robot/answer", publisher=publisher, seq=seq)
 
 
-def test_many_messages_of_one_publisher_displace_only_its_own() -> None:
+def test_full_queue_of_a_publisher_evicts_only_messages_of_that_publisher() -> None:
     held = HeldMessages(per_publisher=2)
     held.add(message(1))
     for seq in range(1000):
@@ -19,7 +19,7 @@ def test_many_messages_of_one_publisher_displace_only_its_own() -> None:
     assert not held
 
 
-def test_many_publishers_displace_no_earlier_one() -> None:
+def test_publishers_beyond_the_limit_do_not_evict_earlier_publishers() -> None:
     held = HeldMessages(publishers=8)
     for publisher in range(1000):
         held.add(message(publisher))

@@ -25,7 +25,7 @@ def test_thousands_separators_are_rejected_instead_of_removed(text: str) -> None
 
 
 @pytest.mark.parametrize("text", EXAMPLES["not_numbers"])
-def test_other_text_is_rejected(text: str) -> None:
+def test_text_that_is_not_a_number_is_rejected(text: str) -> None:
     with pytest.raises(TypedNumberError) as caught:
         parse_number(text)
     assert not caught.value.has_separators

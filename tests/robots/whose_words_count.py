@@ -170,7 +170,7 @@ class WhoseWordsCount:
         assert side.stop_says() == "Pepper didn't reply"
 
     @pytest.mark.parametrize("silent", [False, True])
-    def test_stop_needs_an_answer_of_every_program_with_the_robot_name(
+    def test_stop_requires_an_answer_of_every_program_with_the_robot_name(
         self, pepper: WireRobot, master: Master, side: Side, silent: bool
     ) -> None:
         side.meet(pepper.described, pepper._node.id)
@@ -185,7 +185,7 @@ class WhoseWordsCount:
             twin.close()
 
     @pytest.mark.parametrize("states", [("succeeded",), ("accepted", "running", "succeeded")], ids=len)
-    def test_answer_of_an_unlisted_publisher_is_held_until_the_master_lists_it(
+    def test_answer_of_an_unlisted_publisher_is_queued_until_the_master_lists_the_publisher(
         self, master: Master, side: Side, states: tuple[str, ...]
     ) -> None:
         """The robot makes its answer topic only when it has something to say."""
@@ -213,7 +213,7 @@ class WhoseWordsCount:
         assert side.stop()
         assert len(pepper.heard("stop")) == 1
 
-    def test_first_program_of_a_name_stays_the_robot_and_the_conflict_is_reported(
+    def test_first_program_with_a_robot_name_is_used_and_the_conflict_is_reported(
         self, pepper: WireRobot, evil: nep.Node, side: Side
     ) -> None:
         side.meet(pepper.described, pepper._node.id)

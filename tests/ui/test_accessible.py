@@ -178,7 +178,9 @@ def test_alert_with_an_increased_count_is_not_announced_again(
     assert said[1:] == ["The camera has been silent for 4 s."]
 
 
-def test_result_of_a_stop_is_announced_without_run_times(qtbot, theme: Theme, said: list[str]) -> None:
+def test_stop_result_is_announced_once_and_running_times_are_not(
+    qtbot, theme: Theme, said: list[str]
+) -> None:
     bar = RunBar(theme)
     qtbot.addWidget(bar)
     bar.show()

@@ -62,10 +62,10 @@ def test_qt_warning_fails_the_test_that_caused_it(report: str) -> None:
     assert "FAILED test_inner.py::test_warns -" in report or "FAILED test_inner.py::test_warns\n" in report
 
 
-def test_qt_warning_at_teardown_fails_the_test_too(report: str) -> None:
+def test_qt_warning_at_teardown_fails_the_test_that_caused_it(report: str) -> None:
     assert "ERROR test_inner.py::test_warns_when_closed" in report
     assert "closing hurts" in report
 
 
-def test_tests_with_known_noise_or_no_warning_pass(report: str) -> None:
+def test_expected_qt_warnings_do_not_fail_a_test(report: str) -> None:
     assert "1 failed, 3 passed, 1 error" in report

@@ -13,7 +13,7 @@ OURS = {"LD_LIBRARY_PATH": "/opt/nep-studio/_internal", "_PYI_ARCHIVE_FILE": "/o
     ("original", "inherited"),
     [({}, {}), ({"LD_LIBRARY_PATH_ORIG": "/usr/games"}, {"LD_LIBRARY_PATH": "/usr/games"})],
 )
-def test_child_process_gets_the_original_library_paths(
+def test_child_process_receives_the_original_library_paths(
     original: dict[str, str], inherited: dict[str, str]
 ) -> None:
     environ = {"HOME": "/home/ana", **OURS, **original}

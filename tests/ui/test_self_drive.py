@@ -23,7 +23,7 @@ def drive(qtbot, window: MainWindow, commands: Commands, folder: Path, steps: li
     return driver
 
 
-def test_every_tour_step_waits_for_its_condition_before_the_screenshot(
+def test_every_tour_step_waits_for_its_condition_before_its_screenshot(
     qtbot, window: MainWindow, commands: Commands, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     looks: list[int] = []

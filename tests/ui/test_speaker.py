@@ -84,7 +84,9 @@ def test_voice_is_busy_until_its_engine_has_finished(qtbot, speaker, engine) -> 
     assert speaker.problem == ""
 
 
-def test_slow_engine_does_not_block_the_caller_and_stop_overtakes_it(qtbot, speaker, engine) -> None:
+def test_slow_engine_does_not_block_the_caller_and_stop_cancels_pending_speech(
+    qtbot, speaker, engine
+) -> None:
     engine.may_begin.clear()
     speaker.speak("Hello", "en", 0.5)
     speaker.play(((440.0, 0.1),), 0.5)
@@ -98,7 +100,7 @@ def test_slow_engine_does_not_block_the_caller_and_stop_overtakes_it(qtbot, spea
     assert [each for each in engine.did if isinstance(each, tuple)] == [("Again", 0.5)]
 
 
-def test_late_end_of_a_stopped_speech_does_not_end_the_next_one(qtbot, speaker, engine) -> None:
+def test_late_end_of_a_stopped_speech_does_not_end_the_next_speech(qtbot, speaker, engine) -> None:
     speaker.speak("Hello", "en", 0.5)
     qtbot.waitUntil(lambda: engine.end is not None)
     first, engine.end = engine.end, None
@@ -111,7 +113,7 @@ def test_late_end_of_a_stopped_speech_does_not_end_the_next_one(qtbot, speaker, 
     assert [each for each in engine.did if isinstance(each, tuple)] == [("Hello", 0.5), ("Again", 0.5)]
 
 
-def test_language_without_a_voice_ends_at_once_with_a_reason(qtbot, speaker) -> None:
+def test_speech_in_a_language_without_a_voice_ends_immediately_with_a_reason(qtbot, speaker) -> None:
     speaker.speak("Bonjour", "fr", 0.5)
     qtbot.waitUntil(lambda: not speaker.is_busy)
     assert speaker.problem == "This computer has no voice for French."
@@ -142,7 +144,7 @@ def test_speaker_without_audio_libraries_is_silent_with_a_reason(qtbot) -> None:
     speaker.close()
 
 
-def test_voice_engine_that_crashes_in_its_trial_process_is_not_created(qtbot, monkeypatch, caplog) -> None:
+def test_voice_engine_that_crashes_in_its_test_process_is_not_created(qtbot, monkeypatch, caplog) -> None:
     crash = [sys.executable, "-c", "import os; os.kill(os.getpid(), 11)"]
     assert not passes_trial(crash)
     assert "the test process exited with" in caplog.text
@@ -153,7 +155,7 @@ def test_voice_engine_that_crashes_in_its_trial_process_is_not_created(qtbot, mo
     assert QtEngine().speak("Hello", "en", 0.5, lambda: None) == no_voice_message("en")
 
 
-def test_voice_engine_trial_that_hangs_is_terminated(monkeypatch) -> None:
+def test_hanging_test_process_of_the_voice_engine_is_terminated(monkeypatch) -> None:
     monkeypatch.setattr("app.ui.speaker.TRIAL_TIMEOUT_S", 0.2)
     assert not passes_trial([sys.executable, "-c", "import threading; threading.Event().wait()"])
     hangs = "import threading; from app.ui import speaker; speaker.TRIAL_TIMEOUT_S = 0.2; "
@@ -173,7 +175,7 @@ def test_tone_has_the_requested_pitch_duration_and_volume_without_clicks() -> No
     assert samples((), 1.0) == b""
 
 
-def test_reason_for_silent_robots_names_what_to_install() -> None:
+def test_message_about_a_missing_voice_names_the_packages_or_settings_to_install() -> None:
     assert voice_text("", has_engine=True) == "Robots speak with the voice of this computer."
     silent = voice_text("", has_engine=False, platform="linux")
     assert silent.startswith(

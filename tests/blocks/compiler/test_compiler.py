@@ -241,7 +241,7 @@ def test_blocks_without_event_block_are_reported():
     assert [severity for severity, _ in sentences(workspace(started(), say("Hi")))] == ["info"]
 
 
-def test_loose_value_block_is_reported():
+def test_detached_value_block_is_reported():
     for value in (number(1), boolean(True), block("values_join", A=text("a"), B=text("b"))):
         ((severity, sentence),) = sentences(workspace(started(), value))
         assert severity == "info"
@@ -254,7 +254,7 @@ def test_message_block_outside_message_script_is_a_warning():
     assert play(saved).lines == [""]
 
 
-def test_disabled_block_is_skipped_but_editor_absence_mark_is_ignored():
+def test_user_disabled_block_is_skipped_but_block_marked_robot_absent_is_compiled():
     off = say("off") | {"enabled": False}
     manual = say("manual") | {"disabledReasons": ["MANUALLY_DISABLED"]}
     absent = say("on") | {"disabledReasons": ["robot absent"]}

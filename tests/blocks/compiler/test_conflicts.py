@@ -40,7 +40,7 @@ def test_two_started_scripts_that_move_the_base_conflict() -> None:
     )
 
 
-def test_conflict_names_another_part() -> None:
+def test_conflict_message_names_the_shared_robot_part() -> None:
     (problem,) = conflicts(started(look("a")), started(look("b")))
     assert "“look” both use the face of Pepper" in problem.message
 

@@ -183,20 +183,20 @@ def test_compiled_expression_matches_reference_result(tree):
     assert type(written[0]) is type(expected)
 
 
-def test_number_with_thousands_of_digits_converts_to_text() -> None:
+def test_number_with_thousands_of_digits_is_converted_to_text() -> None:
     assert as_text(2**16384) == "1.1897314953572318e+4932"
     assert as_text(-(2**13999)).startswith("-")
     assert len(as_text(2**13999)) == 4215
 
 
-def test_list_with_number_of_thousands_of_digits_converts_to_text() -> None:
+def test_list_with_number_of_thousands_of_digits_is_converted_to_text() -> None:
     assert as_text([1, 2**16384, "a"]) == '[1, "1.1897314953572318e+4932", "a"]'
     assert as_text({"big": (2**16384,), 2**16384: 1}) == (
         '{"big": ["1.1897314953572318e+4932"], "1.1897314953572318e+4932": 1}'
     )
 
 
-def test_self_containing_list_converts_to_text() -> None:
+def test_self_containing_list_is_converted_to_text() -> None:
     items: list[object] = [1]
     items.append(items)
     assert as_text(items) == '[1, "…"]'

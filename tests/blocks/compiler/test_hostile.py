@@ -91,7 +91,7 @@ def filled(draw, described, depth: int) -> dict[str, object]:
     max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
 )
 @given(st.lists(blocks(), max_size=4), texts, st.lists(texts, max_size=3))
-def test_program_calls_only_known_names(tops, name, variables):
+def test_generated_program_calls_only_known_functions(tops, name, variables):
     saved = workspace(started(*copy.deepcopy(tops)), *tops, variables=tuple(variables))
     program = compile_behaviour(saved, [robot()], name=name)
     check(program.source)

@@ -81,7 +81,7 @@ def test_variable_set_in_any_script_is_not_reported(sets):
     assert told(started(add()), stack(block("events_message", TOPIC="/x"), sets())) == []
 
 
-def test_changed_number_starts_at_zero_but_list_must_be_set():
+def test_incremented_number_defaults_to_zero_but_list_must_be_set():
     change = block("variables_change", VAR={"id": "scores"}, BY=number(1))
     assert told(started(change, write(get("scores")))) == []
     assert told(started(change, add())) == [NEVER]

@@ -26,7 +26,7 @@ def publish(topic: str) -> dict[str, object]:
 
 @pytest.mark.parametrize("topic", ["/Rover/command", "robot_action"])
 @pytest.mark.parametrize("kind", ["messages_publish", "messages_publish_field"])
-def test_program_that_publishes_on_robot_topic_uses_and_moves_that_robot(topic: str, kind: str) -> None:
+def test_publishing_on_robot_topic_counts_as_using_and_moving_that_robot(topic: str, kind: str) -> None:
     content = workspace(started(block(kind, "p", TOPIC=topic, VALUE=text("hello"))))
     program = compile_behaviour(content, [ROVER])
     assert (program.robots, program.moves) == (("Rover",), ("Rover",))
@@ -36,7 +36,7 @@ def test_program_that_publishes_on_robot_topic_uses_and_moves_that_robot(topic: 
     assert Program.from_json(program.to_json()).moves == ("Rover",)
 
 
-def test_publishing_on_other_topics_moves_no_robot() -> None:
+def test_publishing_on_other_topics_does_not_count_as_moving_a_robot() -> None:
     program = compile_behaviour(workspace(started(publish("/weather"))), [ROVER])
     assert (program.robots, program.moves, program.problems) == ((), (), ())
 
@@ -47,7 +47,7 @@ def test_publishing_on_topic_of_virtual_robot_is_not_a_problem() -> None:
     assert (program.moves, program.problems) == (("Rover",), ())
 
 
-def test_topics_map_to_the_robots_they_move() -> None:
+def test_robots_moved_by_a_command_or_world_topic_are_determined() -> None:
     far = replace(ROVER, topics=replace(ROVER.topics, command="/far", world="/far/world"))
     assert robots_moved_by("/far", [PEPPER, far]) == ("Rover",)
     assert robots_moved_by("/far/world", [PEPPER, far]) == ("Rover",)

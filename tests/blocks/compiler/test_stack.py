@@ -43,7 +43,7 @@ def program(tried: Stack) -> Program:
     ],
     ids=["and all below", "the first", "a function", "inside another", "of the toolbox"],
 )
-def test_tried_block_and_all_blocks_below_it_run(tried: Stack, says: list[str]) -> None:
+def test_trial_runs_the_selected_block_and_all_blocks_below(tried: Stack, says: list[str]) -> None:
     made = tried.workspace(behaviour())
     assert made is not None
     link = play(made).link
@@ -51,19 +51,19 @@ def test_tried_block_and_all_blocks_below_it_run(tried: Stack, says: list[str]) 
     assert program(tried).starts == 1
 
 
-def test_tried_event_block_runs_the_blocks_below_it() -> None:
+def test_trial_of_event_block_runs_the_blocks_below() -> None:
     made = program(Stack("hat", "hat"))
     assert "when_touched" not in made.source
     assert "on_start" in made.source
     assert Stack("hat", "hat", started() | {"id": "hat"}).workspace(behaviour()) is None, "nothing is below"
 
 
-def test_tried_blocks_keep_their_ids_for_highlight_and_errors() -> None:
+def test_trial_program_keeps_block_ids_for_highlights_and_errors() -> None:
     assert "step('2')" in program(Stack("2")).runnable
     assert "step('1')" not in program(Stack("2")).runnable
 
 
-def test_tried_value_block_is_printed() -> None:
+def test_trial_of_value_block_prints_its_value() -> None:
     made = Stack("bat", "value", BATTERY).workspace(behaviour())
     assert made is not None
     assert SHOW_BLOCK_ID in compile_behaviour(made, [robot()]).runnable
@@ -73,7 +73,7 @@ def test_tried_value_block_is_printed() -> None:
     assert play(made).lines == ["2"]
 
 
-def test_deleted_block_yields_no_program() -> None:
+def test_trial_of_deleted_block_has_no_program() -> None:
     assert Stack("nowhere").workspace(behaviour()) is None
     assert Stack("nowhere").workspace({}) is None
 

@@ -45,7 +45,7 @@ def test_sensors_and_actions_have_different_search_words():
     assert sensor_search_words(["walk"]).words == ""
 
 
-def test_compound_names_are_matched_by_their_parts():
+def test_compound_action_name_is_searchable_by_its_words():
     assert "wink twice" in action_search_words(["wink_twice"]).english
 
 

@@ -124,7 +124,7 @@ def test_restarted_script_cancels_its_robot_task():
     assert run.runtime.error is None
 
 
-def test_stop_other_scripts_ends_them_and_cancels_robot_tasks():
+def test_stop_other_scripts_ends_other_scripts_and_cancels_robot_tasks():
     link = FakeLink()
     link.held = {"say"}
     run = begin(
@@ -207,7 +207,7 @@ def test_broadcast_needs_a_name(name):
 @pytest.mark.parametrize(
     "name", ["start quiz", "👍", "Olé “x”", "-1", str(2**64 - 1), "x" * 500, "{name}", "%NAME"]
 )
-def test_broadcast_name_may_be_any_text_and_outer_spaces_are_ignored(name):
+def test_broadcast_name_may_be_any_text_and_surrounding_spaces_are_ignored(name):
     run = play(workspace(started(broadcast(f" {name} ")), received(name, write(text("ran")))))
     assert (run.program.problems, run.lines) == ((), ["ran"])
 

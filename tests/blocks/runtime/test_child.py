@@ -123,7 +123,7 @@ def test_error_names_its_block(running, pepper, master):
     assert len(pepper.heard("stop")) == 1
 
 
-def test_pause_step_and_resume(running, master):
+def test_program_can_be_paused_stepped_and_resumed(running, master):
     first, second = write(text("1")) | {"id": "a"}, write(text("2")) | {"id": "b"}
     running.start(workspace(started(first, second)), master=master.address, paused=True)
     paused = running.until("paused")
@@ -135,7 +135,7 @@ def test_pause_step_and_resume(running, master):
     assert running.until("ended")["ok"] is True
 
 
-def test_breakpoint_pauses_before_its_block_and_resume_passes_it(running, master):
+def test_breakpoint_pauses_before_its_block_and_resume_runs_the_block(running, master):
     marked = write(text("two")) | {"id": "two", "data": '{"pause": true}'}
     saved = workspace(started(write(text("one")), marked, write(text("three"))))
     running.start(saved, master=master.address)
@@ -152,7 +152,7 @@ def test_breakpoint_pauses_before_its_block_and_resume_passes_it(running, master
     ("shown", "written"),
     [(block("values_compare", A=number(2), B=number(1)), "no"), (text("true"), "true"), (number(2), "2")],
 )
-def test_tried_value_is_formatted_for_people(running, master, shown, written):
+def test_trial_value_is_formatted_for_display(running, master, shown, written):
     saved = workspace(started(write(shown)))
     program = replace(compile_behaviour(saved, []), shows_value=True)
     running.order(do="start", program=program.to_json(), robots=[], master=master.address)
@@ -245,7 +245,7 @@ def test_output_is_bounded(running, master):
         {"do": "start", "program": 1, "robots": 2},
     ],
 )
-def test_invalid_start_order_is_rejected_with_explanation(running, order):
+def test_invalid_start_request_is_rejected_with_explanation(running, order):
     running.stdin.write("no json\n")
     running.order(do="pause")
     running.order(**order)
@@ -272,7 +272,7 @@ def values_of(said):
     return [(value["id"], value["text"]) for values in lines for value in values]
 
 
-def test_variable_values_are_reported_including_final_ones(running, master):
+def test_variable_values_are_reported_including_final_values(running, master):
     saved = workspace(started(set_score(number(7)), set_score(number(8))), variables=("score",))
     running.start(saved, master=master.address)
     running.until("ended")

@@ -43,7 +43,7 @@ FACTORIAL = define(
 )  # fmt: skip
 
 
-def test_function_with_inputs_and_result() -> None:
+def test_function_with_inputs_returns_its_result() -> None:
     run = play(workspace(started(write(call("f", value=True, n=number(6)))), FACTORIAL))
     assert run.lines == ["720"]
     assert run.program.source.startswith(
@@ -217,7 +217,7 @@ def test_inputs_and_returns_outside_their_function_are_skipped_and_reported() ->
         {"items": -5}, {"items": 10**12}, {"items": True}, {"items": "3"},
     ],
 )  # fmt: skip
-def test_any_extra_state_in_file_still_compiles(extra) -> None:
+def test_blocks_with_arbitrary_extra_state_compile(extra) -> None:
     tops = []
     for each in ("functions_define", "functions_define_result", "functions_call", "lists_create"):
         tops.append(block(each, NAME="x") | {"extraState": extra})

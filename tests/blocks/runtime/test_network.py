@@ -39,7 +39,7 @@ def network(node, pepper):
     made.close()
 
 
-def test_invoke_is_answered(network, pepper):
+def test_invoked_action_returns_its_output(network, pepper):
     pokes: list[int] = []
     network.set_callbacks(lambda: pokes.append(1), lambda _: None)
     call = network.invoke("Pepper", "say", {"text": "Hi"})
@@ -123,7 +123,7 @@ def test_stop_waits_for_replies_and_names_silent_robots(network, pepper):
     assert outside == []
 
 
-def test_duplicate_replies_to_own_pause_stop_are_not_foreign_stops(network, pepper, node):
+def test_duplicate_replies_to_own_stop_for_pause_are_not_reported_as_foreign_stop(network, pepper, node):
     pepper.slow = {"say"}
     outside: list[str] = []
     network.set_callbacks(lambda: None, outside.append)

@@ -116,7 +116,7 @@ def test_program_can_be_paused_while_question_is_shown():
     assert them.run.lines == ["Ada"]
 
 
-def test_question_without_anyone_to_answer_is_an_error():
+def test_question_outside_studio_is_an_error():
     run = play(workspace(started(ask("Name?") | {"id": "q"})))
     assert run.runtime.error is not None
     assert run.runtime.error.block == "q"
@@ -137,7 +137,7 @@ def test_question_without_anyone_to_answer_is_an_error():
         (text("x" * 9999), "x" * MAX_QUESTION_LENGTH),
     ],
 )
-def test_any_value_can_be_asked_as_question(asked, shown):
+def test_value_of_any_type_can_be_asked_as_question(asked, shown):
     them = Person(workspace(started(ask(asked))))
     them.answers(shown, "")
     them.run.end()
@@ -178,7 +178,7 @@ def test_answer_can_be_compared_and_used_as_count():
     assert them.run.lines == ["hop", "hop", "yes"]
 
 
-def test_chosen_option_is_the_answer_and_next_question_has_no_choices():
+def test_selected_option_is_the_answer_and_next_question_has_no_choices():
     them = Person(
         workspace(started(choose(list_of(text("cat"), text("dog"))), write(answer()), ask("Name?")))
     )
@@ -200,7 +200,7 @@ def test_chosen_option_is_the_answer_and_next_question_has_no_choices():
         (text("x" * 9999), "x" * MAX_CHOICE_LENGTH, text("x" * 9999)),
     ],
 )
-def test_chosen_answer_is_the_list_item_itself(item, shown, same_as):
+def test_selected_answer_is_the_list_item_itself(item, shown, same_as):
     same = block("values_compare", A=answer(), RELATION="==", B=same_as)
     them = Person(workspace(started(choose(list_of(item)), write(same))))
     assert them.sees("Which?").choices == (shown,)
@@ -209,7 +209,7 @@ def test_chosen_answer_is_the_list_item_itself(item, shown, same_as):
     assert them.run.lines == ["yes"]
 
 
-def test_choices_are_deduplicated_and_escape_gives_empty_answer():
+def test_choices_are_deduplicated_and_escape_returns_an_empty_answer():
     split = block("lists_split", TEXT=text("a,b,,a,c"), BETWEEN=text(","))
     them = Person(workspace(started(choose(split), write(block("texts_empty", TEXT=answer())))))
     assert them.sees("Which?").choices == ("a", "b", "c")
@@ -218,7 +218,7 @@ def test_choices_are_deduplicated_and_escape_gives_empty_answer():
     assert them.run.lines == ["yes"]
 
 
-def test_text_and_choice_questions_wait_for_each_other():
+def test_text_and_choice_questions_are_asked_one_after_another():
     them = Person(workspace(started(ask("one")), started(choose(list_of(text("a")), "two"), write(answer()))))
     until(lambda: len(them.run.runtime.scheduler.snapshot().blocks) == 2)
     first = them.shown[-1]
@@ -250,7 +250,7 @@ def test_invalid_choices_are_an_error_on_the_block(choices, sentence):
     them.run.stop()
 
 
-def test_choice_question_without_anyone_to_answer_is_an_error():
+def test_choice_question_outside_studio_is_an_error():
     run = play(workspace(started(choose(list_of(text("a"))))))
     assert run.runtime.error is not None
     assert run.runtime.error.sentence == (

@@ -43,11 +43,11 @@ def held(name: str, **feedback: object) -> RobotCall:
         ("say", {"text": "hello"}, {"word": "hello"}, {"text": "hello"}),
     ],
 )
-def test_resumed_action_does_only_the_remainder(name, given, feedback, rest) -> None:
+def test_resumed_action_executes_only_the_remainder(name, given, feedback, rest) -> None:
     assert remaining_input(action(name), given, held(name, **feedback)) == rest
 
 
-def test_action_not_started_before_pause_is_done_in_full() -> None:
+def test_action_not_started_before_pause_is_executed_in_full() -> None:
     call = replace(held("walk"), has_started=False)
     assert remaining_input(action("walk"), {"distance": 1.0}, call) == {"distance": 1.0}
 
@@ -68,7 +68,7 @@ def test_driving_action_without_progress_feedback_is_not_resumed() -> None:
         ("wave", {"hand": "left"}, {}, False),  # it begins again
     ],
 )
-def test_unknown_remainder_is_detected(name, given, feedback, unknown) -> None:
+def test_unknown_remainder_of_paused_action_is_detected(name, given, feedback, unknown) -> None:
     call = held(name, **feedback)
     assert is_remainder_unknown(action(name), given, call) is unknown
     assert not is_remainder_unknown(action(name), given, replace(call, has_started=False))
@@ -87,7 +87,7 @@ class Blind(FakeLink):
         self.answer(call, "canceled")
 
 
-def test_warning_before_and_message_after_skipping_unknown_remainder() -> None:
+def test_skipping_unknown_remainder_warns_before_and_reports_after_resume() -> None:
     walk = block("robot_pepper_do_walk", "w", ROBOT="Pepper", DISTANCE=number(1))
     blocks = workspace(started(walk | {"next": {"block": write(text("after"))}}))
     link = Blind()
@@ -120,7 +120,7 @@ def test_no_message_when_remainder_is_resumed() -> None:
     assert run.end().lines == []
 
 
-def test_measured_value_is_found_by_unit() -> None:
+def test_remainder_parameter_is_found_by_its_unit() -> None:
     assert remainder_parameter(action("walk"), {"distance": 1.0, "speed": 0.3}) == "distance"
     assert remainder_parameter(action("turn"), {"angle": 90, "speed": 40}) == "angle"
     assert remainder_parameter(action("say"), {"text": "hello"}) is None

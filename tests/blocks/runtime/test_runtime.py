@@ -86,7 +86,7 @@ def test_canceled_action_is_not_an_error():
     assert (run.runtime.error, run.lines) == (None, ["after"])
 
 
-def test_robot_that_does_not_answer_is_named(monkeypatch):
+def test_robot_that_does_not_reply_is_named(monkeypatch):
     monkeypatch.setattr("app.blocks.runtime.robot_handle.FIRST_REPLY_TIMEOUT_S", 0.05)
     link = FakeLink()
     link.answers = {"say": ("sent", {}, "")}
@@ -276,7 +276,7 @@ def test_concurrent_variable_changes_are_not_lost():
 # ---- control
 
 
-def test_repeat_while_if_else_and_stop():
+def test_while_loop_if_else_and_stop_blocks_run():
     count = block("variables_change", VAR={"id": "n"}, BY=number(1))
     below = block("values_compare", A=get("n"), RELATION="<", B=number(3))
     loop = block("control_while", MODE="while", CONDITION=below, BODY=[count])
@@ -360,7 +360,7 @@ def test_error_in_statement_names_statement_block():
     )
 
 
-def test_pause_and_single_steps(running):
+def test_paused_program_executes_one_block_per_step(running):
     run = running(workspace(started(*(write(text(f"{n}")) | {"id": f"w{n}"} for n in range(3)))), paused=True)
     scheduler = run.runtime.scheduler
     for n in range(3):

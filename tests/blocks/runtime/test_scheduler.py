@@ -57,7 +57,7 @@ def test_scripts_take_turns_block_by_block(stage):
     assert stage.did == ["a1", "b1", "a2", "b2", "a3", "b3"]
 
 
-def test_only_script_with_the_turn_runs(stage):
+def test_only_one_script_executes_at_a_time(stage):
     inside, most = [0], [0]
 
     def work(_name: str) -> None:
@@ -74,7 +74,7 @@ def test_only_script_with_the_turn_runs(stage):
     assert most == [1]
 
 
-def test_pause_holds_each_script_before_its_next_block(stage):
+def test_pause_suspends_each_script_before_its_next_block(stage):
     stage.scheduler.pause()
     stage.script("a", stage.steps("a1", "a2"))
     until(lambda: stage.scheduler.snapshot().is_paused)
@@ -166,14 +166,14 @@ def test_other_scripts_run_while_one_waits(stage):
     assert stage.did == ["b1", "b2", "waited"]
 
 
-def test_wait_with_timeout_gives_up(stage):
+def test_wait_returns_false_after_its_timeout(stage):
     found = []
     stage.script("a", lambda _: found.append(stage.scheduler.wait_until(lambda: False, 0.03)))
     stage.join()
     assert found == [False]
 
 
-def test_poke_from_another_thread_ends_wait(stage):
+def test_wake_from_another_thread_ends_the_wait(stage):
     arrived = []
 
     def work(_name: str) -> None:
@@ -269,7 +269,7 @@ def test_slow_motion_delays_each_block_while_other_scripts_run(stage):
     assert 0.1 <= time.monotonic() - began < 5.0
 
 
-def test_slow_motion_ends_at_once_when_turned_off(stage):
+def test_slow_motion_ends_immediately_when_disabled(stage):
     stage.scheduler.set_pace(60.0)
     stage.script("a", stage.steps("a1", "a2", "a3"))
     until(lambda: stage.scheduler.snapshot().blocks == ("a1",))
@@ -284,7 +284,7 @@ def test_slow_motion_ends_at_once_when_turned_off(stage):
     assert stage.did == ["a1", "a2", "a3"]
 
 
-def test_interrupted_action_is_held_until_resume_or_its_step(stage):
+def test_interrupted_action_stays_paused_until_resume_or_step(stage):
     def work(_name: str) -> None:
         stage.scheduler.step("drive")
         stage.scheduler.wait_for(stage.scheduler.is_script_paused)

@@ -40,13 +40,13 @@ from tests.blocks.samples import block, get, number, started, workspace, write
         ({"x": 1, "y": [2]}, "other", "{x: 1, y: [2]}"),
     ],
 )
-def test_value_summary(value: object, kind: str, text: str) -> None:
+def test_values_are_formatted_as_short_summaries(value: object, kind: str, text: str) -> None:
     told = display_value("v", value)
     assert (told.kind, told.text) == (kind, text)
     assert VariableValue.from_json(json.loads(json.dumps(told.to_json()))) == told
 
 
-def test_summary_reads_only_what_is_shown() -> None:
+def test_summary_of_large_value_reads_only_the_displayed_part() -> None:
     class Counted(dict[str, object]):
         asked = 0
 
@@ -108,7 +108,7 @@ def test_large_changes_are_reported_in_parts_without_loss() -> None:
     assert {each.id for each in (*first, *rest)} == {f"id v{each}" for each in range(60)}
 
 
-def test_list_modified_during_read_is_harmless() -> None:
+def test_list_modified_during_read_does_not_raise() -> None:
     watched, names = watch(table={"0": 0}, row=[0])
     over = threading.Event()
 
@@ -138,7 +138,7 @@ def test_user_can_set_only_program_variables() -> None:
     assert names["wait"] is wait
 
 
-def test_invalid_variable_line_is_not_a_value() -> None:
+def test_invalid_variable_data_is_rejected_or_truncated() -> None:
     assert VariableValue.from_json([1]) is None
     told = VariableValue.from_json(
         {"id": 5, "kind": "dance", "items": "x", "length": "y", "text": "z" * 10**6}

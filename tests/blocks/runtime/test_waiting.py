@@ -26,7 +26,7 @@ class Queued(FakeLink):
         return call
 
 
-def test_queued_action_shows_awaited_action_then_its_activity(monkeypatch) -> None:
+def test_queued_action_shows_the_awaited_action_and_then_its_own_activity(monkeypatch) -> None:
     monkeypatch.setattr("app.blocks.runtime.robot_handle.TIMEOUT_MARGIN_S", -29.5)  # the limit: half a second
     link = Queued()
     run = begin(link)

@@ -180,7 +180,7 @@ def test_events_from_foreign_nodes_are_ignored_but_sensor_values_are_accepted(
     until(told_by_another)
 
 
-def test_restarted_robot_is_trusted_after_runner_confirms_it(
+def test_restarted_robot_is_trusted_after_confirmation_by_the_runner(
     network: Network, pepper: WireRobot, master: Master
 ) -> None:
     pepper.close()

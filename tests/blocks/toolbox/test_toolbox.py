@@ -53,7 +53,7 @@ def test_block_texts_match_the_design(block_type, expected):
     assert words(block_type) == expected
 
 
-def test_block_icons_are_pictures_and_arguments_are_numbered():
+def test_block_message_placeholders_match_arguments_and_icons_are_defined():
     for definition in BLOCKS.values():
         for number in range(4):
             arguments = definition.get(f"args{number}", [])

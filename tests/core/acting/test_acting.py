@@ -72,7 +72,7 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
     assert "no longer armed" in said
 
 
-def test_invalid_message_is_rejected_with_reason_and_arms_nothing(session: Session) -> None:
+def test_invalid_message_is_rejected_with_reason_without_arming(session: Session) -> None:
     acting = session.acting
     for message, sentence in (
         (SavedMessage("b", "No topic", " "), "Choose a topic first."),
@@ -88,7 +88,7 @@ def test_invalid_message_is_rejected_with_reason_and_arms_nothing(session: Sessi
     assert not acting.arming.is_on
 
 
-def test_shelf_is_saved_to_file_and_damage_is_reported(tmp_path: Path) -> None:
+def test_shelf_is_saved_to_file_and_file_damage_is_reported(tmp_path: Path) -> None:
     first = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
     first.acting.shelf.set_message(STILL)
     first.acting.check()
@@ -118,7 +118,7 @@ def test_shelf_file_of_newer_version_is_not_overwritten(tmp_path: Path) -> None:
     assert path.read_text("utf-8") == data
 
 
-def test_send_results_are_described() -> None:
+def test_send_results_are_formatted() -> None:
     order = SendOrder("a", "Drive", "/cmd_vel", "json", dict)
     for result, words in (
         (SendResult(order, "sent", subscriber_count=2), "received by 2"),

@@ -12,7 +12,7 @@ def made() -> tuple[Arming, list[float]]:
     return Arming(lambda: now[0]), now
 
 
-def test_nothing_is_allowed_before_arming_and_naming_a_target() -> None:
+def test_sending_requires_arming_and_an_allowed_target() -> None:
     arming, _now = made()
     done: list[int] = []
     assert not arming.allow(TOPIC)

@@ -94,7 +94,7 @@ def test_call_times_out_and_can_be_canceled(bench) -> None:
     go_on.set()
 
 
-def test_call_is_not_made_when_disarmed(bench) -> None:
+def test_call_is_not_sent_when_disarmed(bench) -> None:
     asked: list[object] = []
     bench.node.new_server("/sum", asked.append, threads=1)
     bench.arming.disarm()
@@ -103,7 +103,7 @@ def test_call_is_not_made_when_disarmed(bench) -> None:
     assert asked == []
 
 
-def test_call_without_master_times_out_and_is_not_made_later(bench) -> None:
+def test_call_without_master_times_out_and_is_not_sent_later(bench) -> None:
     asked: list[object] = []
     bench.node.new_server("/sum", asked.append, threads=1)
     bench.waiting = []

@@ -40,6 +40,6 @@ def test_ros_point_types_have_their_fields() -> None:
         assert codec_for(msg_type).decode(made.data, {}) == POINT.payload("/camera", msg_type)
 
 
-def test_point_topic_is_below_picture_topic() -> None:
+def test_point_topic_is_below_image_topic() -> None:
     assert default_topic("/robot/camera") == "/robot/camera/point"
     assert default_topic("camera/") == "camera/point"

@@ -104,7 +104,7 @@ def test_invalid_message_fails_with_reason(bench, topic, msg_type, payload) -> N
     assert bench.outbox.all_repeated == ()
 
 
-def test_message_repeats_until_ended(bench) -> None:
+def test_message_repeats_until_stopped(bench) -> None:
     heard = bench.node.new_sub("/cmd_vel", "json")
     bench.arm("/cmd_vel")
     assert bench.outbox.start(order(), 50)

@@ -21,7 +21,7 @@ from nep.errors import NepError
 LOOK = SavedMessage("a", "Look at Aiko", "/robot_action", "json", '{"yaw": {yaw}}', (("yaw", "-12.5"),), 10.0)
 
 
-def test_kept_message_payload_is_built_from_its_values() -> None:
+def test_saved_message_payload_is_built_from_its_values() -> None:
     assert LOOK.payload() == {"yaw": -12.5}
     assert LOOK.with_value("yaw", "left").payload() == {"yaw": "left"}
     with pytest.raises(NepError, match="Fill in “yaw” first"):

@@ -18,7 +18,7 @@ def beside() -> Iterator[BackgroundWorker[str]]:
     made.close()
 
 
-def test_result_is_taken_once(beside) -> None:
+def test_result_is_returned_only_once(beside) -> None:
     found: list[str | None] = []
     beside.submit("a", lambda: threading.current_thread().name)
     until(lambda: bool(found.append(beside.pop_result("a")) or found[-1]))
@@ -43,7 +43,7 @@ def test_only_newest_pending_job_runs(beside) -> None:
     assert beside.pop_result("a") == "slow"
 
 
-def test_job_failure_is_raised_on_take_and_next_job_runs(beside) -> None:
+def test_job_failure_is_raised_when_the_result_is_requested_and_next_job_runs(beside) -> None:
     def fail() -> str:
         raise ValueError("no such luck")
 

@@ -69,7 +69,7 @@ def test_emptied_backpack_can_be_restored(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "content", [b"{", b"\xff\xfe", b"[]", b'{"backpack": 0, "items": []}', b'{"backpack": 1}']
 )
-def test_invalid_backpack_file_is_set_aside_and_reported_once(tmp_path: Path, content: bytes) -> None:
+def test_invalid_backpack_file_is_backed_up_and_reported_once(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "backpack.json").write_bytes(content)
     (tmp_path / "backpack.damaged.json").write_text("an earlier one")
     backpack = Backpack(tmp_path)

@@ -112,7 +112,7 @@ def test_work_discarded_during_journal_write_does_not_reappear(
     assert list(journals.glob("*")) == []
 
 
-def test_hanging_disk_is_reported_when_the_window_closes(
+def test_unresponsive_disk_is_reported_when_the_window_closes(
     on_a_slow_disk: Document, slow: SlowJournal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.core.documents.background_worker.JOIN_TIMEOUT_S", 0.01)
@@ -123,7 +123,7 @@ def test_hanging_disk_is_reported_when_the_window_closes(
     assert on_a_slow_disk.retry_journal()
 
 
-def test_old_journal_is_kept_while_new_one_cannot_be_written(document: Document, journals: Path) -> None:
+def test_old_journal_is_kept_until_the_new_journal_is_written(document: Document, journals: Path) -> None:
     document.apply_edit(STARTED)
     assert document.is_on_disk
     _as_if_dead(journals)
@@ -171,7 +171,7 @@ def test_saved_behaviour_reopens_unchanged_and_its_journal_is_deleted(
     assert (other.name, other.workspace, other.dirty) == ("Grüße", STARTED, False)
 
 
-def test_save_without_file_explains_what_to_do(document: Document) -> None:
+def test_save_without_file_raises_with_advice(document: Document) -> None:
     with pytest.raises(DocumentError, match="choose one"):
         document.save()
 
@@ -441,7 +441,7 @@ def test_short_behaviour_is_compiled_at_once(document: Document) -> None:
     assert compiler._thread is None
 
 
-def test_long_file_opened_in_untouched_tab_does_not_block_the_window(
+def test_long_file_opened_in_unmodified_tab_does_not_block_the_window(
     document: Document, tmp_path: Path
 ) -> None:
     other = Document(lambda: Journal(tmp_path / "other"))

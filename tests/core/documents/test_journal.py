@@ -28,7 +28,7 @@ def _killed_writer(folder: Path) -> None:
     subprocess.run([sys.executable, "-c", code, str(folder)], check=False)
 
 
-def test_unsaved_work_of_running_process_is_not_offered(tmp_path: Path) -> None:
+def test_unsaved_work_of_running_process_is_not_offered_for_recovery(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
     journal.write("Greeting", None, TEXT, {})
     assert unsaved_work(tmp_path) == []
@@ -36,7 +36,7 @@ def test_unsaved_work_of_running_process_is_not_offered(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_unsaved_work_of_killed_process_is_offered(tmp_path: Path) -> None:
+def test_unsaved_work_of_killed_process_is_offered_for_recovery(tmp_path: Path) -> None:
     _killed_writer(tmp_path)
     (unsaved,) = unsaved_work(tmp_path)
     assert unsaved.name == "Greeting"
@@ -58,7 +58,7 @@ def test_journal_is_replaced_atomically(tmp_path: Path) -> None:
     journal.discard()
 
 
-def test_unsaved_work_is_offered_when_its_pid_was_reused(tmp_path: Path) -> None:
+def test_unsaved_work_is_offered_for_recovery_when_its_pid_was_reused(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
     journal.write("Greeting", None, TEXT, {})
     (file,) = tmp_path.glob("*.json")

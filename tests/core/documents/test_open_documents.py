@@ -76,7 +76,7 @@ def as_if_dead(journals: Path) -> None:
         journal.write_text(json.dumps(entry))
 
 
-def test_opened_file_replaces_untouched_behaviour_then_opens_new_tabs(documents, tmp_path) -> None:
+def test_opened_file_replaces_unmodified_behaviour_then_opens_new_tabs(documents, tmp_path) -> None:
     documents.open(file(tmp_path, "A"))
     documents.open(file(tmp_path, "B"))
     assert names(documents) == ["A", "B"]
@@ -95,7 +95,7 @@ def test_opening_an_open_file_shows_its_tab(documents, tmp_path) -> None:
     assert len(documents) == 2
 
 
-def test_invalid_file_changes_no_tab(documents, tmp_path) -> None:
+def test_invalid_file_leaves_all_tabs_unchanged(documents, tmp_path) -> None:
     documents.open(file(tmp_path, "A"))
     (tmp_path / "bad.nepb").write_text("{")
     revision = documents.revision
@@ -170,7 +170,7 @@ def test_save_over_file_of_another_tab_keeps_that_tab_as_unsaved(documents, jour
     assert (journals / first.journal_name).is_file()
 
 
-def test_every_tab_knows_connected_robots_including_later_tabs(documents, tmp_path) -> None:
+def test_connected_robots_are_available_in_every_tab_including_later_tabs(documents, tmp_path) -> None:
     documents.open(file(tmp_path, "A"))
     documents.set_connected([rize.robot("Pepper")])
     documents.set_topics(["/faces"])
@@ -226,7 +226,7 @@ def test_after_crash_files_reopen_as_saved_and_unsaved_work_awaits_recovery(
         {"tabs": [None, {"path": 3}, {"path": "/no/such.nepb", "journal": []}, {}], "current": 7},
     ],
 )
-def test_invalid_tab_settings_open_nothing(documents, kept) -> None:
+def test_invalid_tab_settings_open_only_an_empty_behaviour(documents, kept) -> None:
     documents.restore_tabs(kept, [], ended_well=True)
     assert names(documents) == ["New behaviour"]
 

@@ -29,7 +29,7 @@ def lines(saved, missing: list[Robot], connected: list[Robot]):
     return problem_lines(program.problems, saved, missing, connected, MODELS, program.absent)
 
 
-def test_all_blocks_of_missing_robot_are_one_problem() -> None:
+def test_all_blocks_of_missing_robot_are_reported_as_one_problem() -> None:
     (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [])
     assert line.problem.message == "Pepper isn't connected, so 3 blocks will be skipped."
     assert line.problem.subject == "3 blocks"
@@ -58,23 +58,23 @@ def test_problem_button_describes_its_action() -> None:
     assert line.fixes == (Fix("Show the robots", "connect:Nao 3"),)
 
 
-def test_problem_with_one_block_names_it() -> None:
+def test_problem_with_a_single_block_names_the_block() -> None:
     (line,) = lines(speaks("Pepper", 1), [pepper("Pepper")], [])
     assert line.problem.message == "Pepper isn't connected, so say will be skipped."
 
 
-def test_connected_robot_with_same_abilities_is_suggested_first() -> None:
+def test_connected_robot_with_same_capabilities_is_suggested_first() -> None:
     (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [pepper("Pepper 2")])
     assert [fix.label for fix in line.fixes] == ["Use Pepper 2", "Start a virtual Pepper"]
     assert line.fixes[0].action == "robot.use:Pepper:Pepper 2"
 
 
-def test_robot_of_unknown_model_can_only_be_connected() -> None:
+def test_missing_robot_of_unknown_model_has_no_replacement_suggestion() -> None:
     (line,) = lines(workspace(started(say("Hi"))), [sample("Pepper")], [])
     assert [fix.label for fix in line.fixes] in (["Show the robots"], ["Start a virtual Pepper"])
 
 
-def test_two_missing_robots_are_two_problems() -> None:
+def test_two_missing_robots_are_reported_as_two_problems() -> None:
     both = workspace(
         started(*(block("robot_pepper_do_say", ROBOT=name, TEXT=text("x")) for name in ("A", "B", "A")))
     )

@@ -43,7 +43,7 @@ def test_node_without_traffic_for_a_minute_is_quiet() -> None:
     assert quiet.quiet_keys(30.0 + QUIET_S) == {"1", "2", "3", "4"}
 
 
-def test_restarted_counter_counts_as_traffic() -> None:
+def test_counter_reset_counts_as_traffic() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(2**64 - 1, 5)), 0.0)
     quiet.update(facts(heard(0, 5)), 50.0)
@@ -66,7 +66,7 @@ def test_internal_nep_messages_do_not_count_as_traffic() -> None:
     assert "1" in quiet.quiet_keys(QUIET_S)
 
 
-def test_node_that_left_is_forgotten() -> None:
+def test_departed_node_is_removed() -> None:
     quiet = QuietNodes()
     quiet.update(facts(), 0.0)
     quiet.update(GraphFacts(), 1.0)

@@ -113,7 +113,7 @@ def test_lines_connect_publishers_with_subscribers_and_clients_with_servers() ->
     assert (graph.node_count, graph.topic_count, graph.service_count) == (6, 4, 1)
 
 
-def test_node_kinds_and_names() -> None:
+def test_node_kinds_and_names_are_determined() -> None:
     graph = node_graph(facts(), GraphOptions())
     assert {each.name: (each.kind, each.bridged_network) for each in graph.nodes} == {
         "pepper_driver": ("program", ""),
@@ -125,7 +125,7 @@ def test_node_kinds_and_names() -> None:
     }
 
 
-def test_nodes_are_grouped_by_computer_with_address_or_by_robot_or_not() -> None:
+def test_nodes_are_grouped_by_computer_with_address_or_by_robot_or_left_ungrouped() -> None:
     found = facts()
     by_computer = node_graph(found, GraphOptions()).groups
     assert [(each.key, each.address, each.member_count) for each in by_computer] == [
@@ -205,7 +205,7 @@ def test_wildcard_subscriber_is_connected_to_all_matching_topics() -> None:
 
 
 @pytest.mark.parametrize("group_by", ["computer", "robot"])
-def test_web_pages_have_a_group_and_titles_known_to_the_server(group_by: GroupBy) -> None:
+def test_web_pages_are_grouped_and_titled_by_the_web_server(group_by: GroupBy) -> None:
     pages = (
         replace(node("7", "web_lab:8080_50001"), language="web"),
         replace(node("8", "web_lab:8080_50002"), language="web"),
@@ -218,7 +218,7 @@ def test_web_pages_have_a_group_and_titles_known_to_the_server(group_by: GroupBy
     assert (group.icon, group.member_count, graph.page_count) == ("globe", 2, 2)
 
 
-def test_empty_facts_give_empty_graph() -> None:
+def test_empty_network_data_gives_an_empty_graph() -> None:
     assert node_graph(GraphFacts(), GraphOptions()) == NodeGraph()
 
 

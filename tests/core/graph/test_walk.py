@@ -34,7 +34,7 @@ def test_first_arrow_key_selects_the_leftmost_node() -> None:
     assert move_selection(NodeGraph(), GraphLayout(), None, "right") is None
 
 
-def test_right_key_follows_a_line_and_left_key_goes_back() -> None:
+def test_right_key_follows_a_line_and_left_key_returns() -> None:
     assert walked(GraphSelection("node", "a"), "right", "right") == ["/two", "c"]
     assert walked(GraphSelection("node", "a"), "right", "left") == ["/two", "a"]
     assert walked(GraphSelection("node", "b"), "left", "left") == ["/two", "a"]

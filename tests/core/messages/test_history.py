@@ -16,7 +16,7 @@ def numbers(history: MessageHistory) -> list[int | None]:
     return [kept.seq for kept in history]
 
 
-def test_oldest_messages_are_evicted_and_numbers_stay() -> None:
+def test_oldest_messages_are_evicted_and_message_numbers_are_stable() -> None:
     history = MessageHistory(most_messages=3)
     for number in range(5):
         history.add(message(number))
@@ -51,7 +51,7 @@ def test_history_copies_borrowed_bytes_and_keeps_messages_undecoded() -> None:
     assert [kept.decoded for kept in history] == [UNDECODED]
 
 
-def test_latency_is_fixed_at_arrival() -> None:
+def test_latency_is_computed_once_on_arrival() -> None:
     history = MessageHistory()
     sent = message(1)
     history.add(sent)
@@ -89,7 +89,7 @@ class Watching:
         self.log.append("closed")
 
 
-def test_shallow_history_needs_no_extra_room_and_no_past_messages() -> None:
+def test_shallow_history_requests_no_larger_queue_and_no_past_messages() -> None:
     log: list[str] = []
     feed = SeriesFeed(
         lambda _topic: Watching(log), lambda: 0, lambda topic, room: log.append(f"{topic} {room}")

@@ -72,7 +72,7 @@ def test_identical_bytes_reuse_pixels_for_new_message(images: Images) -> None:
 @pytest.mark.parametrize("size", [(320, 240), (33, 25), (1, 1), (17, 400)])
 @pytest.mark.parametrize("fit", [None, (16, 12), (4, 3), (0, 0)])
 @pytest.mark.parametrize("kind", [".jpg", ".png"])
-def test_picture_is_decoded_again_for_another_size(
+def test_image_is_decoded_again_for_another_size(
     size: tuple[int, int], fit: tuple[int, int] | None, kind: str
 ) -> None:
     frame = np.random.default_rng(1).integers(0, 255, (size[1], size[0], 3), np.uint8)
@@ -92,7 +92,7 @@ def test_picture_is_decoded_again_for_another_size(
 
 
 @pytest.mark.parametrize("place", [0, 1, 5_000, 199_999])
-def test_single_changed_byte_gives_a_new_picture(place: int) -> None:
+def test_single_changed_byte_gives_a_new_image(place: int) -> None:
     shape = {"shape": [100, 2000], "encoding": "mono8"}
     first = Message("/camera", bytes(200_000), "image", "image", seq=1, extension=shape)
     shown, error = decode(first, 1.0)
@@ -105,7 +105,7 @@ def test_single_changed_byte_gives_a_new_picture(place: int) -> None:
     assert reuse_picture(shown, other, 2.0, None) is None
 
 
-def test_picture_is_decoded_for_its_stream(images: Images) -> None:
+def test_received_image_is_decoded_with_its_size_and_sequence_number(images: Images) -> None:
     stream = images.stream("/camera")
     images.offer([jpeg((10, 20, 30), seq=7)])
     until(lambda: stream.picture is not None)
@@ -114,7 +114,7 @@ def test_picture_is_decoded_for_its_stream(images: Images) -> None:
     assert (stream.picture.width, stream.picture.height, stream.picture.seq) == (32, 24, 7)
 
 
-def test_only_newest_picture_of_a_batch_is_decoded(images: Images, monkeypatch) -> None:
+def test_only_newest_image_of_a_batch_is_decoded(images: Images, monkeypatch) -> None:
     decoded: list[int | None] = []
 
     def seen(message: Message, *more: object):
@@ -139,7 +139,7 @@ def test_other_topics_and_closed_streams_receive_nothing(images: Images, watched
     assert watched == []
 
 
-def test_undecodable_picture_sets_error_and_keeps_last_picture(images: Images) -> None:
+def test_undecodable_image_sets_error_and_keeps_last_image(images: Images) -> None:
     stream = images.stream("/camera")
     images.offer([jpeg((1, 2, 3))])
     until(lambda: stream.picture is not None)
@@ -150,7 +150,7 @@ def test_undecodable_picture_sets_error_and_keeps_last_picture(images: Images) -
     until(lambda: stream.error is None)
 
 
-def test_unexpected_decoder_exception_does_not_stop_later_pictures(images: Images, monkeypatch) -> None:
+def test_unexpected_decoder_exception_does_not_stop_later_images(images: Images, monkeypatch) -> None:
     def strange(message: Message, *more: object):
         if message.seq == 1:
             raise KeyError("no such thing")
@@ -177,7 +177,7 @@ def test_two_panels_can_show_one_topic(images: Images) -> None:
     assert one.picture.seq == 1
 
 
-def test_grey_and_alpha_pictures_are_decoded() -> None:
+def test_grey_and_alpha_images_are_decoded() -> None:
     for channels, encoding in ((1, "mono8"), (3, "bgr8"), (3, "rgb8")):
         shape = [4, 6, 3] if channels == 3 else [4, 6]
         data = bytes(range(4 * 6 * channels))
@@ -189,7 +189,7 @@ def test_grey_and_alpha_pictures_are_decoded() -> None:
         assert picture.bgra.shape == (4, 6, 4)
 
 
-def test_rate_needs_two_events_and_forgets_old_ones() -> None:
+def test_rate_needs_two_events_and_ignores_old_events() -> None:
     rate = Rate()
     rate.add(0.0)
     assert rate.per_second(1.0) is None
@@ -199,7 +199,7 @@ def test_rate_needs_two_events_and_forgets_old_ones() -> None:
     assert rate.per_second(20.0) is None
 
 
-def test_shown_rate_equals_arrival_rate_when_painting_lags() -> None:
+def test_displayed_rate_equals_arrival_rate_when_painting_lags() -> None:
     arriving, shown = Rate(), Rate()
     for number in range(90):
         arriving.add(number / 30)
@@ -216,7 +216,7 @@ def large(seq: int, value: int = 9) -> Message:
     )  # fmt: skip
 
 
-def test_picture_is_decoded_at_display_size_and_again_when_enlarged(images: Images) -> None:
+def test_image_is_decoded_at_display_size_and_again_when_enlarged(images: Images) -> None:
     stream = images.stream("/camera")
     stream.set_size((160, 120))
     images.offer([large(1)])
@@ -243,7 +243,7 @@ def test_largest_requested_size_of_two_panels_is_decoded(images: Images) -> None
     assert small.picture.is_full_resolution
 
 
-def test_held_picture_stays_and_is_decoded_in_full_on_demand_while_arrivals_are_counted(
+def test_frozen_image_is_decoded_in_full_on_demand_while_arrivals_are_counted(
     images: Images,
 ) -> None:
     stream, other = images.stream("/camera"), images.stream("/camera")
@@ -266,7 +266,7 @@ def test_held_picture_stays_and_is_decoded_in_full_on_demand_while_arrivals_are_
 
 
 @pytest.mark.parametrize("kind", [Images])
-def test_pictures_are_decoded_in_decoder_thread(images: Images) -> None:
+def test_images_are_decoded_in_decoder_thread(images: Images) -> None:
     seen: list[int] = []
 
     class Extension(dict[str, object]):
@@ -281,7 +281,7 @@ def test_pictures_are_decoded_in_decoder_thread(images: Images) -> None:
     assert threading.get_ident() not in seen
 
 
-def test_suspended_stream_decodes_nothing_and_keeps_its_picture(images: Images, watched: list[str]) -> None:
+def test_suspended_stream_decodes_nothing_and_keeps_its_image(images: Images, watched: list[str]) -> None:
     stream, other = images.stream("/camera"), images.stream("/camera")
     images.offer([jpeg((1, 2, 3), seq=1)])
     until(lambda: stream.picture is not None and other.picture is not None)
@@ -320,7 +320,7 @@ def test_resumed_stream_is_not_reported_as_silent(kind: type[Images]) -> None:
     images.close()
 
 
-def test_held_picture_of_suspended_stream_can_be_enlarged_after_resume(images: Images) -> None:
+def test_frozen_image_of_suspended_stream_can_be_enlarged_after_resume(images: Images) -> None:
     stream = images.stream("/camera")
     stream.set_size((160, 120))
     images.offer([large(1)])

@@ -85,7 +85,7 @@ def test_text_offset_maps_to_path_of_its_value() -> None:
     assert found.path_to(0) == ()
 
 
-def test_lazy_values_are_equal_when_their_texts_are() -> None:
+def test_lazy_values_with_equal_text_are_equal() -> None:
     one, two = index('[{"a": 1}, {"a": 1}, {"a": 2}, [1]]').root, index('[{"a": 1}]').root
     assert isinstance(one, LazyList)
     assert isinstance(two, LazyList)

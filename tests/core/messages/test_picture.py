@@ -38,7 +38,7 @@ def raw(frame: np.ndarray, encoding: str) -> Message:
     return message(frame.tobytes(), shape=list(frame.shape), encoding=encoding)
 
 
-def test_picture_without_target_size_is_decoded_in_full() -> None:
+def test_image_without_target_size_is_decoded_in_full() -> None:
     picture, error = decode(encoded(scene(32, 24)), 7.0)
     assert error is None
     assert picture is not None
@@ -56,7 +56,7 @@ def test_picture_without_target_size_is_decoded_in_full() -> None:
 
 
 @pytest.mark.parametrize("kind", ["jpg", "png", "bgr8", "rgb8"])
-def test_small_view_gets_downscaled_picture(kind: str) -> None:
+def test_small_view_gets_downscaled_image(kind: str) -> None:
     frame = scene(640, 480)
     sent = raw(frame, kind) if kind.endswith("8") else encoded(frame, kind)
     picture, _ = decode(sent, 0.0, (150, 100))
@@ -70,13 +70,13 @@ def test_small_view_gets_downscaled_picture(kind: str) -> None:
     assert picture.bgra[60, 10, 3] == 255
 
 
-def test_view_larger_than_half_size_gets_full_picture() -> None:
+def test_view_larger_than_half_size_gets_full_image() -> None:
     picture, _ = decode(encoded(scene(640, 480), "jpg"), 0.0, (321, 241))
     assert picture is not None
     assert picture.is_full_resolution
 
 
-def test_grey_and_depth_pictures_have_pixel_values() -> None:
+def test_grey_and_depth_images_have_pixel_values() -> None:
     grey = np.arange(24, dtype=np.uint8).reshape(4, 6)
     depth = (grey.astype(np.uint16) + 1) * 1000
     for sent, wanted in ((raw(grey, "mono8"), 23), (encoded(grey), 23), (encoded(depth), 24_000)):
@@ -104,7 +104,7 @@ def test_grey_and_depth_pictures_have_pixel_values() -> None:
         (message(b"\x89PNG\r\n\x1a\n" + b"\0" * 40), "the PNG image is damaged"),
     ],
 )
-def test_invalid_picture_gives_an_error_message(sent: Message, words: str) -> None:
+def test_invalid_image_gives_an_error_message(sent: Message, words: str) -> None:
     picture, error = decode(sent, 0.0)
     assert picture is None
     assert error is not None
@@ -137,7 +137,7 @@ def test_signed_and_float_values_are_scaled_for_display_and_kept_for_reading(val
         assert picture.bgra[tuple(place)].tolist() == [0, 0, 0, 255], "no number is black"
 
 
-def test_pictures_with_high_bit_depth_or_only_nan_are_decoded() -> None:
+def test_images_with_high_bit_depth_or_only_nan_are_decoded() -> None:
     deep = np.full((4, 6, 3), 0x8000, np.uint16)
     unit = np.full((4, 6, 3), 0.5, np.float32)
     for sent in (raw(deep, "bgr16"), encoded(deep), raw(unit, "32FC3")):
@@ -161,7 +161,7 @@ def test_downscaled_depth_has_same_brightness_as_full_depth() -> None:
         assert small.bgra[20, 70].tolist() == [37, 231, 253, 255]
 
 
-def test_float_picture_cannot_be_encoded_as_png() -> None:
+def test_float_image_cannot_be_encoded_as_png() -> None:
     with pytest.raises(EncodeError, match="can't encode a 'image of float32' as 'png': only integers"):
         png_of(raw(np.zeros((4, 6), np.float32), "32FC1"))
 
@@ -174,7 +174,7 @@ def png_of_size(side: int) -> Message:
     return message(bytes(data))
 
 
-def test_oversized_picture_is_rejected_without_allocating_memory() -> None:
+def test_oversized_image_is_rejected_without_allocating_memory() -> None:
     picture, error = decode(png_of_size(20_000), 0.0)
     assert picture is None
     assert error is not None
@@ -196,7 +196,7 @@ def test_header_with_huge_dimensions_is_rejected() -> None:
         png_of(message(bytes(jpeg)))
 
 
-def test_snapshot_is_identical_to_received_picture() -> None:
+def test_snapshot_is_identical_to_received_image() -> None:
     frame = scene(64, 48)
     png = encoded(frame)
     assert png_of(png) == bytes(png.data)

@@ -25,7 +25,7 @@ def message(array: np.ndarray) -> Message:
     return Message("/c", array.tobytes(), "image", "image", extension=extension)
 
 
-def test_default_appearance_returns_picture_unchanged() -> None:
+def test_default_appearance_returns_image_unchanged() -> None:
     picture = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
     assert apply_tones(PLAIN, picture) is picture
 
@@ -64,20 +64,20 @@ def test_custom_range_clips_values_outside() -> None:
         (np.array([[0, 2**64 - 1]], np.uint64), (0.0, float(2**64 - 1))),
     ],
 )
-def test_unusual_values_have_a_colour_scale(numbers, ends) -> None:
+def test_constant_nan_and_extreme_values_have_a_colour_scale(numbers, ends) -> None:
     bgra, scale = apply_colour_map(PLAIN, numbers)
     assert bgra.shape == (*numbers.shape, 4)
     assert (scale.low, scale.high) == ends
 
 
-def test_contradictory_range_collapses_to_its_given_limit() -> None:
+def test_single_limit_outside_the_data_range_collapses_the_colour_scale() -> None:
     _bgra, scale = apply_colour_map(PictureLook(low=50.0), np.array([[1, 2]], np.uint16))
     assert scale.low == scale.high == 50.0
     _bgra, scale = apply_colour_map(PictureLook(high=-5.0), np.array([[1, 2]], np.uint16))
     assert scale.low == scale.high == -5.0
 
 
-def test_decoded_picture_has_its_appearance_and_colour_scale() -> None:
+def test_decoded_image_reports_its_appearance_and_colour_scale() -> None:
     plain, _error = decode(message(np.array([[0, 255]], np.uint8)), 0.0)
     assert plain is not None
     assert (plain.scale, plain.look) == (None, PLAIN)

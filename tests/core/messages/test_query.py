@@ -26,7 +26,7 @@ def found(text: str, value: object = SEEN) -> dict[str, object]:
     return {str(path): each for path, each in JsonQuery(text).evaluate(value).found.items()}
 
 
-def test_paths_written_by_panels_find_values() -> None:
+def test_jsonpath_queries_find_matching_values() -> None:
     assert found("$.people[*].name") == {
         "people[0].name": "Ann",
         "people[1].name": "Bea",

@@ -42,7 +42,7 @@ def large(text: bytes) -> bytes:
     return text + b" " * LARGE_BYTES
 
 
-def test_small_message_is_decoded_and_invalid_message_gives_error() -> None:
+def test_small_message_is_decoded_and_invalid_message_returns_an_error() -> None:
     found = read(message(b'{"a": [1, 2]}'))
     assert (found.value, found.index, found.error) == ({"a": [1, 2]}, None, None)
     bad = read(message(b"{bad"))
@@ -104,7 +104,7 @@ def test_only_newest_pending_message_is_read(reader: Reader, monkeypatch) -> Non
     assert slow.seqs == [1, 49]
 
 
-def test_forgotten_message_is_not_delivered(reader: Reader, monkeypatch) -> None:
+def test_result_of_cleared_message_is_discarded(reader: Reader, monkeypatch) -> None:
     slow = SlowRead(monkeypatch)
     reader.submit(message(b"1", seq=1))
     assert slow.began.wait(WAIT_S)

@@ -26,7 +26,7 @@ def test_snapshot_file_is_named_by_topic_and_time(tmp_path) -> None:
     assert path.read_bytes() == bytes(message().data)
 
 
-def test_same_picture_saved_twice_gives_two_files(tmp_path) -> None:
+def test_same_image_saved_twice_gives_two_files(tmp_path) -> None:
     first, second = snapshots.save(message(), tmp_path), snapshots.save(message(), tmp_path)
     assert second.name == f"{first.stem} 2.png"
     assert first.read_bytes() == second.read_bytes()
@@ -38,7 +38,7 @@ def test_invalid_file_name_characters_are_removed(tmp_path) -> None:
     assert len(snapshots.file_stem(message("x" * 500))) < 120
 
 
-def test_invalid_picture_leaves_no_file(tmp_path) -> None:
+def test_invalid_image_leaves_no_file(tmp_path) -> None:
     with pytest.raises(DecodeError):
         snapshots.save(message(data=b"nothing"), tmp_path)
     assert list(tmp_path.iterdir()) == []

@@ -77,7 +77,7 @@ def test_healthy_topic_leaves_reserve_time_to_failing_topics() -> None:
     assert checks.pop_results()["/b"].checked > 40
 
 
-def test_malformed_message_lets_rest_of_batch_use_reserve_time() -> None:
+def test_malformed_message_allows_remaining_batch_to_use_reserve_time() -> None:
     checks = Checks(work=Clock(step_s=0.01))
     checks.check("/a", messages(BAD, *[GOOD] * 200))
     found = checks.pop_results()["/a"]

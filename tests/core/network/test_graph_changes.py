@@ -17,7 +17,7 @@ def graph(**nodes: list[str]) -> GraphView:
     return GraphView(1, 1, infos, topics)
 
 
-def test_joining_robot_is_one_line_with_topic_count() -> None:
+def test_joining_robot_is_reported_in_one_line_with_topic_count() -> None:
     assert change_messages(graph(), graph(Pepper=["/a", "/b", "/c"])) == ["Pepper joined with 3 topics"]
 
 
@@ -32,11 +32,11 @@ def test_joined_and_left_nodes_are_reported() -> None:
     assert change_messages(graph(one=["/a"]), graph(two=["/a"])) == ["two joined", "one left"]
 
 
-def test_unchanged_graph_gives_no_line() -> None:
+def test_unchanged_graph_is_not_reported() -> None:
     assert change_messages(graph(one=["/a"]), graph(one=["/a"])) == []
 
 
-def test_topic_without_publisher_is_not_new() -> None:
+def test_topic_without_publisher_is_not_reported_as_new() -> None:
     after = GraphView(1, 1, {}, {"/a": TopicInfo("/a", "json", "json")})
     assert change_messages(graph(), after) == []
 
@@ -54,7 +54,7 @@ def test_internal_topics_and_master_log_node_are_not_reported() -> None:
     assert change_messages(graph(), graph(one=["/nep/log"])) == ["one joined"]
 
 
-def test_many_simultaneous_changes_are_one_line_with_count() -> None:
+def test_many_simultaneous_changes_are_reported_in_one_line_with_count() -> None:
     thousand = [f"/t{number:04}" for number in range(1000)]
     assert change_messages(graph(one=[]), graph(one=thousand)) == [
         "1000 new topics: /t0000, /t0001, /t0002 and 997 more"

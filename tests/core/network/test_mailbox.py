@@ -13,7 +13,7 @@ def message(topic: str, number: int, size: int = 10) -> Message:
     return Message(topic=topic, data=data, codec="bytes", msg_type="bytes", seq=number)
 
 
-def test_drain_gives_batches_by_topic_in_order() -> None:
+def test_drain_returns_batches_by_topic_in_order() -> None:
     mailbox = Mailbox()
     mailbox.post("a", [message("a", 1)])
     mailbox.post("b", [message("b", 1)])

@@ -90,7 +90,7 @@ def test_master_is_started_when_none_is_running(free) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a program of one line is a shell's")
-def test_frozen_studio_starts_itself_as_master(free, monkeypatch, tmp_path: Path) -> None:
+def test_packaged_studio_starts_its_own_executable_as_master(free, monkeypatch, tmp_path: Path) -> None:
     """It has no Python that knows "-m nep": it is the only program there, and takes Studio's options."""
     studio = tmp_path / "nep-studio"
     studio.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" -m app "$@"\n', "utf-8")

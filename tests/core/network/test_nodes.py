@@ -54,7 +54,7 @@ def test_wildcard_subscriptions_are_listed_with_topics_of_the_node() -> None:
     assert found.subscribes == ("/robot/*/camera", "/z")
 
 
-def test_nodes_after_first_graph_are_new_until_seen() -> None:
+def test_nodes_added_after_the_first_graph_are_marked_new_until_seen() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a")]), 0)
     nodes.update(view(2, [node("a"), node("b")]), 1)
@@ -75,7 +75,7 @@ def test_load_updates_without_new_graph_revision() -> None:
     assert nodes.revision == before
 
 
-def test_vanished_node_stays_listed_for_ten_seconds_with_its_topics() -> None:
+def test_removed_node_stays_listed_for_ten_seconds_with_its_topics() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a", cpu=0.2)], [topic("/x", "a")]), 0)
     nodes.update(view(2, []), 5)
@@ -86,7 +86,7 @@ def test_vanished_node_stays_listed_for_ten_seconds_with_its_topics() -> None:
     assert len(nodes) == 0
 
 
-def test_restarted_program_replaces_its_vanished_node() -> None:
+def test_restarted_program_replaces_its_removed_node() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a", "arm"), node("b", "arm2")]), 0)
     nodes.update(view(2, []), 1)

@@ -70,7 +70,7 @@ def test_user_can_allow_and_deny_connections_from_other_computers(world, make):
     reach.close()
 
 
-def test_remote_access_choice_is_sent_once_to_each_new_master(world, make):
+def test_remote_access_setting_is_sent_once_to_each_new_master(world, make):
     reach, _alerts = make()
     reach.listen_on(["192.168.1.20"])
     world.answer(reach)
@@ -100,7 +100,7 @@ def test_rejected_remote_access_is_an_alert_with_fix_until_resolved(world, make)
     reach.close()
 
 
-def test_unsaved_remote_access_choice_is_applied_and_reported(world, make, tmp_path):
+def test_unsaved_remote_access_setting_is_applied_and_reported(world, make, tmp_path):
     reach, alerts = make()
     (tmp_path / "settings.json").mkdir()  # as a full disk: nothing can be written there
     for hosts, words in ((["192.168.1.20"], "Can't save this change"), ([], "Can't save this change")):
@@ -118,7 +118,7 @@ def test_unsaved_remote_access_choice_is_applied_and_reported(world, make, tmp_p
     reach.close()
 
 
-def test_remote_access_choice_is_not_sent_to_master_of_another_computer(make, world):
+def test_remote_access_setting_is_not_sent_to_master_of_another_computer(make, world):
     near, _alerts = make()
     near.listen_on(["192.168.1.20"])  # kept, for the master of this computer
     world.answer(near)
@@ -132,7 +132,7 @@ def test_remote_access_choice_is_not_sent_to_master_of_another_computer(make, wo
     assert not world.asked
 
 
-def test_last_remote_access_choice_is_sent_last_despite_slow_first_request(world, make, monkeypatch):
+def test_last_remote_access_setting_is_sent_last_despite_slow_first_request(world, make, monkeypatch):
     may_go_on, told = threading.Event(), []
 
     def slow(hosts, _address):

@@ -36,7 +36,7 @@ def test_collapsed_folder_hides_its_contents() -> None:
     assert keys(TopicTree(topics, {"/a/b/*", "/never/*"})) == ["/a/*", "/a/b/*", "/a/x", "/c/*", "/c/z"]
 
 
-def test_folder_sums_known_figures_of_live_topics() -> None:
+def test_folder_sums_known_stats_of_live_topics() -> None:
     topics = [
         Topic("/a/x", rate_hz=10.0, bandwidth_Bps=100.0, age_s=3.0, lost=2),
         Topic("/a/b/y", rate_hz=5.5, age_s=1.0),
@@ -72,7 +72,7 @@ def test_networks_have_separate_folders() -> None:
         ("/" * 5, ("/////",)),
     ],
 )
-def test_unusual_topic_names_are_rows(name, parts) -> None:
+def test_unusual_topic_names_are_shown_as_rows(name, parts) -> None:
     assert parts_of_name(name) == parts
     assert len(TopicTree([Topic(name)]).rows(by_name)) == len(parts)
 
@@ -84,7 +84,7 @@ def test_tree_depth_is_limited() -> None:
     assert max(folder.depth for folder in TopicTree([Topic(name)])) == MAX_DEPTH - 1
 
 
-def test_folders_above_a_topic() -> None:
+def test_parent_folders_of_a_topic_are_listed() -> None:
     assert folders_above("/a/b/c") == ["/a/*", "/a/b/*"]
     assert folders_above("/a/b", "ros2") == ["ros2 /a/*"]
     assert folders_above("/a") == []

@@ -42,7 +42,7 @@ def message(number: int, data: bytes = b"{}", stamp_ns: int | None = None) -> Me
     return Message("/a", data, "json", "json", seq=number, stamp_ns=stamp_ns)
 
 
-def test_topics_after_first_graph_are_new_until_seen() -> None:
+def test_topics_added_after_the_first_graph_are_marked_new_until_seen() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics.update(view(info("/a"), info("/b")), 1)
@@ -51,7 +51,7 @@ def test_topics_after_first_graph_are_new_until_seen() -> None:
     assert not topics["/b"].is_new
 
 
-def test_topic_figures_come_from_publishers_and_node_names_are_sorted() -> None:
+def test_topic_stats_come_from_publishers_and_node_names_are_sorted() -> None:
     topics = Topics()
     topics.update(view(info("/a", rate_hz=30.0, lost=3, loss_ratio=0.1)), 0)
     topic = topics["/a"]
@@ -61,7 +61,7 @@ def test_topic_figures_come_from_publishers_and_node_names_are_sorted() -> None:
     assert topic.age_s == 0.5
 
 
-def test_vanished_topic_stays_listed_for_ten_seconds_with_unknown_figures() -> None:
+def test_removed_topic_stays_listed_for_ten_seconds_without_stats() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics.update(view(), 5)
@@ -73,7 +73,7 @@ def test_vanished_topic_stays_listed_for_ten_seconds_with_unknown_figures() -> N
     assert len(topics) == 0
 
 
-def test_vanished_watched_topic_leaves_the_list_and_can_return() -> None:
+def test_removed_watched_topic_is_unlisted_and_can_reappear() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics["/a"].is_watched = True
@@ -154,7 +154,7 @@ def test_total_rate_is_unknown_without_reported_rates() -> None:
     assert total_rate_hz([info("/a"), info("/b", rate_hz=None)]) == 10.0
 
 
-def test_unchanged_graph_updates_only_figures() -> None:
+def test_unchanged_graph_updates_only_stats() -> None:
     topics = Topics()
     topics.update(view(info("/a", rate_hz=10.0), revision=7), 0)
     before = topics.revision
@@ -226,7 +226,7 @@ def test_newly_watched_stream_has_grace_period() -> None:
     assert silence(topics, 112) == 0.0, "another publisher has taken its place"
 
 
-def test_wrong_clock_does_not_cause_silence() -> None:
+def test_wrong_clock_does_not_mark_a_stream_as_silent() -> None:
     topics = Topics()
     topics.update(view(heard()), 0)
     topics["/a"].is_watched = True

@@ -50,7 +50,7 @@ def test_new_subscription_counts_from_zero() -> None:
     assert traffic.sent_30s == 9
 
 
-def test_network_figures_come_from_the_graph() -> None:
+def test_network_stats_are_read_from_the_graph() -> None:
     traffic = Traffic(Topics())
     one = PublisherInfo(1, "n1", (), False, 5, 50, 5, 1, 10.0, 100.0)
 
@@ -73,7 +73,7 @@ class Counted(dict[str, TopicInfo]):
         return super().values()
 
 
-def test_figures_of_many_topics_are_summed_twice_a_second_including_last_ones() -> None:
+def test_stats_of_many_topics_are_summed_twice_a_second_including_the_last_update() -> None:
     traffic = Traffic(Topics())
     one = TopicInfo("/a", "json", "json", lost=1, rate_hz=2.0)
     views = [
@@ -99,7 +99,7 @@ def test_only_recent_losses_are_counted() -> None:
     assert losses.count(105, 21.0 + WINDOW_S) == 0
 
 
-def test_vanished_topic_is_removed_from_total_losses() -> None:
+def test_removed_topic_is_excluded_from_total_losses() -> None:
     losses = RecentLosses()
     losses.count(10, 0.0)
     assert losses.count(0, 1.0) == 0

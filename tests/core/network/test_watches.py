@@ -17,7 +17,7 @@ def test_first_watch_subscribes_and_last_close_unsubscribes() -> None:
     assert not watches.is_watched("/a")
 
 
-def test_suspended_watch_is_unsubscribed_but_remembered() -> None:
+def test_suspended_watch_is_unsubscribed_and_resubscribed_on_resume() -> None:
     calls: list[str] = []
     watches = Watches(*(lambda topic, sign=sign: calls.append(f"{sign}{topic}") for sign in "+-!"))
     first, second = watches.open(["/a"]), watches.open(["/a"])

@@ -73,7 +73,7 @@ def test_settings_changed_during_the_start_reach_the_server(studio: Studio) -> N
     assert studio.wait().allow_moving == {"Turtle"}
 
 
-def test_server_stops_with_its_last_protocol(studio: Studio) -> None:
+def test_server_stops_when_its_last_protocol_is_disabled(studio: Studio) -> None:
     server = studio.switch_on()
     studio.web.set_protocol_enabled("foxglove", on=True)
     studio.web.set_protocol_enabled("rosbridge", on=False)
@@ -83,7 +83,7 @@ def test_server_stops_with_its_last_protocol(studio: Studio) -> None:
     assert (studio.web.state, server.has_ended) == ("off", True)
 
 
-def test_another_address_restarts_the_server_with_a_token(studio: Studio) -> None:
+def test_address_change_restarts_the_server_with_a_token(studio: Studio) -> None:
     first = studio.switch_on()
     studio.web.listen_on(WIFI.host)
     second = studio.wait()

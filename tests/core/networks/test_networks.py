@@ -45,7 +45,7 @@ def test_topic_names_of_all_networks_are_distinct() -> None:
     assert (list(native), list(others)) == (["/a"], ["ros /a"])
 
 
-def test_network_is_observed_only_when_chosen_and_again_at_next_start(world: World) -> None:
+def test_network_is_observed_only_when_selected_and_again_at_next_start(world: World) -> None:
     world.networks.start()
     assert (world.made, world.networks.selected) == ([], [])
     world.networks.select("ros2", " 7 ")
@@ -88,7 +88,7 @@ def test_invalid_network_settings_are_ignored(kept: object, tmp_path: Path) -> N
         ("ros", "http://", "isn't a valid address of a ROS master"),
     ],
 )
-def test_invalid_address_is_rejected_with_reason_and_choice_stays(
+def test_invalid_address_is_rejected_with_reason_and_selection_is_unchanged(
     world: World, kind: str, address: str, said: str
 ) -> None:
     world.networks.select(kind, "")
@@ -100,7 +100,7 @@ def test_invalid_address_is_rejected_with_reason_and_choice_stays(
     assert [network.kind.name for network in world.networks.selected] == [kind]
 
 
-def test_network_is_observed_even_if_choice_cannot_be_saved(
+def test_network_is_observed_even_if_selection_cannot_be_saved(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(_key: str, _value: object) -> None:
@@ -128,7 +128,7 @@ def test_topics_and_nodes_are_listed_with_their_network(world: World) -> None:
     assert world.networks.topic("zenoh /a") is None
 
 
-def test_unreachable_network_is_stale_with_reason_until_it_returns(world: World) -> None:
+def test_unreachable_network_is_stale_with_reason_until_it_reconnects(world: World) -> None:
     world.networks.select("ros", "")
     world.tell(GraphReceived(graph("/a"), 0.0))
     revision = world.networks.revision
@@ -169,7 +169,7 @@ def test_events_of_closed_source_are_ignored(world: World) -> None:
     assert len(world.made) == 3, "the same address again changes nothing"
 
 
-def test_watch_before_network_is_chosen_takes_effect_later(world: World) -> None:
+def test_watch_before_network_is_selected_takes_effect_later(world: World) -> None:
     world.networks.watch("ros /a")
     world.networks.watch("ros /b")
     world.networks.unwatch("ros /b")

@@ -30,18 +30,18 @@ from app.core.recording.choice import (
         ("not not /a", (), ("/a",)),
     ],
 )
-def test_patterns_are_parsed_and_not_excludes(text, wanted, unwanted):
+def test_include_and_exclude_patterns_are_parsed(text, wanted, unwanted):
     assert parse_patterns(text) == (wanted, unwanted)
 
 
-def test_exclusions_win_and_no_patterns_means_all():
+def test_exclusions_take_precedence_and_no_patterns_select_all_topics():
     choice = RecordingChoice("pattern", patterns=("/arm/*",), excluded=("/arm/raw",))
     assert [choice.selection.has(topic) for topic in ("/arm/x", "/arm/raw", "/odom")] == [True, False, False]
     assert RecordingChoice("pattern", excluded=("/raw",)).selection.has("/odom")
     assert RecordingChoice("all", topics=("/a",), excluded=("/b",)).selection.has("/b")
 
 
-def test_invalid_recording_choice_gives_reason():
+def test_invalid_recording_choice_returns_the_reason():
     assert RecordingChoice("chosen").problem == "No topic is selected."
     assert RecordingChoice("chosen", topics=("/a",)).problem == ""
     assert RecordingChoice("pattern").problem == ""
@@ -112,7 +112,7 @@ def test_recording_name_becomes_valid_file_name(name, stem):
     assert file_stem(name) == stem
 
 
-def test_occupied_path_gets_a_number(tmp_path: Path):
+def test_path_of_an_existing_file_gets_a_numeric_suffix(tmp_path: Path):
     first = tmp_path / "a.mcap"
     assert free_path(first) == first
     first.touch()

@@ -75,7 +75,7 @@ def test_recorder_process_starts_only_when_needed(made):
     assert not made.lines
 
 
-def test_recording_starts_reports_figures_and_ends(made):
+def test_recording_starts_reports_stats_and_ends(made):
     client = made.client
     assert client.record(Path("a.mcap"), ("/a",), ("/b",), "first")
     assert not client.record(Path("b.mcap"))
@@ -198,7 +198,7 @@ def test_flight_recorder_saves_last_seconds_and_is_restarted(made):
     assert not client.save_last(Path("c.mcap"), 60.0)
 
 
-def test_unresponsive_recorder_and_invalid_events_are_harmless(made):
+def test_unresponsive_recorder_and_invalid_events_are_handled(made):
     made.client.set_ring(RingChoice(Path("ring")))
     made.lines[0].is_full = True
     assert made.client.record(Path("a.mcap"))

@@ -91,7 +91,7 @@ def test_tried_stack_is_recorded_with_text_of_its_block(told):
     assert said["name"] == "wave"
 
 
-def test_alarm_is_recorded_on_and_off_once_each(told):
+def test_alarm_start_and_end_are_recorded_once_each(told):
     for kind in ("on", "still", "off", "off"):
         told.events.on_alarm(event(kind))
     (role, on), (_role, off) = told.said
@@ -108,7 +108,7 @@ def test_alarm_about_node_has_no_topic(told):
     assert told.said[0][1]["topic"] == ""
 
 
-def test_ongoing_events_are_repeated_and_finished_ones_are_not(told):
+def test_only_ongoing_events_are_repeated(told):
     told.events.on_alarm(event("on", "/a"))
     told.events.on_alarm(event("on", "/b"))
     told.events.update_run(RUNNING)
@@ -121,7 +121,7 @@ def test_ongoing_events_are_repeated_and_finished_ones_are_not(told):
     assert all(value["until_ns"] is None for _role, value in told.said)
 
 
-def test_each_of_many_alarms_is_recorded_once_and_number_kept_is_limited(told, monkeypatch):
+def test_many_alarms_are_recorded_once_each_and_active_alarms_are_limited(told, monkeypatch):
     monkeypatch.setattr(events_module, "MAX_ACTIVE", 3)
     for number in range(5):
         told.events.on_alarm(event("on", f"/{number}"))

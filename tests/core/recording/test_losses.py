@@ -55,7 +55,7 @@ def test_recording_without_losses_is_not_read(tmp_path, read_bytes) -> None:
     assert read_bytes == []
 
 
-def test_few_losses_are_all_found_by_reading_little(tmp_path, read_bytes) -> None:
+def test_few_losses_are_found_by_reading_a_small_part_of_the_file(tmp_path, read_bytes) -> None:
     path = tmp_path / "a.mcap"
     recording(path, {1: 2, 3000: 3, 3003: 1, 7_600: 7})
     with Recording(path) as made:

@@ -97,14 +97,14 @@ def test_one_time_choice_is_not_saved(made):
     assert made.again().choice == RecordingChoice()
 
 
-def test_impossible_recording_gives_reason_and_starts_nothing(made):
+def test_invalid_recording_request_returns_reason_and_starts_nothing(made):
     made.recordings.set_choice(RecordingChoice("chosen"))
     assert made.recordings.record() == "No topic is selected."
     assert made.recordings.save_last() == "The flight recorder is off."
     assert made.lines == []
 
 
-def test_occupied_name_gets_a_number_and_nothing_is_overwritten(made):
+def test_existing_file_name_gets_a_numeric_suffix_and_nothing_is_overwritten(made):
     folder = made.home / "Recordings"
     folder.mkdir()
     (folder / "a.mcap").write_bytes(b"precious")
@@ -112,7 +112,7 @@ def test_occupied_name_gets_a_number_and_nothing_is_overwritten(made):
     assert made.lines[0].orders[0]["path"] == str(folder / "a 2.mcap")
 
 
-def test_missing_chosen_folder_is_reported_not_created(made):
+def test_missing_selected_folder_is_reported_not_created(made):
     away = made.home / "stick" / "films"
     made.recordings.set_folder(away)
     assert made.again().folder == away
@@ -167,7 +167,7 @@ def test_alarm_saves_last_seconds_and_is_notified_when_saved(made):
     assert made.made == [("alarm-2026-11-26-22-01-05.mcap", "kept")]
 
 
-def test_alarm_is_notified_why_nothing_was_saved(made):
+def test_alarm_is_notified_of_the_reason_for_not_saving(made):
     told: list[tuple[bool, str]] = []
 
     def done(well: bool, words: str) -> None:
@@ -189,5 +189,5 @@ def test_alarm_is_notified_why_nothing_was_saved(made):
 
 
 @pytest.mark.parametrize("words", ["", "sound", "kept nothing", "mcap", ".mcapx"])
-def test_words_without_file_name_give_no_file(words):
+def test_text_without_a_file_name_returns_an_empty_name(words):
     assert saved_file_name(words) == ""

@@ -133,7 +133,7 @@ def test_series_starts_with_messages_before_playhead_and_has_no_duplicates(shown
     assert taker.seqs == [seq for seq in seqs if seq <= 10]
 
 
-def test_figures_show_losses_and_topic_rate(shown, whole):
+def test_stats_show_losses_and_topic_rate(shown, whole):
     shown.seek(whole[-1][0])
     topic = shown.replay.topics["/a"]
     assert topic.lost == LOST
@@ -155,7 +155,7 @@ def test_losses_and_density_are_read_in_background_thread(shown, whole):
     assert densities.newest.peak("/nowhere") == 0
 
 
-def test_user_can_skip_to_bookmarks_and_to_both_ends(shown, whole):
+def test_user_can_seek_to_bookmarks_and_to_start_and_end(shown, whole):
     replay = shown.replay
     shown.seek(whole[20][0])
     made = replay.bookmark("here")
@@ -173,7 +173,7 @@ def test_user_can_skip_to_bookmarks_and_to_both_ends(shown, whole):
     assert replay.bookmarks == ()
 
 
-def test_loop_is_set_by_its_edges(shown, whole):
+def test_loop_start_and_end_are_set_at_the_playhead(shown, whole):
     replay = shown.replay
     shown.seek(whole[20][0])
     replay.set_loop_edge(is_start=True)

@@ -95,7 +95,7 @@ def some(whole, *topics: str, begin: int = 0, end: int = COUNT):
     return [kept(message) for _ns, message in whole[begin:end] if message.topic in topics]
 
 
-def test_chosen_topics_are_sent_completely_and_panels_receive_watched_topics(played, whole):
+def test_selected_topics_are_sent_completely_and_panels_receive_watched_topics(played, whole):
     sender = played("/a", "/camera", watched="/b")
     assert sender.taken() == []  # what a panel shows at the beginning is not sent
     sender.do(Playback.play)
@@ -128,7 +128,7 @@ def test_seek_sends_no_skipped_messages_and_pause_sends_nothing(played, whole):
     assert sender.taken() == some(whole, "/a", "/b", begin=51)
 
 
-def test_loop_repeats_only_its_part(played, whole):
+def test_loop_sends_only_the_messages_of_the_looped_part(played, whole):
     sender = played("/a", "/b")
     begin, end = 10, 20
     sender.do(lambda playback: playback.loop(whole[begin][0], whole[end][0]))
@@ -220,7 +220,7 @@ def test_replay_omits_messages_that_would_move_a_newly_connected_robot():
     assert (sent.count, sent.skipped) == (1, 1)
 
 
-def test_outbox_sends_only_allowed_messages_and_counts_omitted_ones():
+def test_outbox_sends_only_allowed_messages_and_counts_skipped_messages():
     node, jobs, arming = TestNode(), [], Arming()
     outbox = ReplayOutbox(arming, lambda _what, job: jobs.append(job))
     arming.arm()

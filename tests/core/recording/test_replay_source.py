@@ -259,7 +259,7 @@ def test_plot_receives_messages_before_the_playhead(replay, whole):
     assert [each.seq for each in handed.history["/a"]] == [seq for seq in before if seq <= 10]
 
 
-def test_figures_follow_the_playhead(replay, whole):
+def test_stats_follow_the_playhead(replay, whole):
     played = replay()
     handed = played.do(lambda playback: playback.seek(whole[59][0]))
     assert handed.stats["/rare"].newest_ns == whole[20][0]

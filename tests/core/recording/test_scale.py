@@ -22,7 +22,7 @@ WHOLE = TimeScale.full(100 * S, 860 * S)
         (-1_500_000_000, 3, "-0:01.500"),
     ],
 )
-def test_time_spans_are_formatted(ns, digits, words):
+def test_durations_are_formatted(ns, digits, words):
     assert duration_text(ns, digits=digits) == words
 
 
@@ -55,7 +55,7 @@ def test_zoom_keeps_the_time_under_the_mouse():
     assert scale.zoomed(100.0, 400 * S).is_full
 
 
-def test_tick_marks_are_full_steps_from_the_beginning():
+def test_tick_marks_are_multiples_of_the_step_from_the_recording_start():
     marks = list(WHOLE.marks(8))
     assert [each - 100 * S for each in marks] == [k * 120 * S for k in range(7)]
     inside = WHOLE.zoomed(0.1, 480 * S)

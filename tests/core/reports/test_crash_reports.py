@@ -34,7 +34,7 @@ def reports(tmp_path: Path, clock: Clock) -> CrashReports:
     return CrashReports(tmp_path / "crashes", clock)
 
 
-def test_crash_report_contains_part_cause_and_time(reports: CrashReports) -> None:
+def test_crash_report_contains_component_cause_and_time(reports: CrashReports) -> None:
     path = reports.add(Crash("robot", "it ended by signal 11", "where it was"))
     assert path is not None
     told = path.read_text("utf-8")
@@ -171,7 +171,7 @@ def test_crash_report_with_damaged_first_line_is_offered_without_version(
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_crash_messages_are_translated_for_every_part(pseudo: None, reports: CrashReports, part) -> None:
+def test_crash_messages_are_translated_for_every_component(pseudo: None, reports: CrashReports, part) -> None:
     alerts = Alerts()
     reports.add(Crash(part, "how", version="0.0.9"))
     show_crash_alert(alerts, reports)

@@ -49,7 +49,7 @@ def test_root_home_folder_is_not_removed() -> None:
     assert without_home("/usr/bin", PurePosixPath("/")) == "/usr/bin"  # type: ignore[arg-type]
 
 
-def test_only_harmless_settings_are_reported_with_values() -> None:
+def test_only_public_settings_are_reported_with_values() -> None:
     kept = {"theme": "dark", "network_keys": {"room 3": "swordfish"}, "recent": ["/home/a/Secret.nepb"]}
     shown = reportable_settings(kept)
     assert shown == {"network_keys": OMITTED_TEXT, "recent": OMITTED_TEXT, "theme": "dark"}
@@ -67,5 +67,5 @@ def test_unknown_settings_are_reported_without_values(kept: dict[str, str]) -> N
 
 
 @pytest.mark.parametrize("word", ["key", "secret", "password", "code", "token", "recent", "tabs", "networks"])
-def test_harmless_settings_contain_no_private_names(word: str) -> None:
+def test_public_settings_contain_no_private_names(word: str) -> None:
     assert not [name for name in PUBLIC_SETTINGS if word in name]

@@ -53,7 +53,7 @@ def opened(data: bytes) -> dict[str, str]:
         return {name: archive.read(name).decode("utf-8") for name in archive.namelist()}
 
 
-def test_report_contents(parts: ReportParts) -> None:
+def test_report_contains_description_doctor_findings_logs_and_settings(parts: ReportParts) -> None:
     parts.crashes.add(Crash("robot", "by signal 11", "where it was"))
     found = opened(make_report(parts, "  It stood still.\nThen it fell. ñ "))
     assert found["what-happened.txt"] == "It stood still.\nThen it fell. ñ"

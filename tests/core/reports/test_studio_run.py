@@ -160,7 +160,7 @@ def younger_begin(pid: int) -> float:
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"pid": "x", "began_s": 1}', '{"pid": 1e400}'])
-def test_damaged_run_mark_is_deleted(place: Place, text: str) -> None:
+def test_damaged_run_marker_file_is_deleted(place: Place, text: str) -> None:
     place.runs.mkdir()
     (place.runs / "mark.json").write_text(text)
     assert place.run().left() == []

@@ -36,7 +36,7 @@ def test_words_of_robot_event_blocks_precede_suggested_words() -> None:
     assert words() == ("hello",)
 
 
-def test_text_compared_with_heard_word_is_offered() -> None:
+def test_text_compared_with_a_speech_sensor_is_offered_as_a_word() -> None:
     sensor = {"block": {"type": "robot_pepper_get_heard_word", "fields": {"ROBOT": "Pepper"}}}
     text = {"block": {"type": "values_text", "fields": {"TEXT": " blue "}}}
     compare = {"type": "values_compare", "inputs": {"A": sensor, "B": text}}

@@ -208,7 +208,7 @@ def test_restarted_robot_replaces_its_previous_program(session: Session, master:
         second.close()
 
 
-def test_new_program_with_name_of_a_moving_robot_does_not_prove_its_stop(
+def test_new_program_with_name_of_a_moving_robot_does_not_confirm_its_stop(
     session: Session, master: Master, pepper: WireRobot
 ) -> None:
     """It is frozen, so the master unlists it; the new one answers, and the old one may still move."""
@@ -235,7 +235,7 @@ def test_new_program_with_name_of_a_moving_robot_does_not_prove_its_stop(
         thief.close()
 
 
-def test_new_program_does_not_prove_stop_of_a_robot_moved_by_hand(
+def test_new_program_does_not_confirm_stop_of_a_robot_moved_by_hand(
     session: Session, master: Master, pepper: WireRobot
 ) -> None:
     link = the_link(session)
@@ -402,7 +402,7 @@ def test_invalid_description_is_reported_and_the_previous_one_stays_valid(
     assert session.fleet.link("Rover").is_connected
 
 
-def test_repeated_descriptions_use_a_fifth_of_window_time_at_most() -> None:
+def test_parsing_repeated_descriptions_uses_at_most_a_fifth_of_main_thread_time() -> None:
     """And whoever has just come is read before those who repeat themselves."""
     clock = Clock()
     announcements = Announcements(Watches(len, len), Senders(), clock)

@@ -51,7 +51,7 @@ def test_malformed_messages_are_one_alert_with_exact_count(case: Case) -> None:
     assert alert.detail == "No json. See the raw bytes in the Inspector."
 
 
-def test_unchecked_messages_are_mentioned_in_the_alert(case: Case) -> None:
+def test_alert_reports_the_number_of_unchecked_messages(case: Case) -> None:
     case.look(100, unchecked=0)
     case.look(1, unchecked=400)
     alert = case.alert()

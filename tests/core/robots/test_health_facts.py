@@ -54,7 +54,7 @@ def case() -> Case:
     return Case()
 
 
-def test_facts_of_a_healthy_robot(case: Case) -> None:
+def test_healthy_robot_has_only_ok_facts(case: Case) -> None:
     assert [(fact.title, fact.status, fact.text) for fact in case.facts()] == [
         ("Connection", "ok", "last response 3 s ago"),
         ("Battery", "ok", "84 %"),

@@ -33,13 +33,13 @@ def test_known_robots_are_sorted_by_last_seen_and_persist(settings, tmp_path) ->
     assert again.robots == (KnownRobot("NAO", 300.0), KnownRobot("Rover", 200.0))
 
 
-def test_virtual_robots_are_not_remembered(settings) -> None:
+def test_virtual_robots_are_not_saved_as_known(settings) -> None:
     known = KnownRobots(settings)
     known.record([robot("Pepper", virtual=True)])
     assert known.robots == ()
 
 
-def test_forgotten_robot_is_known_again_when_it_returns(settings) -> None:
+def test_removed_known_robot_is_added_again_when_it_returns(settings) -> None:
     known = KnownRobots(settings, lambda: 1.0)
     known.record([robot("NAO"), robot("Rover")])
     known.discard("NAO")
@@ -61,7 +61,7 @@ def test_number_of_known_robots_is_limited(settings) -> None:
     assert len(known.robots) == MAX_ROBOTS
 
 
-def test_robot_that_joins_the_fleet_is_known(settings) -> None:
+def test_robot_that_joins_the_fleet_is_saved_as_known(settings) -> None:
     fleet = Fleet(Watches(lambda _t: None, lambda _t: None), lambda _what, _job: None, settings=settings)
     fleet.connect(robot("NAO"), "robot_action NAO")
     assert [one.name for one in KnownRobots(settings).robots] == ["NAO"]

@@ -42,7 +42,7 @@ def test_running_virtual_robots_are_restored_and_stopped_ones_are_not(tmp_path: 
     assert next_start(tmp_path) == {}
 
 
-def test_start_without_restored_robots_keeps_the_list(tmp_path: Path) -> None:
+def test_start_without_restoring_robots_keeps_the_saved_list(tmp_path: Path) -> None:
     Settings(tmp_path).set(KEPT, {"Pepper": "pepper"})
     LastRobots(Settings(tmp_path)).save(Launcher())
     assert next_start(tmp_path) == {"Pepper": "pepper"}

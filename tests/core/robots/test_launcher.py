@@ -60,7 +60,7 @@ def test_missing_virtual_robot_is_started_at_once(world: World) -> None:
     assert len(world.started) == 1  # that it ended is another matter: it is told, not started again
 
 
-def test_virtual_robot_is_started_when_the_existing_one_has_ended(world: World) -> None:
+def test_virtual_robot_is_started_after_the_existing_robot_has_ended(world: World) -> None:
     world.there = True
     world.launcher.start_virtual_robot()
     world.after(REQUEST_LIFETIME_S - 1)
@@ -117,7 +117,7 @@ def test_canceled_start_request_is_dropped(world: World, end: Callable[[Launcher
     assert not world.started
 
 
-def test_restart_is_not_a_second_start_request(world: World) -> None:
+def test_restart_does_not_add_a_second_start_request(world: World) -> None:
     world.there = True
     world.launcher.start_virtual_robot()
     world.launcher.restart_virtual_robot("Pepper")
@@ -142,7 +142,7 @@ def test_second_studio_uses_the_running_pepper(master: Master, tmp_path: Path) -
             second.close()
 
 
-def test_fleet_knows_running_robots_after_the_first_graph() -> None:
+def test_running_robots_are_known_after_the_first_graph() -> None:
     fleet = Fleet(Watches(lambda _topic: None, lambda _topic: None), lambda _what, _job: None)
     assert fleet.is_present("Pepper") is None
     fleet.update(GraphView(1, 1))

@@ -46,7 +46,7 @@ def test_actions_without_risk_need_no_permission(rover) -> None:
     assert MotionPermission().request_permission([(rover, ["light", "stop"])], pytest.fail)
 
 
-def test_permission_continues_once_and_lasts_for_the_session(rover) -> None:
+def test_granted_permission_continues_once_and_lasts_for_the_session(rover) -> None:
     moving, done = MotionPermission(), []
     moving.request_permission([(rover, ["move"])], lambda: done.append(1))
     moving.answer(let=True)
@@ -58,7 +58,7 @@ def test_permission_continues_once_and_lasts_for_the_session(rover) -> None:
     assert not MotionPermission().request_permission([(rover, ["move"])], lambda: None)  # and each session
 
 
-def test_denied_permission_moves_nothing_and_asks_again(rover) -> None:
+def test_denied_permission_prevents_motion_and_is_requested_again(rover) -> None:
     moving = MotionPermission()
     moving.request_permission([(rover, ["move"])], pytest.fail)
     moving.answer(let=False, always=True)
@@ -117,7 +117,7 @@ def test_robot_moved_by_publishing_needs_permission_for_all_actions(rover) -> No
     assert "move" in actions
 
 
-def test_error_names_the_robots() -> None:
+def test_permission_error_names_the_robots() -> None:
     assert "Rover and Tim can't move yet" in str(MayNotMoveError(["Rover", "Tim"]))
 
 

@@ -23,7 +23,7 @@ def ledger() -> Ledger:
     return Ledger()
 
 
-def test_robot_is_removed_when_its_program_proves_a_stop(ledger: Ledger) -> None:
+def test_robot_is_removed_when_its_program_confirms_a_stop(ledger: Ledger) -> None:
     ledger.record_command(["Pepper"], "shelf")
     ledger.record_stopped("Pepper", {"stranger"}, ledger.mark)
     assert ledger.names == ("Pepper",)
@@ -31,7 +31,7 @@ def test_robot_is_removed_when_its_program_proves_a_stop(ledger: Ledger) -> None
     assert ledger.names == ()
 
 
-def test_stop_does_not_prove_commands_sent_after_it_began(ledger: Ledger) -> None:
+def test_confirmed_stop_does_not_cover_later_commands(ledger: Ledger) -> None:
     ledger.record_command(["Pepper"], "form", id="1")
     mark = ledger.mark
     ledger.record_command(["Pepper"], "key")
@@ -56,7 +56,7 @@ def test_final_reply_does_not_end_continuous_motion(ledger: Ledger) -> None:
     assert "Pepper" in ledger
 
 
-def test_restarted_program_does_not_prove_stop_of_its_possibly_running_predecessor(ledger: Ledger) -> None:
+def test_restarted_program_does_not_confirm_the_stop_of_its_running_predecessor(ledger: Ledger) -> None:
     ledger.record_command(["Pepper"], "behaviour")
     ledger.now = NEW
     assert ledger.other_programs("Pepper", NEW) == (OLD,)
@@ -78,13 +78,13 @@ def test_virtual_robot_is_removed_when_its_program_ends(ledger: Ledger) -> None:
     assert "Pepper" not in ledger
 
 
-def test_confirmation_of_the_user_removes_the_robot(ledger: Ledger) -> None:
+def test_user_confirmation_removes_the_robot(ledger: Ledger) -> None:
     ledger.record_command(["Pepper", "Turtle"], "bridge")
     ledger.confirm(["Turtle", "Nobody"])
     assert ledger.names == ("Pepper",)
 
 
-def test_cause_of_motion_is_preferred_over_missing_stop_reply(ledger: Ledger) -> None:
+def test_cause_of_motion_takes_precedence_over_missing_stop_reply(ledger: Ledger) -> None:
     ledger.record_command(["Pepper"], "alarm")
     ledger.record_command(["Pepper"], "stop")
     motion = ledger.motion("Pepper")
@@ -94,7 +94,7 @@ def test_cause_of_motion_is_preferred_over_missing_stop_reply(ledger: Ledger) ->
     assert ledger.motion("Turtle") is None
 
 
-def test_number_of_motions_is_limited_without_forgetting_any(ledger: Ledger) -> None:
+def test_recorded_motions_are_limited_without_removing_a_moving_robot(ledger: Ledger) -> None:
     for number in range(3 * MAX_MOTIONS):
         ledger.record_command(["Pepper"], "form", id=str(number))
         ledger.record_command(["Pepper"], "key")
@@ -115,7 +115,9 @@ def newcomer_after(ledger: Ledger, graphs: int) -> None:
 
 
 @pytest.mark.parametrize("graphs", [0, 1])
-def test_twin_that_appears_right_after_a_command_may_have_received_it(ledger: Ledger, graphs: int) -> None:
+def test_second_program_appearing_right_after_a_command_may_have_received_the_command(
+    ledger: Ledger, graphs: int
+) -> None:
     newcomer_after(ledger, graphs)
     assert ledger.other_programs("Pepper", OLD) == (NEW,)
     ledger.record_stopped("Pepper", {"old"}, ledger.mark)
@@ -124,19 +126,19 @@ def test_twin_that_appears_right_after_a_command_may_have_received_it(ledger: Le
     assert "Pepper" not in ledger
 
 
-def test_twin_that_appears_later_has_not_received_the_command(ledger: Ledger) -> None:
+def test_second_program_appearing_later_has_not_received_the_command(ledger: Ledger) -> None:
     newcomer_after(ledger, 2)
     assert "Pepper" not in ledger
 
 
-def test_twin_with_a_proven_stop_is_not_a_newcomer(ledger: Ledger) -> None:
+def test_second_program_with_a_confirmed_stop_is_not_recorded_as_new(ledger: Ledger) -> None:
     ledger.record_command(["Pepper"], "form", id="1")
     ledger.record_stopped("Pepper", {"old", "new"}, ledger.mark)
     ledger.record_new_programs({"Pepper": [NEW]})
     assert "Pepper" not in ledger
 
 
-def test_confirmation_of_the_user_includes_newcomers(ledger: Ledger) -> None:
+def test_user_confirmation_includes_newly_appeared_programs(ledger: Ledger) -> None:
     ledger.record_command(["Pepper"], "key")
     ledger.confirm(["Pepper"])
     assert ledger.recently_commanded == ()

@@ -112,7 +112,7 @@ def test_pause_interrupts_walk_and_resume_completes_it(master, pepper, node) -> 
         runner.close()
 
 
-def test_step_completes_a_held_action(master, pepper, node) -> None:
+def test_step_completes_a_paused_action(master, pepper, node) -> None:
     (robot,) = find_robots(node, 30, wanted=("Pepper",)).robots
     walks = [block("robot_pepper_do_walk", ROBOT="Pepper", DISTANCE=number(0.4)) for _ in range(2)]
     program = compile_behaviour(workspace(started(*walks)), (robot,), name="Walk")

@@ -101,7 +101,7 @@ def test_user_can_confirm_that_robot_stands_still_after_rejected_stop(session: S
     assert link.state == "ready"
 
 
-def test_neither_disconnection_nor_new_program_of_same_name_proves_a_stop(
+def test_neither_disconnection_nor_new_program_of_same_name_confirms_a_stop(
     session: Session, master: Master
 ) -> None:
     with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node):
@@ -122,7 +122,7 @@ def test_neither_disconnection_nor_new_program_of_same_name_proves_a_stop(
         other.close()
 
 
-def test_robot_lost_without_stop_is_asked_again_until_the_user_confirms(
+def test_stop_is_resent_to_robot_lost_without_stop_until_the_user_confirms(
     session: Session, master: Master
 ) -> None:
     with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node):
@@ -145,7 +145,7 @@ def test_rejected_stop_of_a_single_robot_is_an_alert(session: Session, arm: Driv
     assert "the brake does not answer" in link.stop_problem
 
 
-def test_run_prints_rejection_of_the_robot(master: Master, arm: Driver, tmp_path: Path) -> None:
+def test_run_prints_the_rejection_message_of_the_robot(master: Master, arm: Driver, tmp_path: Path) -> None:
     path, out = tmp_path / "wave.nepb", io.StringIO()
     wave = workspace(started(block("robot_arm_do_wave", ROBOT="Arm")))
     robots = {"Arm": arm.description}
@@ -209,7 +209,7 @@ def test_first_stop_replies_are_shown_while_others_are_pending(patient: Session,
             robot.close()
 
 
-def test_later_stop_includes_robots_without_reply_to_an_earlier_one(
+def test_later_stop_includes_robots_that_did_not_reply_to_an_earlier_stop(
     patient: Session, pepper: WireRobot
 ) -> None:
     link = the_link(patient, "Pepper")
@@ -258,7 +258,9 @@ def test_ongoing_action_is_shown_until_robot_reports_its_end(session: Session, p
     tick_until(session, lambda: not session.alerts.has("moving:Pepper"))
 
 
-def test_robot_whose_stop_is_always_late_is_asked_only_once_more(session: Session, pepper: WireRobot) -> None:
+def test_stop_is_repeated_only_once_for_a_robot_whose_stop_is_always_late(
+    session: Session, pepper: WireRobot
+) -> None:
     link = the_link(session, "Pepper")
     say_ = pepper._say
     pepper._say = lambda command, state, error="": say_(command, "failed", SAID)  # type: ignore[method-assign]
@@ -327,7 +329,9 @@ def test_late_stop_reply_updates_the_result(session: Session, pepper: WireRobot)
     assert report.elapsed_ms >= (report.robots[0].elapsed_ms or 0) > 1000
 
 
-def test_silent_robots_of_the_program_are_asked_again(session: Session, pepper: WireRobot) -> None:
+def test_stop_is_resent_to_robots_that_did_not_reply_to_the_program(
+    session: Session, pepper: WireRobot
+) -> None:
     the_link(session, "Pepper")
     pepper.silent = {"stop"}
     session.document.apply_edit(workspace(started(block("control_wait", SECONDS=number(600)))))

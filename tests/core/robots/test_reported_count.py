@@ -24,7 +24,7 @@ def lab(tmp_path: Path) -> Iterator[SimulatedLab]:
     "hostile",
     [None, True, -1, 3.0, "4", [5], {"count": 6}, MAX_COUNT + 1, 10**400, float("nan"), float("inf")],
 )
-def test_anything_but_a_count_is_ignored(hostile: object) -> None:
+def test_value_that_is_not_a_count_is_ignored(hostile: object) -> None:
     count = ReportedCount()
     count.update(hostile, 1.0)
     assert (count.value, count.is_growing(1.0)) == (0, False)

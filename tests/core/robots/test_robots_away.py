@@ -99,7 +99,7 @@ def strangers() -> Strangers:
     return Strangers()
 
 
-def test_invented_robots_are_forgotten_and_their_resources_closed(
+def test_fake_robots_are_evicted_and_their_resources_closed(
     strangers: Strangers,
 ) -> None:
     strangers.pass_by(1000)
@@ -133,7 +133,7 @@ def test_moved_robot_that_left_is_still_named_by_stop(strangers: Strangers) -> N
 
 
 @pytest.mark.parametrize("why", ["proven", "chosen", "used", "being stopped", "not stopped"])
-def test_important_robots_are_not_forgotten(strangers: Strangers, why: str) -> None:
+def test_stopped_selected_or_used_robots_are_not_evicted(strangers: Strangers, why: str) -> None:
     fleet = strangers.fleet
     link = strangers.come("Pepper")
     if why == "proven":
@@ -154,7 +154,7 @@ def test_important_robots_are_not_forgotten(strangers: Strangers, why: str) -> N
     assert len(fleet.links) == MAX_DISCONNECTED + 1
 
 
-def test_robots_that_replied_are_forgotten_last(strangers: Strangers) -> None:
+def test_robots_that_replied_are_evicted_last(strangers: Strangers) -> None:
     strangers.come("Pepper").replied_s = 1.0
     strangers.come("Silent")
     strangers.leave()
@@ -163,7 +163,7 @@ def test_robots_that_replied_are_forgotten_last(strangers: Strangers) -> None:
     assert "Silent" not in strangers.names
 
 
-def test_forgotten_robot_that_returns_is_new(strangers: Strangers) -> None:
+def test_evicted_robot_that_returns_is_new(strangers: Strangers) -> None:
     before = strangers.come("Rover")
     strangers.leave()
     strangers.pass_by(300)
@@ -175,7 +175,7 @@ def test_forgotten_robot_that_returns_is_new(strangers: Strangers) -> None:
     assert strangers.published["/Rover/command"] == 1
 
 
-def test_alerts_of_forgotten_robots_are_resolved(strangers: Strangers) -> None:
+def test_alerts_of_evicted_robots_are_resolved(strangers: Strangers) -> None:
     alerts = Alerts()
     health = Health(Topics(), strangers.fleet, alerts, strangers.clock.now)
     strangers.come("Rover")

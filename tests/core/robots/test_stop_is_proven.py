@@ -66,7 +66,7 @@ def stranger(master: Master) -> Iterator[Stranger]:
     made.node.close()
 
 
-def test_foreign_reply_does_not_prove_stop_of_a_frozen_robot(stopper, pepper, stranger) -> None:
+def test_foreign_reply_does_not_confirm_stop_of_a_frozen_robot(stopper, pepper, stranger) -> None:
     pepper.silent = {"stop"}
     report = stopper.stop_all(["Pepper"], timeout_s=SHORT_S)
     assert stranger.answered.is_set()
@@ -89,7 +89,7 @@ def test_foreign_node_that_only_replies_is_named(master, stopper, pepper) -> Non
     assert reports[0].strangers == (("Pepper", "liar"),)
 
 
-def test_two_robots_of_one_name_must_both_reply(master, stopper, pepper) -> None:
+def test_two_robots_of_the_same_name_must_both_reply(master, stopper, pepper) -> None:
     twin = WireRobot(master.address)
     try:
         stopper.update_graph(stopper._node.graph())
@@ -119,7 +119,7 @@ def test_other_subscriber_of_the_commands_is_named(master, stopper) -> None:
     assert [robot.message for robot in report.robots][1:] == [said]
 
 
-def test_many_other_subscribers_are_one_line(master, stopper) -> None:
+def test_many_other_subscribers_are_summarized_in_one_line(master, stopper) -> None:
     nodes = [nep.node(f"listener {number}", master=master.address) for number in range(6)]
     for node in nodes:
         node.new_sub("/Pepper/command", "robot/command")
@@ -131,7 +131,7 @@ def test_many_other_subscribers_are_one_line(master, stopper) -> None:
     assert report.is_proven
 
 
-def test_first_announcing_program_is_the_robot(master, stopper, pepper) -> None:
+def test_first_program_that_announces_a_robot_counts_as_the_robot(master, stopper, pepper) -> None:
     twin = WireRobot(master.address)
     try:
         view = stopper._node.graph()
@@ -160,7 +160,7 @@ def test_stop_is_also_sent_to_topics_of_earlier_descriptions(master, stopper, pe
     assert pepper.heard("stop")
 
 
-def test_robot_that_stop_was_not_sent_to_is_named() -> None:
+def test_robot_that_did_not_receive_stop_is_named() -> None:
     report = StopReport((RobotStop("Pepper", True, 3.0),), 3.0)
     whole = report.with_unreached(["Pepper", "Turtle"], "no master answers")
     assert (whole.is_proven, whole.unconfirmed_names) == (False, ("Turtle",))

@@ -354,7 +354,7 @@ BROKEN_HISTORIES: dict[str, list[Step]] = {
 
 
 @pytest.mark.parametrize("history", BROKEN_HISTORIES.values(), ids=BROKEN_HISTORIES)
-def test_histories_that_once_broke_a_proof(history: list[Step]) -> None:
+def test_regression_histories_keep_confirmed_stops_correct(history: list[Step]) -> None:
     model = StopModel()
     try:
         model.start(both=True)
@@ -366,7 +366,7 @@ def test_histories_that_once_broke_a_proof(history: list[Step]) -> None:
 
 
 @pytest.mark.timeout(600 + HISTORIES)
-def test_proven_stop_is_true_in_every_history() -> None:
+def test_confirmed_stop_is_correct_in_random_histories() -> None:
     count = HISTORIES or FIXED_HISTORIES
     run_state_machine_as_test(
         StopModel,
@@ -382,7 +382,7 @@ def test_proven_stop_is_true_in_every_history() -> None:
     )
 
 
-def test_killed_program_does_not_prevent_proof_for_its_twin() -> None:
+def test_killed_program_does_not_prevent_stop_confirmation_by_its_namesake() -> None:
     model = StopModel()
     try:
         model.start(both=False)

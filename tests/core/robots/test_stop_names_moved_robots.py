@@ -56,7 +56,7 @@ def recover(robot: SimulatedRobot) -> None:
 
 
 @pytest.mark.parametrize("how", ["hung", "frozen", "killed", "left", "replaced"])
-def test_robot_lost_while_moving_is_named_until_it_answers_or_a_person_confirms(
+def test_robot_lost_while_moving_is_named_until_it_replies_or_the_user_confirms(
     lab: SimulatedLab, how: str
 ) -> None:
     pepper = lab.start_robot("Pepper")
@@ -119,7 +119,7 @@ def test_stop_names_the_cause_of_motion(lab: SimulatedLab, by: str) -> None:
     assert motion.reason in session.runs.view().detail
 
 
-def test_stop_without_robots_ends_ready_and_proves_nothing(lab: SimulatedLab) -> None:
+def test_stop_without_robots_ends_ready_without_confirmation(lab: SimulatedLab) -> None:
     lab.stop()
     view = lab.studio.session.runs.view()
     assert (view.state, view.result_status, view.can_run) == ("ready", "off", True)
@@ -148,7 +148,7 @@ def test_stop_pressed_before_the_connection_is_delivered_late_and_reported(lab: 
     assert report.robots[0].waited_ms
 
 
-def test_stop_is_not_delivered_late_after_a_person_confirmed(lab: SimulatedLab) -> None:
+def test_stop_is_not_delivered_late_after_the_user_confirmed(lab: SimulatedLab) -> None:
     pepper, runs = start_unreachable_robot(lab), lab.studio.session.runs
     lab.stop()
     runs.confirm_stopped()
@@ -168,7 +168,7 @@ def flood(lab: SimulatedLab, topic: str) -> None:
     lab.studio.hand_to_stopper(topic, batch)
 
 
-def test_flood_of_foreign_replies_does_not_displace_reply_of_the_robot(lab: SimulatedLab) -> None:
+def test_flood_of_foreign_replies_does_not_evict_the_reply_of_the_robot(lab: SimulatedLab) -> None:
     pepper, runs = lab.start_robot("Pepper"), lab.studio.session.runs
     topic = lab.wait_for_link("Pepper").robot.topics.answer
     pepper.node.is_held = True
@@ -207,7 +207,7 @@ def test_stopper_does_not_decode_foreign_replies(lab: SimulatedLab, sender: str)
 
 @pytest.mark.parametrize("announcing", ["one node", "many nodes"])
 @pytest.mark.parametrize("order", ["before", "after"])
-def test_invented_robots_do_not_prevent_stop_of_a_real_robot(
+def test_fake_robots_do_not_prevent_stop_of_a_real_robot(
     lab: SimulatedLab, order: str, announcing: str
 ) -> None:
     invented = [f"A{number}" for number in range(MAX_ROBOTS + 20)]
@@ -244,7 +244,7 @@ def test_robot_whose_lease_expired_after_its_reply_still_receives_stop(lab: Simu
     assert lab.studio.session.runs.view().state == "ready", "nobody waits for its answer"
 
 
-def test_reply_of_another_program_does_not_prove_a_stop(lab: SimulatedLab) -> None:
+def test_reply_of_another_program_does_not_confirm_a_stop(lab: SimulatedLab) -> None:
     pepper, runs = lab.start_robot("Pepper"), lab.studio.session.runs
     lab.wait_for_link("Pepper")
     pepper.node.is_held = True

@@ -54,7 +54,7 @@ def bench() -> Bench:
     return Bench()
 
 
-def test_trial_passes_through_its_states_and_is_kept(bench) -> None:
+def test_trial_passes_through_its_states_and_is_recorded(bench) -> None:
     made = bench.begin("move", distance=0.5)
     assert bench.sent[0]["input"] == {"distance": 0.5}
     assert made.state == "sent"
@@ -104,7 +104,7 @@ def test_trial_fails_two_seconds_after_robot_falls_silent(bench) -> None:
     assert bench.sent[-1] == {"id": made.id, "op": "cancel", "from": "studio", "action": "move"}
 
 
-def test_robot_without_heartbeat_is_awaited_until_the_time_limit(bench) -> None:
+def test_trial_on_robot_without_heartbeat_waits_until_the_time_limit(bench) -> None:
     bench.link.robot = replace(bench.link.robot, beat_s=None)
     made = bench.begin()
     bench.answer(made, "running")

@@ -62,7 +62,9 @@ def test_pepper_and_turtle_work_in_one_behaviour(session: Session, node: nep.Nod
             assert (link.drawing["figure"], link.drawing["eyes"]) == ("turtle", "#ff0000")
 
 
-def test_panels_show_the_chosen_robot_or_the_first_connected(session: Session, node: nep.Node) -> None:
+def test_panels_show_the_selected_robot_or_the_first_connected_robot(
+    session: Session, node: nep.Node
+) -> None:
     with Driver(simulated.ROBOT, "Pepper", node):
         there(session, "Pepper")
         with Driver(turtle.ROBOT, "Turtle", node):
@@ -186,7 +188,7 @@ def wait(seconds: float) -> dict[str, object]:
     return block("control_wait", "w", SECONDS=number(seconds))
 
 
-def test_pause_halts_a_driving_robot_and_resume_lets_it_drive_again(session: Session, node: nep.Node) -> None:
+def test_pause_halts_a_driving_robot_and_resume_continues_the_drive(session: Session, node: nep.Node) -> None:
     with Driver(turtle.ROBOT, "Turtle", node) as driver:
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]
@@ -204,7 +206,7 @@ def test_pause_halts_a_driving_robot_and_resume_lets_it_drive_again(session: Ses
         assert wheels.still()
 
 
-def test_step_does_not_leave_a_robot_driving(session: Session, node: nep.Node) -> None:
+def test_robot_stands_still_after_a_single_step(session: Session, node: nep.Node) -> None:
     with Driver(turtle.ROBOT, "Turtle", node) as driver:
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]

@@ -56,17 +56,19 @@ def process() -> Iterator[subprocess.Popen[bytes]]:
     made.communicate()
 
 
-def test_process_started_here_is_own(process: subprocess.Popen[bytes]) -> None:
+def test_process_started_by_this_studio_is_recognized(process: subprocess.Popen[bytes]) -> None:
     known = VirtualProcesses(MODULES, lambda: [process.pid])
     assert known.is_started_by_studio(Identity("n", "Turtle", HERE, process.pid))
     assert known.is_started_by_studio(Identity("n", "Turtle", HERE, os.getpid()))
 
 
-def test_process_that_only_mentions_the_module_is_not_own(process: subprocess.Popen[bytes]) -> None:
+def test_process_that_only_mentions_the_module_is_not_recognized(process: subprocess.Popen[bytes]) -> None:
     assert not VirtualProcesses(MODULES).is_started_by_studio(Identity("n", "Turtle", HERE, process.pid))
 
 
-def test_process_on_another_computer_or_unknown_process_is_not_own(process: subprocess.Popen[bytes]) -> None:
+def test_process_on_another_computer_or_unknown_process_is_not_recognized(
+    process: subprocess.Popen[bytes],
+) -> None:
     known = VirtualProcesses(MODULES, lambda: [process.pid])
     assert not known.is_started_by_studio(Identity("n", "Turtle", "another-computer", process.pid))
     assert not known.is_started_by_studio(Identity("n", "Turtle", HERE, None))
@@ -74,7 +76,7 @@ def test_process_on_another_computer_or_unknown_process_is_not_own(process: subp
     assert not known.is_started_by_studio(Identity("n", "Turtle", HERE, 1))
 
 
-def test_virtual_robot_of_another_studio_of_this_user_is_own(master: Master) -> None:
+def test_virtual_robot_started_by_another_studio_of_this_user_is_recognized(master: Master) -> None:
     command = [sys.executable, "-m", "app.robots.turtle", "--name", "Turtle", "--owner-pid", str(os.getpid())]
     made = subprocess.Popen(command, env={**os.environ, "NEP_MASTER": master.address})
     try:
@@ -88,7 +90,7 @@ def test_virtual_robot_of_another_studio_of_this_user_is_own(master: Master) -> 
         made.wait(10)
 
 
-def test_process_end_is_known_only_on_this_computer(
+def test_process_end_is_detected_only_on_this_computer(
     process: subprocess.Popen[bytes],
 ) -> None:
     known = VirtualProcesses(MODULES)

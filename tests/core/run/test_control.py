@@ -58,7 +58,7 @@ def test_robots_are_stopped_before_the_program_ends_and_awaited_afterwards() -> 
     assert steps.done == [("stop sent", "p1"), ("program ended", None), ("robots awaited", "p1")]
 
 
-def test_stop_is_unproven_when_stopper_and_runner_raise(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stop_is_unconfirmed_when_stopper_and_runner_raise(monkeypatch: pytest.MonkeyPatch) -> None:
     steps, posted = Steps(), list[object]()
     monkeypatch.setattr(Steps, "stop", failing)
     monkeypatch.setattr(Steps, "send_stop", failing)
@@ -72,7 +72,7 @@ def test_stop_is_unproven_when_stopper_and_runner_raise(monkeypatch: pytest.Monk
     assert done.report.robots[0].problem == "Stop wasn't sent to Arm: OSError: out of order"
 
 
-def test_stop_of_one_robot_is_unproven_when_the_stopper_raises(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stop_of_one_robot_is_unconfirmed_when_the_stopper_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Steps, "stop_all", failing)
     posted = list[object]()
     stop_robot(posted.append, cast("RobotStopper", Steps()), "Arm", 3)

@@ -22,7 +22,7 @@ class Program:
         self.told.append(guarded)
 
 
-def test_program_is_informed_of_unreadable_robots_without_repetition() -> None:
+def test_topics_of_robots_with_unreadable_descriptions_are_sent_to_the_program_once() -> None:
     fleet = SimpleNamespace(
         connected=(),
         moved=MovedRobots(),

@@ -84,7 +84,7 @@ def test_failing_block_is_reported(pepper, saved):
     assert "Pepper stopped (" in out
 
 
-def test_interrupt_stops_the_run_with_a_proven_stop(pepper, saved):
+def test_interrupt_stops_the_run_with_a_confirmed_stop(pepper, saved):
     pepper.slow = {"say"}
     interrupted = threading.Event()
     found: list[tuple[int, str]] = []
@@ -146,7 +146,7 @@ def test_robot_without_description_in_the_file_is_awaited(master, saved):
     assert "Pepper not found" in out
 
 
-def test_unusable_file_is_rejected(master, saved, tmp_path):
+def test_file_with_errors_or_without_start_block_is_rejected(master, saved, tmp_path):
     code, out = run(saved(workspace(started(block("control_wait")))))
     assert (code, "error: wait needs a number." in out) == (UNUSABLE, True)
     assert run(saved(workspace()))[0] == UNUSABLE

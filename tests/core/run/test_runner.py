@@ -165,7 +165,7 @@ def test_question_includes_its_choices(runner, heard, master):
     assert heard.until("print").text == "2"
 
 
-def test_pause_step_and_resume(runner, heard, master):
+def test_program_can_be_paused_stepped_and_resumed(runner, heard, master):
     made = runner()
     first, second = write(text("1")) | {"id": "a"}, write(text("2")) | {"id": "b"}
     made.start(program(first, second), [], master.address, paused=True)
@@ -205,7 +205,7 @@ def test_stop_ends_endless_program_at_once(runner, heard, master):
     assert kinds.count("ended") == 1
 
 
-def test_stop_interrupts_a_block_that_computes_endlessly(runner, heard, master):
+def test_stop_interrupts_a_block_in_an_infinite_computation(runner, heard, master):
     power = number(9)
     for _ in range(3):
         power = block("values_arithmetic", A=number(9), SIGN="**", B=power)
@@ -320,7 +320,7 @@ def test_error_event_has_block_and_message(runner, heard, master):
     assert not heard.until("ended").is_ok
 
 
-def test_frozen_studio_runs_itself_as_child(monkeypatch):
+def test_packaged_studio_runs_its_own_executable_as_child(monkeypatch):
     monkeypatch.setattr(sys, "frozen", True, raising=False)
     assert child_command() == (sys.executable, "--child")
 

@@ -140,7 +140,7 @@ def test_error_output_is_bounded(started, heard) -> None:
 # ---- pipes and processes ---------------------------------------------------------------------------
 
 
-def test_program_that_closes_its_output_is_ended(started, heard) -> None:
+def test_program_that_closes_its_output_is_stopped(started, heard) -> None:
     started(CLOSES)
     assert heard.until("ended").text == "The program lost its connection to Studio and was stopped."
 

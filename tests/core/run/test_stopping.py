@@ -67,13 +67,13 @@ def test_only_named_robots_are_stopped(stopper, robots):
     assert robots[0].heard("stop") == []
 
 
-def test_unknown_robot_name_is_in_the_report(stopper, robots):
+def test_unknown_robot_name_is_reported_as_unconfirmed(stopper, robots):
     report = stopper.stop_all(["Turtle", "Nobody"], timeout_s=LONG_S)
     assert (report.is_proven, report.unconfirmed_names) == (False, ("Nobody",))
     assert report.robots[1].message == "Stop wasn't sent to Nobody. Switch it off by hand."
 
 
-def test_stop_without_robots_proves_nothing(stopper):
+def test_stop_without_robots_is_not_confirmed(stopper):
     stopper.set_robots(())
     report = stopper.stop_all()
     assert (report.robots, report.is_proven, report.status) == ((), False, "off")
@@ -87,7 +87,7 @@ def test_failed_stop_is_reported_with_robot_message(stopper, robots):
     assert report.robots[0].message == "Pepper may still move: the brake is stuck. Switch it off by hand."
 
 
-def test_robot_that_replies_for_another_or_twice_proves_nothing(stopper, robots):
+def test_replies_for_another_robot_and_duplicate_replies_do_not_confirm_a_stop(stopper, robots):
     pepper, turtle = robots
     turtle.silent = {"stop"}
     say_ = pepper._say
@@ -147,7 +147,7 @@ def test_stop_names_the_program_to_end(stopper, robots):
         assert [stop.get("ends") for stop in robot.heard("stop")] == ["program-1", "program-2", None]
 
 
-def test_two_simultaneous_stops_both_get_replies(stopper):
+def test_two_simultaneous_stops_both_receive_replies(stopper):
     reports: list[StopReport] = []
     threads = [threading.Thread(target=lambda: reports.append(stopper.stop_all())) for _ in range(2)]
     for thread in threads:
@@ -158,7 +158,7 @@ def test_two_simultaneous_stops_both_get_replies(stopper):
 
 
 @pytest.mark.parametrize("how", ["obeys", "computes for ever", "was killed"])
-def test_robots_stay_stopped_whatever_the_program_does(master, stopper, robots, how):
+def test_robots_stay_stopped_regardless_of_the_program(master, stopper, robots, how):
     """A program moves a robot, Stop is pressed, the robot has answered, and nothing moves it again."""
     robots[0].slow = {"say"} if how == "obeys" else set()
     power = number(9)

@@ -24,7 +24,7 @@ def began(stack: Stack | None) -> tuple[Trial, str]:
     return made, made.start(program, [robot("Pepper")])
 
 
-def test_tried_value_is_shown_with_its_unit() -> None:
+def test_trial_value_is_shown_with_its_unit() -> None:
     trial, words = began(BATTERY)
     assert words == "battery"
     assert trial.value is None
@@ -33,12 +33,12 @@ def test_tried_value_is_shown_with_its_unit() -> None:
     assert (trial.value.block, trial.value.text) == ("bat", "84 %")
 
 
-def test_empty_line_is_an_unknown_value() -> None:
+def test_empty_output_line_is_an_unknown_value() -> None:
     trial, _words = began(BATTERY)
     assert trial.parse_line("") == "not known yet"
 
 
-def test_next_run_clears_the_tried_value() -> None:
+def test_next_run_clears_the_trial_value() -> None:
     trial, _words = began(BATTERY)
     trial.parse_line("84")
     trial.prepare(RequestedRun(Document()))

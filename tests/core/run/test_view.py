@@ -43,7 +43,7 @@ def test_running_state_shows_elapsed_time_and_activity() -> None:
     assert elsewhere.title == "Greeting is starting"
 
 
-def test_paused_state_warns_what_resume_will_skip() -> None:
+def test_paused_state_warns_of_actions_that_resume_will_skip() -> None:
     said = "Rover doesn't report how much of “drive” is left; Resume skips it"
     run = RunState("paused", "Greeting", paused_at="drive 2 m", warning=said)
     assert view_of(run, ["Rover"], 1.0).detail == said
@@ -71,13 +71,13 @@ def test_stopping_state_appears_after_100_ms_and_counts_replies() -> None:
     assert not view.can_run
 
 
-def test_stop_after_unproven_stop_never_shows_ready() -> None:
+def test_repeated_stop_after_unconfirmed_stop_never_shows_ready() -> None:
     run = RunState("stopping", "Greeting", pressed_s=10.0, robots_to_stop=("Pepper",), is_stop_repeated=True)
     view = view_of(run, [], 10.01)
     assert (view.state, view.title, view.stop_label) == ("stopping", "Stopping", "Stopping")
 
 
-def test_proven_stop_shows_its_duration() -> None:
+def test_confirmed_stop_shows_its_duration() -> None:
     view = view_of(after(PEPPER, TURTLE, elapsed_s=14.0, has_stopped_blocks=True), [], 0)
     assert (view.title, view.detail) == ("Stopped after 14 s", "It stopped at the dashed block")
     assert (view.result, view.result_status) == ("all 2 robots stopped (41 ms)", "ok")
@@ -193,11 +193,11 @@ def test_stop_results_are_formatted() -> None:
         ((PEPPER, RobotStop("Pepper", False, None, can_confirm=False, program="motor box")), "ok"),
     ],
 )
-def test_only_complete_proof_has_ok_status(robots: tuple[RobotStop, ...], status: str) -> None:
+def test_only_fully_confirmed_stop_has_ok_status(robots: tuple[RobotStop, ...], status: str) -> None:
     assert StopReport(robots, 41.0).status == status
 
 
-def test_program_without_robots_shows_its_end_and_proves_nothing() -> None:
+def test_program_without_robots_shows_its_end_without_stop_result() -> None:
     run = RunState("ready", "Greeting", elapsed_s=3.0, finished=True, report=StopReport((), 0.0))
     view = view_of(run, [], 0)
     assert (view.state, view.title, view.result, view.result_status) == (

@@ -42,7 +42,7 @@ def test_stack_with_block_of_disconnected_robot_cannot_be_tried() -> None:
     assert wanted.problems(program) == {"ada": "Ada isn't connected, so these blocks can't be tried."}
 
 
-def test_requested_value_has_its_unit() -> None:
+def test_requested_value_has_the_unit_of_its_sensor() -> None:
     battery = block("robot_pepper_get_battery", "bat", ROBOT="Pepper")
     wanted = RequestedRun(document("Pepper"), stack=Stack("bat", "value", battery))
     program = wanted.program()

@@ -184,7 +184,7 @@ class ItsProgram:
         return list(self.words)
 
 
-def test_windows_system_processes_are_not_part_of_the_test() -> None:
+def test_windows_system_processes_are_excluded_from_the_self_test() -> None:
     for program in (r"C:\Windows\explorer.exe", r"c:\windows\System32\conhost.exe"):
         assert is_windows_program(ItsProgram(program), r"C:\Windows")
         assert is_windows_program(ItsProgram("", (program, "/desktop")), r"C:\Windows")

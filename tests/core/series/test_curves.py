@@ -114,7 +114,7 @@ def test_long_silence_is_a_gap_and_short_silence_is_not() -> None:
     assert [t for t, _v, gap in points(x) if gap] == [9.0]
 
 
-def test_slower_topic_becomes_a_continuous_line_again() -> None:
+def test_topic_with_a_lower_rate_becomes_a_continuous_line_again() -> None:
     case = Case()
     x = case.curve("/a.x")
     case.send("/a", *((n / 1000, {"x": n}) for n in range(50)))
@@ -219,7 +219,7 @@ def test_curves_stay_sorted_and_finite_for_any_input(rows) -> None:
 # -- calculated ---------------------------------------------------------------------------------------
 
 
-def test_calculated_curves() -> None:
+def test_calculated_curves_have_correct_values() -> None:
     case = Case()
     names = ("difference(/a.x)", "derivative(/a.x)", "integral(/a.x)", "mean(/a.x, 0.25 s)", "/a.x * 10")
     difference, derivative, integral, mean, times = (case.curve(name) for name in names)

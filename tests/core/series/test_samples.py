@@ -135,7 +135,7 @@ def series(draw) -> tuple[Samples, list[Row]]:
 
 @settings(max_examples=15, deadline=None)
 @given(series(), st.floats(-0.1, 1.1), st.floats(-0.1, 1.1))
-def test_figures_of_a_range_match_its_samples(made, one, other) -> None:
+def test_stats_of_a_range_match_its_samples(made, one, other) -> None:
     samples, rows = made
     length = rows[-1][0]
     begin, end = sorted((one * length, other * length))
@@ -265,7 +265,7 @@ def test_rewritten_samples_are_redrawn() -> None:
     assert line.values[line.times > 10.5].min() == 1
 
 
-def test_oldest_samples_are_evicted_and_counted_with_correct_figures() -> None:
+def test_oldest_samples_are_evicted_and_counted_with_correct_stats() -> None:
     samples = Samples(limit=8192)
     random = np.random.default_rng(1)
     rows: list[float] = []
@@ -293,12 +293,12 @@ def test_late_sample_updates_existing_peaks() -> None:
     assert samples.stats(4.3, 10).maximum == 0
 
 
-def test_overflowing_mean_is_unknown_instead_of_wrong() -> None:
+def test_mean_that_overflows_is_unknown() -> None:
     samples = filled([(float(n), 1.7e308, False) for n in range(1 << SHIFTS[-1])])
     assert samples.stats(0, 1e9) == RangeStats(1 << SHIFTS[-1], 1.7e308, 1.7e308, None)
 
 
-def test_step_to_previous_and_next_sample() -> None:
+def test_time_of_previous_and_next_sample_is_found() -> None:
     samples = filled([(1.0, 1, False), (2.0, 2, False), (3.0, 3, True)])
     assert [samples.time_at_step(2.0, step) for step in (-2, -1, 1, 2)] == [None, 1.0, 3.0, None]
     assert samples.at(0.5) is None

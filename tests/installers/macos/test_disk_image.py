@@ -30,7 +30,7 @@ def test_dmgbuild_settings_place_application_and_applications_link(tmp_path: Pat
     assert told["format"] == "ULMO"
 
 
-def test_dmgbuild_knows_every_setting_it_is_given(tmp_path: Path) -> None:
+def test_dmgbuild_supports_every_generated_setting(tmp_path: Path) -> None:
     """Its options are read from its source: it can be imported on a Mac only, and takes what it knows not."""
     found = find_spec("ds_store")
     if found is None or found.origin is None:

@@ -100,7 +100,7 @@ def test_background_is_light_with_an_arrow_from_application_to_applications_fold
         assert retina.size == (2 * WINDOW[0], 2 * WINDOW[1])
 
 
-def test_generated_pictures_are_reproducible(pictures: Path, tmp_path: Path) -> None:
+def test_generated_images_are_reproducible(pictures: Path, tmp_path: Path) -> None:
     subprocess.run([sys.executable, "-m", "installers.macos.pictures", tmp_path], cwd=ROOT, check=True)
     for each in pictures.iterdir():
         assert (tmp_path / each.name).read_bytes() == each.read_bytes(), each.name

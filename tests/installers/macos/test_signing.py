@@ -54,7 +54,7 @@ def signed(log: Path, app: Path) -> list[tuple[str, str]]:
     return found
 
 
-def test_everything_is_signed_once_from_the_inside_out(tmp_path: Path, tools: Path) -> None:
+def test_all_code_is_signed_once_from_the_inside_out(tmp_path: Path, tools: Path) -> None:
     app = finished(tmp_path, signing.Identity(NAME))
     found = signed(tools, app)
     places = [path for path, _allowed in found]

@@ -67,7 +67,7 @@ def test_frame_is_parsed_or_rejected_with_a_frame_error(frame, framing, codec):
 
 @quick
 @given(data=REQUESTS, port=st.sampled_from([7000, 50000]))
-def test_every_request_is_answered(gateway, original, data, port):
+def test_every_request_receives_a_reply(gateway, original, data, port):
     answer = json.loads(original.ask_raw(data, port))
     assert answer["state"] in {"success", "failure"}
     assert answer["state"] == "success" or answer["error"]

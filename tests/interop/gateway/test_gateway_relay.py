@@ -65,7 +65,7 @@ def test_native_string_is_not_forwarded_to_json_subscribers(gateway, original, n
         assert subscriber.recv() == b't {"native":1}'
 
 
-def test_one2many_the_program_binds_and_the_gateway_connects(gateway, original, native):
+def test_program_binds_and_gateway_connects_in_one2many_mode(gateway, original, native):
     port = original.ask("t", "publisher", mode="one2many")["port"]
     other = original.ask("t", "subscriber", mode="one2many")["port"]
     prefixed = original.ask("t", "subscriber")["port"]
@@ -79,7 +79,7 @@ def test_one2many_the_program_binds_and_the_gateway_connects(gateway, original, 
         native.wait(lambda: native.published)
 
 
-def test_many2one_the_subscriber_binds_and_the_gateway_connects(gateway, original, native):
+def test_subscriber_binds_and_gateway_connects_in_many2one_mode(gateway, original, native):
     port = original.ask("t", "subscriber", mode="many2one")["port"]
     other = original.ask("t", "publisher", mode="many2one")["port"]
     with original.socket(zmq.SUB) as subscriber, original.publisher(other) as publisher:

@@ -53,12 +53,12 @@ def test_each_framing_of_a_topic_has_its_own_port_pair(gateway, original):
     ],
     ids=range(14),
 )
-def test_invalid_requests_are_answered_and_the_gateway_survives(gateway, original, bad, port):
+def test_invalid_requests_receive_a_reply_and_the_gateway_survives(gateway, original, bad, port):
     assert json.loads(original.ask_raw(bad, port))["state"] == "failure"
     assert original.ask("fine", port=port)["state"] == "success"
 
 
-def test_multipart_request_and_client_that_leaves_early_do_no_harm(gateway, original):
+def test_multipart_requests_and_early_disconnects_do_not_stop_the_gateway(gateway, original):
     with original.socket(zmq.REQ) as asking:
         asking.connect("tcp://127.0.0.1:7000")
         asking.send_multipart([b'{"node":"n",', b'"topic":"t","socket":"publisher"}'])

@@ -80,7 +80,7 @@ def test_integer_beyond_float_range_is_treated_as_infinite() -> None:
 
 @pytest.mark.parametrize("kind", ["changes", "equals", "is_not"])
 @pytest.mark.parametrize("huge", [10**400, -(10**400), 2**64, 2**64 - 1, -(2**63)])
-def test_huge_integer_is_described_in_words(kind: str, huge: int) -> None:
+def test_huge_integer_triggers_the_alarm_with_a_description(kind: str, huge: int) -> None:
     scene = Scene(rule(kind, "/d", path=".", limit=1 if kind == "is_not" else huge))
     scene.graph(("/d",))
     told = message("/d", 0)
@@ -166,7 +166,7 @@ def test_change_triggers_the_alarm_but_the_first_value_does_not() -> None:
     assert scene.wait(6) == [("off", "run")]
 
 
-def test_leave_alarm_requires_a_known_node_and_a_complete_graph() -> None:
+def test_node_left_alarm_requires_a_known_node_and_a_complete_graph() -> None:
     scene = Scene(rule("leaves", "lidar"))
     scene.graph(nodes=("other",))
     scene.wait(5)

@@ -35,7 +35,7 @@ for _name in (
     "test_polling_listing_of_the_paper_works",
     "test_every_type_round_trips",
     "test_every_subscriber_receives_from_every_publisher",
-    "test_the_next_message_reaches_a_new_subscriber",
+    "test_next_message_reaches_a_new_subscriber",
     "test_rejected_payload_does_not_replace_the_latched_message",
     "test_new_subscriber_does_not_make_an_invalid_payload_raise",
     "test_payload_of_a_wrong_type_raises_with_and_without_a_subscriber",
@@ -67,7 +67,7 @@ for _name in (
     "test_timers_and_other_coroutines_run_during_an_async_spin",
     "test_callbacks_added_and_stop_requested_from_other_threads_wake_an_async_spin",
     "test_exception_in_a_callback_propagates_from_async_spin",
-    "test_cancelled_async_spin_releases_everything",
+    "test_cancelled_async_spin_releases_all_resources",
     "test_two_loops_in_two_threads_share_a_subscriber",
 ):
     globals()[_name] = getattr(contract_async, _name)

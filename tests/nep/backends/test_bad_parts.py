@@ -273,7 +273,7 @@ REQUESTS = (
 )
 
 
-def test_master_answers_every_request_and_keeps_serving(
+def test_master_replies_to_every_request_and_keeps_serving(
     context: zmq.Context[zmq.Socket[bytes]], master: Master, caplog: pytest.LogCaptureFixture
 ) -> None:
     with nep.node("bystander", master=master.address) as node:

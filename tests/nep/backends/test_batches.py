@@ -249,7 +249,7 @@ def waiting(batch: PendingBatch, *stamps_ns: int) -> None:
         batch.pending.append((b"x", stamp_ns))
 
 
-def test_batching_requires_permission_and_readers_that_support_it() -> None:
+def test_batching_requires_a_permitting_publisher_and_supporting_readers() -> None:
     batch = PendingBatch(may_wait=True)
     batch.open_window(1000)
     assert batch.until_ns == 0  # nobody has said that he reads batches

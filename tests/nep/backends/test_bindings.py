@@ -61,7 +61,7 @@ def test_local_socket_is_used_regardless_of_start_order(node: nep.Node, first: s
 
 
 @pytest.mark.parametrize("msg_type", ["bytes", "image"])
-def test_message_types_that_may_be_large_use_tcp(node: nep.Node, msg_type: str) -> None:
+def test_publishers_of_potentially_large_message_types_use_tcp(node: nep.Node, msg_type: str) -> None:
     with node.new_pub("t", msg_type), node.new_sub("t", msg_type) as sub:
         assert ends(sub) == [endpoint(node, "t")]
 

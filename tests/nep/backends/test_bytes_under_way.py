@@ -137,7 +137,7 @@ def test_stopped_subscriber_does_not_affect_others(publisher: nep.Publisher, mas
             eventually(lambda each=each: is_all_counted(each, 81))  # type: ignore[misc]
 
 
-def test_burst_of_thirty_pictures_is_not_lost_with_a_late_reader(
+def test_burst_of_thirty_images_is_not_lost_with_a_late_reader(
     publisher: nep.Publisher, master: Master
 ) -> None:
     with running(SUBSCRIBER, master.address, "idle") as late:

@@ -87,7 +87,7 @@ def test_every_type_round_trips(make: Make, msg_type: str, payload: object) -> N
 
 
 @pytest.mark.parametrize("topic", _topics)
-def test_topic_with_a_common_prefix_is_another_topic(make: Make, topic: str) -> None:
+def test_topics_with_a_common_prefix_are_distinct(make: Make, topic: str) -> None:
     sub, node = make("b").new_sub(topic), make("a")
     node.new_pub(topic + "2").publish(1)
     node.new_pub(topic).publish(2)
@@ -114,7 +114,7 @@ def test_every_subscriber_receives_from_every_publisher(make: Make) -> None:
         assert sorted(sub.listen(timeout_s=30.0)[1] for _ in range(3)) == [0, 1, 2]  # type: ignore[type-var]
 
 
-def test_the_next_message_reaches_a_new_subscriber(make: Make) -> None:
+def test_next_message_reaches_a_new_subscriber(make: Make) -> None:
     pubs = [make(f"p{n}").new_pub("topic") for n in range(3)]
     sub = make("s").new_sub("topic")
     for n, pub in enumerate(pubs):

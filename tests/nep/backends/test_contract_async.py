@@ -335,7 +335,7 @@ def test_exception_in_a_callback_propagates_from_async_spin(make: Make, is_corou
     run(main())
 
 
-def test_cancelled_async_spin_releases_everything(make: Make) -> None:
+def test_cancelled_async_spin_releases_all_resources(make: Make) -> None:
     node, pub = make("b"), make("a").new_pub("example")
 
     async def main() -> None:

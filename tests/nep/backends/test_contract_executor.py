@@ -244,7 +244,7 @@ def test_spin_rejects_invalid_nodes_and_timeouts(make: Nodes) -> None:
     nep.spin(node, node)
 
 
-def test_coroutine_callback_is_rejected_by_spin_before_its_message_is_lost(make: Nodes) -> None:
+def test_spin_rejects_coroutine_callback_without_losing_its_message(make: Nodes) -> None:
     node = make("a", "memory")
     got: list[object] = []
 
@@ -266,7 +266,7 @@ def test_coroutine_callback_is_rejected_by_spin_before_its_message_is_lost(make:
     node.spin(0.0)
 
 
-def test_back_end_without_poll_support_is_checked_periodically(make: Nodes) -> None:
+def test_back_end_without_poll_support_is_polled_periodically(make: Nodes) -> None:
     """Also a back end of somebody else, that is older than `enter_wait`."""
 
     class Older:

@@ -120,7 +120,7 @@ def test_each_publisher_of_a_topic_has_its_own_history(make: Make) -> None:
         assert [each for each in got if each[0] == n] == [[n, 3], [n, 4]]  # type: ignore[index]
 
 
-def test_history_keeps_pictures_and_large_messages(make: Make) -> None:
+def test_history_keeps_images_and_large_messages(make: Make) -> None:
     node = make("a")
     pictures = [np.full((90, 120, 3), n, np.uint8) for n in range(100)]
     pub = node.new_pub("camera", "image", history=80)
@@ -171,7 +171,9 @@ def test_invalid_history_lengths_are_rejected(make: Make) -> None:
     assert node.new_pub("topic", history=0).count == 0
 
 
-def test_back_end_without_history_rejects_it(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_back_end_without_history_rejects_the_history_option(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
     node = make("a")
     monkeypatch.setattr("nep.backends.base.Backend.has_history", False, raising=False)
     object.__setattr__(node._backend, "has_history", False)

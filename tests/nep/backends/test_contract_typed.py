@@ -55,7 +55,7 @@ def test_graph_has_the_type_name(make: Make) -> None:
     assert (message.msg_type, message.codec, message.topic) == ("geometry_msgs/Twist", "json", "t")
 
 
-def test_every_way_of_reading_returns_typed_payloads(make: Make) -> None:
+def test_every_receive_method_returns_typed_payloads(make: Make) -> None:
     a, b = make("a"), make("b")
     sub, latest = b.new_sub("t", Count), b.new_sub("t", Count, keep="latest")
     sunk: queue.SimpleQueue[object] = queue.SimpleQueue()

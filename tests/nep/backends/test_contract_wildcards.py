@@ -226,7 +226,7 @@ def test_undecodable_messages_are_skipped_and_the_graph_lists_the_pattern(make: 
     assert [each.id for each in other.graph().topics["a/*"].subscribers] == [exact.id]
 
 
-def test_back_end_without_wildcards_rejects_them(make: Make) -> None:
+def test_back_end_without_wildcards_rejects_patterns(make: Make) -> None:
     node = make("a")
     object.__setattr__(node._backend, "has_patterns", False)
     try:

@@ -110,7 +110,7 @@ print(node.new_sub("own").listen(), [each for each in node.graph().topics])
             assert not late.is_closed
 
 
-def test_publisher_with_few_files_survives_a_hundred_subscribers(master: Master) -> None:
+def test_publisher_with_a_low_file_limit_survives_a_hundred_subscribers(master: Master) -> None:
     """libzmq accepts what it can; the publisher is not ended, and goes on with those who reach it."""
     code = (
         FEW
@@ -159,7 +159,7 @@ sys.stdin.read()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has local names")
-def test_publisher_closes_its_local_socket_when_files_are_short(master: Master) -> None:
+def test_publisher_closes_its_local_socket_when_file_descriptors_run_out(master: Master) -> None:
     """libzmq ends the program when it cannot accept there; by TCP it only makes others wait."""
     code = (
         FEW
@@ -188,7 +188,7 @@ def local_names(program: Program) -> list[str]:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="counts files as Linux does")
-def test_gateway_without_free_files_rejects_originals_and_survives(tmp_path: Path) -> None:
+def test_gateway_without_free_file_descriptors_rejects_originals_and_survives(tmp_path: Path) -> None:
     code = (
         FEW
         + """

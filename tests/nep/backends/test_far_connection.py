@@ -80,7 +80,7 @@ def test_hello_over_another_connection_closes_the_previous_one() -> None:
     assert ENDED == [1], "no hello to this publisher"
 
 
-def test_only_connections_to_other_computers_get_keep_alive() -> None:
+def test_only_connections_to_other_computers_use_keep_alive() -> None:
     with zmq.Context() as context, context.socket(zmq.XPUB) as socket_:
         seen = []
         for host in ("127.0.0.1", "0.0.0.0", "127.0.0.1"):

@@ -13,7 +13,7 @@ from tests.nep.programs import eventually
 
 
 @pytest.mark.usefixtures("patient")
-def test_publisher_that_closes_before_its_subscriber_connects_is_not_waited_for(
+def test_publisher_that_closes_before_its_subscriber_connects_does_not_delay_subscribing(
     master: Master, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[Found] = []

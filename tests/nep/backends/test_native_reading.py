@@ -27,7 +27,7 @@ def node(master: Master) -> Iterator[nep.Node]:
         yield made
 
 
-def test_received_picture_can_be_forwarded_and_stays_readable(node: nep.Node, master: Master) -> None:
+def test_received_payload_can_be_forwarded_and_stays_readable(node: nep.Node, master: Master) -> None:
     data = os.urandom(300_000)
     with nep.node("relay", master=master.address) as relay:
         there, back = relay.new_sub("there", "bytes"), relay.new_pub("back", "bytes")
@@ -45,7 +45,7 @@ def test_received_picture_can_be_forwarded_and_stays_readable(node: nep.Node, ma
         assert message.data == data
 
 
-def test_memoryview_of_wider_items_is_sent_as_its_bytes(node: nep.Node) -> None:
+def test_memoryview_with_multi_byte_items_is_sent_as_bytes(node: nep.Node) -> None:
     sub, pub = node.new_sub("wide", "bytes"), node.new_pub("wide", "bytes")
     for size in (8, 80_000):
         data = os.urandom(size)
@@ -129,7 +129,7 @@ def test_blocking_reader_does_not_delay_a_new_publisher(node: nep.Node, master: 
     assert sub.lost == 0
 
 
-def test_messages_left_by_a_reader_are_moved_to_the_inbox_by_the_node(node: nep.Node) -> None:
+def test_unread_messages_are_moved_to_the_inbox_by_the_node(node: nep.Node) -> None:
     sub, pub = node.new_sub("left", "bytes"), node.new_pub("left", "bytes")
     for _ in range(3):  # a reader that gets one message after the other
         pub.publish(b"x")
@@ -257,7 +257,7 @@ def test_publisher_with_a_changed_port_is_reconnected(context: zmq.Context[zmq.S
         each.close()
 
 
-def test_message_behind_a_rejected_batch_is_read_at_once(context: zmq.Context[zmq.Socket[bytes]]) -> None:
+def test_message_after_a_rejected_batch_is_read_immediately(context: zmq.Context[zmq.Socket[bytes]]) -> None:
     """The descriptor is edge-triggered: it does not signal messages that are already in the queue."""
     spec = SubscriberSpec(5, "t", "bytes", Hybrid("x", "many2many"), None)
     socket, there = context.socket(zmq.SUB), context.socket(zmq.XPUB)

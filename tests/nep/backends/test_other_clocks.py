@@ -122,7 +122,7 @@ def test_programs_on_one_computer_share_a_clock() -> None:
         assert message.seen_ns > message.stamp_ns
 
 
-def test_a_message_without_time_has_no_latency() -> None:
+def test_message_without_time_stamp_has_no_latency() -> None:
     message = Message("t", b"1", "json", "json")
     assert message.latency_s is None
     assert message.latency_uncertainty_s is None

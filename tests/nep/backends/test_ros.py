@@ -190,7 +190,7 @@ node.close()
 )
 
 
-def test_raw_ros_pictures_are_decoded_in_every_layout(ros: str) -> None:
+def test_raw_ros_images_are_decoded_in_every_layout(ros: str) -> None:
     pytest.importorskip("cv2")
     with running(PICTURES, **told(ros)) as program:
         for expected in (
@@ -247,7 +247,7 @@ node.close()
 )
 
 
-def test_ros_programs_receive_pictures(ros: str) -> None:
+def test_ros_programs_receive_images(ros: str) -> None:
     pytest.importorskip("cv2")
     with running(FRAMES, **told(ros)) as program:
         assert program.line() == "jpeg True True"

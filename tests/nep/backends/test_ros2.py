@@ -194,7 +194,7 @@ def test_missing_packages_are_reported_with_the_install_command(monkeypatch: pyt
             library(missing)  # type: ignore[operator]
 
 
-def test_platform_without_wheels_is_told_what_to_build(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_platform_without_wheels_is_reported_with_build_instructions(monkeypatch: pytest.MonkeyPatch) -> None:
     def missing(_name: str) -> object:
         raise ImportError
 
@@ -239,7 +239,7 @@ def test_compatible_endpoints_raise_no_alert() -> None:
     assert alerts(writers, readers) == alerts([], readers) == alerts(writers, []) == {}
 
 
-def test_incompatible_endpoints_raise_alerts_in_plain_words() -> None:
+def test_incompatible_endpoints_raise_alerts_with_the_differing_settings() -> None:
     heard = "“c” doesn't receive “t” from “a”: it requests "
     assert alerts([party("a", is_reliable=False)], [party("c")]) == {
         "ros2-reliability:t": heard + "“reliable”, but the publisher offers “best effort”"

@@ -197,7 +197,7 @@ def test_message_types_map_to_ros_types(msg_type: str, ros_type: str) -> None:
     assert is_ros_type(msg_type) == (msg_type == ros_type)
 
 
-def test_bodies_of_other_messages_are_rejected() -> None:
+def test_invalid_message_bodies_are_rejected() -> None:
     read = unpacker_for("json", "std_msgs/String", "").unpack
     assert read(memoryview(to_ros("std_msgs/String", "json", Encoded(b"{}"))))[0] == b"{}"
     for wrong in (b"", b"\1\0\0", b"\5\0\0\0ab", b"\1\0\0\0ab"):
@@ -211,7 +211,7 @@ def test_bodies_of_other_messages_are_rejected() -> None:
     assert bytes(read(memoryview(labelled))[0]) == b"yz", "the data begins where data_offset says"
 
 
-def test_undecodable_picture_is_rejected() -> None:
+def test_undecodable_image_is_rejected() -> None:
     for data in (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"):
         with pytest.raises(nep.EncodeError):
             to_ros("sensor_msgs/CompressedImage", "image", Encoded(data))

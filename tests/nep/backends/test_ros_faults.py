@@ -81,7 +81,7 @@ node.close()
 SAME_NAME = "import nep; nep.node('second', 'ros').new_pub('topic'); print('ready'); input()"
 
 
-def test_node_replaced_by_another_of_its_name_raises_instead_of_waiting(ros: str) -> None:
+def test_node_shut_down_by_a_node_with_the_same_name_raises_instead_of_blocking(ros: str) -> None:
     with running(SHUT_DOWN, "__name:=same", **told(ros)) as first:
         assert first.line() == "ready"
         with running(SAME_NAME, "__name:=same", **told(ros)) as second:
@@ -293,7 +293,7 @@ def test_invalid_master_address_is_rejected(given: str, monkeypatch: pytest.Monk
         nep.node("n", "ros")
 
 
-def test_default_master_address_is_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_default_master_address_is_localhost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
     assert ros_master_address(None) == "127.0.0.1:11311"
     monkeypatch.setenv("ROS_MASTER_URI", "")

@@ -269,7 +269,7 @@ node.close()
 SAME_NAME = "import nep; nep.node('second', 'ros').new_pub('topic'); print('ready'); input()"
 
 
-def test_server_whose_node_name_is_taken_raises_instead_of_waiting(ros: str) -> None:
+def test_server_whose_node_name_is_taken_raises_instead_of_blocking(ros: str) -> None:
     with running(SHUT_DOWN, "__name:=same", **told(ros)) as first:
         assert first.line() == "ready"
         with running(SAME_NAME, "__name:=same", **told(ros)) as second:

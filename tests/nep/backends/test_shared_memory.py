@@ -113,7 +113,7 @@ def test_every_size_arrives_complete_and_in_order(node: nep.Node, size: int) -> 
     assert sub.lost == 0
 
 
-def test_burst_of_thirty_pictures_arrives_completely(master: Master, node: nep.Node) -> None:
+def test_burst_of_thirty_images_arrives_completely(master: Master, node: nep.Node) -> None:
     pub = node.new_pub("frames", "bytes")
     with running(LISTENER, master.address) as listener:
         assert listener.line() == "listens"
@@ -150,7 +150,7 @@ def test_subscriber_without_shared_memory_receives_the_same_through_the_socket(
     assert message.payload == data
 
 
-def test_subscriber_without_hello_receives_payloads_and_so_do_the_others(
+def test_subscriber_without_hello_and_other_subscribers_receive_payloads(
     master: Master, node: nep.Node
 ) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
@@ -190,7 +190,7 @@ def test_payloads_outlive_the_publisher_the_subscriber_and_both_nodes(master: Ma
     assert message.payload == b"\7" * LARGE
 
 
-def test_received_picture_is_a_read_only_view_of_shared_memory(node: nep.Node) -> None:
+def test_received_image_is_a_read_only_view_of_shared_memory(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "image"), node.new_pub("t", "image")
     frame = np.arange(720 * 1280 * 3, dtype=np.uint8).reshape(720, 1280, 3)
     count = 0
@@ -296,7 +296,7 @@ def test_segment_grows_for_larger_payloads(node: nep.Node) -> None:
     assert (message.size_bytes, sub.lost) == (70_000_000, 0)
 
 
-def test_reader_that_keeps_all_messages_gets_copies_and_does_not_exhaust_slots(node: nep.Node) -> None:
+def test_reader_that_keeps_all_messages_receives_copies_and_does_not_exhaust_slots(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     for _ in range(begin(pub)):
         sub.receive(LONG_S)

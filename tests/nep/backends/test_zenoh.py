@@ -136,7 +136,9 @@ def test_rate_is_known_after_two_polls(make: Make) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="nobody is killed so there")
-def test_killed_program_is_removed_and_its_successor_connects_to_the_rest(make: Make, place: str) -> None:
+def test_killed_program_is_removed_and_its_successor_connects_to_the_other_programs(
+    make: Make, place: str
+) -> None:
     here = make("here")
     pub = here.new_pub("to/peer")
     with running(PEER, place) as peer:
@@ -153,7 +155,7 @@ def test_killed_program_is_removed_and_its_successor_connects_to_the_rest(make: 
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="nobody is halted so there")
-def test_halted_subscriber_delays_a_publisher_by_half_a_second_and_is_named(
+def test_hung_subscriber_delays_a_publisher_by_half_a_second_and_is_named(
     make: Make, place: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     here, other = make("here"), make("other")
@@ -283,7 +285,9 @@ def test_invalid_puts_and_replies_are_rejected_and_counted(
 # ---- places
 
 
-def test_place_is_taken_from_argument_or_configuration_variable(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_zenoh_address_is_taken_from_argument_or_configuration_variable(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.delenv(CONFIG_VARIABLE, raising=False)
     assert validate_address() == validate_address("") == "local"
     for given in ("local/lab", "tcp/192.0.2.1:7447", "tls/a.b:1,tcp/c:2", "/etc/zenoh.json5"):
@@ -452,7 +456,7 @@ def test_zenoh_is_not_imported_unless_requested() -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks here")
-def test_forked_child_raises_exits_and_holds_no_resources(place: str, make: Make) -> None:
+def test_forked_child_raises_an_error_exits_and_holds_no_resources(place: str, make: Make) -> None:
     code = f"""
     import os, sys, nep
     def say(it):  # whole lines at once: parent and child have one output

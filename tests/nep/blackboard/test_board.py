@@ -119,7 +119,7 @@ def test_values_are_copies(board: nep.Blackboard) -> None:
     assert board.get("x") == [1, {"a": [2]}]
 
 
-def test_value_can_become_a_map_and_a_value_again(board: nep.Blackboard) -> None:
+def test_value_can_be_replaced_by_a_map_and_back(board: nep.Blackboard) -> None:
     seen: list[tuple[str, str]] = []
     board.on_change("**", lambda change: seen.append((change.key, change.cause)))
     board.put("a", 1)

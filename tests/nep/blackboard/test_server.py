@@ -53,7 +53,7 @@ def ask(other: nep.Node, board: nep.Blackboard) -> Ask:
     return call
 
 
-def test_set_get_and_keys_services(ask: Ask, board: nep.Blackboard) -> None:
+def test_services_set_get_and_list_keys(ask: Ask, board: nep.Blackboard) -> None:
     assert ask("set", key="human.1", value={"name": "é", "at": [1, None]}) == {"set": 1}
     assert ask("set", values={"a": 1, r"b\.c": True}, lives_s=1000) == {"set": 2}
     assert board["human.1"] == {"name": "é", "at": [1, None]}
@@ -100,7 +100,7 @@ def test_invalid_request_is_rejected_with_a_message(ask: Ask, board: nep.Blackbo
     assert len(board) == 0
 
 
-def test_values_that_json_lacks_are_converted(ask: Ask, board: nep.Blackboard) -> None:
+def test_values_without_json_equivalent_are_converted(ask: Ask, board: nep.Blackboard) -> None:
     board.put("nan", float("nan"))
     board.put("huge", 10**5000)
     board.put("bytes", b"\xff")

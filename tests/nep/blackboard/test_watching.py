@@ -208,7 +208,7 @@ def test_invalid_watches_are_rejected(make: Make) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows does not fork")
-def test_forked_child_keeps_values_but_watches_nothing(master: Master) -> None:
+def test_forked_child_keeps_values_but_has_no_watches(master: Master) -> None:
     code = """
     import os, threading, nep
     node = nep.node("robot")

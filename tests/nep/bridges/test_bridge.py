@@ -90,7 +90,7 @@ def test_shared_types_keep_bytes_and_type(pair, msg_type, payload):
         assert (message.payload, message.codec, message.msg_type) == (payload, msg_type, msg_type)
 
 
-def test_picture_keeps_its_bytes_and_shape():
+def test_image_keeps_its_bytes_and_shape():
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/camera")):
         sub, direct = b.node("b").new_sub("/camera", "image"), a.node("c").new_sub("/camera", "image")
         picture = np.arange(4 * 6 * 3, dtype=np.uint8).reshape(4, 6, 3)
@@ -181,7 +181,7 @@ def test_typed_back_end_is_subscribed_with_the_published_type(twist_side):
             )
 
 
-def test_picture_of_a_back_end_specific_type_is_forwarded_as_a_picture(twist_side):
+def test_image_of_a_back_end_specific_type_is_forwarded_as_a_image(twist_side):
     import nep
 
     with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
@@ -398,7 +398,7 @@ def test_pattern_renames_every_matching_topic(pair):
         assert {each.end.topic for each in bridge.routes} == {"ros/arm/now", "ros/leg/now"}
 
 
-def test_bidirectional_pattern_finds_topics_of_both_sides_but_not_its_own():
+def test_bidirectional_pattern_matches_topics_of_both_sides_but_not_its_own_topics():
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/a/**", "/b/**")) as bridge:
         on_a, on_b = a.node("a"), b.node("b")
         says_a, says_b = on_a.new_pub("/a/x/y"), on_b.new_pub("/b/z")
@@ -470,7 +470,7 @@ def test_pattern_routes_are_bounded(monkeypatch, caplog):
 # ---- who is not there
 
 
-def test_unavailable_network_is_reported_and_awaited_while_the_rest_works(caplog):
+def test_unavailable_network_is_reported_and_awaited_while_other_networks_work(caplog):
     with Master("127.0.0.1:0", learn_s=0.0) as first:
         address = first.address
     with nets("memory") as (a,):
@@ -593,7 +593,7 @@ def test_close_delivers_received_messages_and_is_idempotent(pair):
     assert bridge.routes[0].counts().sent == 500
 
 
-def test_close_while_waiting_for_a_network_returns_soon():
+def test_close_while_waiting_for_a_network_returns_promptly():
     with nets("memory") as (a,):
         away = Net("memory")
         away.backend, away.master = "zeromq", "127.0.0.1:9"

@@ -62,7 +62,7 @@ def way(report, side):
     return next(each for each in report["routes"] if each["from"]["side"] == side)
 
 
-def test_every_message_between_processes_is_accounted_for(file, nodes):
+def test_every_message_between_processes_is_forwarded_or_counted(file, nodes):
     on_a, on_b = nodes
     path = file('[[topics]]\na = "/count"\nb = "zenoh/count"\n[[topics]]\na = "/thin"\nmax_rate_hz = 0.001\n')
     with running(COMMAND, "bridge", path, "--json") as program:
@@ -152,7 +152,7 @@ def test_command_line_form_joins_one_topic(nodes, master, place):
         assert name in {each.name for each in on_a.graph().nodes.values()}
 
 
-def test_master_that_starts_later_is_waited_for(file, place):
+def test_bridge_command_waits_for_a_master_that_starts_later(file, place):
     with Master("127.0.0.1:0", learn_s=0.0) as first:
         address = first.address
     path = file('[[topics]]\na = "/t"\ndirection = "b->a"\n', address)

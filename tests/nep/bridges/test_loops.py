@@ -244,7 +244,7 @@ def test_two_bridges_over_a_network_without_trails_do_not_loop(nameless_side):
 # ---- other bridges between the same networks
 
 
-def test_one_of_two_bridges_without_trails_yields_until_the_other_has_ended(monkeypatch, caplog):
+def test_one_of_two_parallel_bridges_without_trails_suspends_until_the_other_ends(monkeypatch, caplog):
     import nep
 
     monkeypatch.setattr("nep.programs.bridges.other_bridges._EXPIRY_S", 3.0)
@@ -422,7 +422,7 @@ def test_echo_is_recognised_once_per_sent_message_until_it_expires():
     assert not echoes.is_echo(b"x", 10.0), "nothing is remembered any more"
 
 
-def test_echo_memory_is_bounded():
+def test_number_of_remembered_echoes_is_bounded():
     echoes = LoopGuard()
     for number in range(10_000):
         echoes.record_sent(str(number).encode(), 0.0)

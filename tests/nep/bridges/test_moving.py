@@ -23,7 +23,7 @@ def describe(robot: nep.Node, name: str, command: str) -> nep.Subscriber:
 
 
 @pytest.mark.parametrize("direction", ["a->b", "b->a"])
-def test_bridge_moves_no_robot_under_another_name(direction):
+def test_bridge_blocks_messages_that_move_a_robot_under_another_topic_name(direction):
     """The robot was not there when the bridge began: each message is checked."""
     with nets("zeromq", "memory") as (a, b):
         near, far = (a, b) if direction == "a->b" else (b, a)
@@ -43,7 +43,7 @@ def test_bridge_moves_no_robot_under_another_name(direction):
             assert told.received == 0
 
 
-def test_bridge_forwards_to_an_allowed_robot_and_patterns_reach_no_other():
+def test_bridge_forwards_to_an_allowed_robot_and_patterns_match_no_other_robot():
     with nets("memory", "memory") as (a, b):
         rover, fido = b.node("robots"), b.node("others")
         told, other = describe(rover, "Rover", "/r/Rover/go"), describe(fido, "Fido", "/r/Fido/go")

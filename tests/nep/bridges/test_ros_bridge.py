@@ -130,7 +130,7 @@ def test_configuration_file_bridges_types_names_and_latched_messages(
             assert odom.receive(30.0).payload["twist"]["linear"] == {"x": 0.0, "y": 0.0, "z": 0.0}
 
 
-def test_ros_master_that_starts_later_is_waited_for(master: Master, tmp_path: Path) -> None:
+def test_bridge_waits_for_a_ros_master_that_starts_later(master: Master, tmp_path: Path) -> None:
     skip_without_ros()
     address = f"127.0.0.1:{free_port()}"
     words = (f"zeromq@{master.address}:/chat", f"ros@{address}:")

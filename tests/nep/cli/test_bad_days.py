@@ -47,7 +47,7 @@ def alone(script: str, *, up: bool) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_everything_works_with_only_the_loopback_interface():
+def test_commands_work_with_only_the_loopback_interface():
     done = alone(
         """
         NEP master 2>master.log & master=$!
@@ -86,7 +86,7 @@ def test_disabled_loopback_is_reported_by_the_doctor_and_nothing_crashes():
     assert "Traceback" not in done.stderr
 
 
-def test_node_without_a_free_port_reports_it():
+def test_node_without_a_free_port_raises_an_error():
     code = """
 import nep
 with nep.Master("127.0.0.1:7780", learn_s=0.0), nep.node("many") as node:

@@ -79,7 +79,7 @@ def test_blackboard_command_watches_topics_and_shows_values(master: Master, run:
             assert process.wait(60.0) == 0
 
 
-def test_name_and_lifetime_options(master: Master, run: TypeIn) -> None:
+def test_name_and_lifetime_options_are_applied(master: Master, run: TypeIn) -> None:
     with started("--name", "home", "--lives", "0.05", "--max-keys", "5"), nep.node("robot") as node:
         told = node.new_sub("/home/changes")
         pub = node.new_pub("/blackboard")

@@ -200,7 +200,7 @@ def test_lists_are_tables_or_json(running_master, type_in):
         }
 
 
-def test_empty_lists_explain_how_to_fill_them(running_master, type_in):
+def test_empty_lists_show_a_message_and_empty_json(running_master, type_in):
     assert "no topics" in type_in("topic", "list").stderr
     assert "no nodes" in type_in("node", "list").stderr
     assert json.loads(type_in("topic", "list", "--json").stdout) == []
@@ -297,7 +297,7 @@ def test_master_runs_until_ctrl_c_and_a_second_one_is_rejected(address, start):
     assert not nep.is_running(address, 0.3)
 
 
-def test_master_exits_when_its_owner_has_ended_and_no_node_needs_it(address, start):
+def test_master_exits_when_its_owner_has_ended_and_no_node_remains(address, start):
     owner = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
     master = start("master", "--no-gateway", "--owner-pid", str(owner.pid))
     master.wait_says("master at")

@@ -72,7 +72,7 @@ def test_topics_and_types_are_completed_for_info_and_find(robot):
     assert complete("bash", "nep topic find s") == ["string"]
 
 
-def test_nodes_and_levels_are_completed(robot):
+def test_node_names_and_log_levels_are_completed(robot):
     assert complete("bash", "nep log --node P") == ["Pepper"]
     assert complete("bash", "nep log --level w") == ["warning"]
 

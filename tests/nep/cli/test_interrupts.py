@@ -74,7 +74,7 @@ def test_interrupt_during_startup_exits_with_130(words):
         assert done.returncode == 130, at
 
 
-def test_package_import_leaves_no_time_for_a_traceback():
+def test_cli_package_import_loads_no_other_modules():
     loaded = "import sys; old = set(sys.modules); import nep.cli; print(*set(sys.modules) - old)"
     new = {name for name in python(loaded).stdout.decode().split() if not name.startswith("importlib")}
     assert new <= {"nep", "nep.cli", "__future__", "warnings"}

@@ -52,7 +52,7 @@ def test_message_that_does_not_match_is_filtered_out(text):
     assert not MessageFilter(text).matches(PAYLOAD)
 
 
-def test_m_refers_to_a_payload_that_is_not_a_map():
+def test_variable_m_refers_to_a_payload_that_is_not_a_map():
     assert MessageFilter("m > 3").matches(4)
     assert MessageFilter("m[0] == 1").matches([1])
     assert not MessageFilter("x > 3").matches("text")

@@ -49,7 +49,7 @@ def test_messages_of_a_back_end_are_printed_filtered_and_measured(there, type_in
     assert json.loads(out)["rate_hz"] > 0
 
 
-def test_an_unknown_back_end_is_an_error(type_in):
+def test_unknown_back_end_is_an_error(type_in):
     code, out, err = type_in("topic", "list", "--backend", "zenho")
     assert (code, out) == (1, "")
     assert "zenoh" in err

@@ -32,7 +32,7 @@ def node(master: Master) -> Iterator[nep.Node]:
         yield made
 
 
-def test_list_get_and_set(node: nep.Node, run: TypeIn) -> None:
+def test_parameters_are_listed_read_and_set(node: nep.Node, run: TypeIn) -> None:
     told = run("list", "robot")
     assert told.returncode == 0
     for word in ("speed", "0.5", "float", "0 ≤ … ≤ 2", "how fast, in m/s", '["walk","run"]', "read only"):

@@ -113,7 +113,7 @@ def test_bw_prints_sizes_as_a_table(published, capsys):
     assert "Ctrl+C" in shown.err
 
 
-def test_missing_topic_is_waited_for_with_the_nearest_name(published, capsys):
+def test_missing_topic_is_awaited_and_the_nearest_name_is_suggested(published, capsys):
     with pytest.raises(WaitTimeoutError, match=r"timed out after 0\.5 s while waiting for .*'/odm'"):
         hz(["/odm"], 10.0, 0, published, timeout_s=0.5)
     assert "'/odm' has no publisher yet; did you mean '/odom'? waiting" in capsys.readouterr().err
@@ -179,7 +179,9 @@ def test_ages_from_before_the_clock_comparison_are_excluded():
         (0.0, 0.0004, "0 us"),
     ],
 )
-def test_negative_age_within_the_uncertainty_is_shown_as_below_it(age_s, uncertainty_s, words):
+def test_negative_age_within_the_uncertainty_is_shown_as_less_than_the_uncertainty(
+    age_s, uncertainty_s, words
+):
     assert format_latency(age_s, uncertainty_s) == words
 
 
@@ -219,7 +221,7 @@ def _latched(stamp_ns, clock=OWN_CLOCK, publisher=1):
     )
 
 
-def test_messages_kept_for_new_subscribers_are_replays():
+def test_latched_messages_from_before_the_subscription_are_detected():
     opened, now = time.monotonic(), time.time_ns()
     replays = LatchedFilter(opened)
     assert replays.predates_subscription(_latched(now - 10_000_000), opened)
@@ -230,7 +232,7 @@ def test_messages_kept_for_new_subscribers_are_replays():
     )
 
 
-def test_with_uncompared_clocks_the_first_message_of_a_latched_publisher_is_a_replay():
+def test_first_latched_message_predates_the_subscription_without_clock_comparison():
     replays = LatchedFilter(0.0)
     for publisher in (1, 2):
         first, second = (_latched(0, UNKNOWN_CLOCK, publisher) for _ in range(2))
@@ -249,7 +251,7 @@ class _FakeClock:
         self.now += seconds
 
 
-def test_published_messages_keep_the_rate_and_skip_slots_missed_during_a_stall():
+def test_publish_loop_keeps_the_rate_and_skips_slots_missed_during_a_stall():
     clock, sent = _FakeClock(), []
 
     def send():
@@ -261,7 +263,7 @@ def test_published_messages_keep_the_rate_and_skip_slots_missed_during_a_stall()
     assert gaps == pytest.approx([0.02] * 4 + [0.24] + [0.02] * 14)
 
 
-def test_high_rates_catch_up_with_late_wake_ups():
+def test_high_rate_is_kept_despite_late_wake_ups():
     clock, sent = _FakeClock(), []
 
     def oversleep(seconds):

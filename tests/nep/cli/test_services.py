@@ -70,7 +70,7 @@ def test_topics_and_services_are_listed_separately(arm, type_in):
     assert head[-2:] == ["serves", "calls"]
 
 
-def test_info_type_and_find_of_a_service(arm, type_in):
+def test_service_info_type_and_find_commands_print_the_service(arm, type_in):
     code, out, _err = type_in("service", "info", SERVICE)
     assert code == 0
     assert out.startswith(

@@ -33,7 +33,7 @@ def graph(*topics: TopicInfo) -> GraphView:
     return GraphView(1, 1, {each.id: each for each in (NODE, OTHER)}, {each.name: each for each in topics})
 
 
-def test_largest_values_are_listed_first_and_unknown_ones_last() -> None:
+def test_largest_values_are_listed_first_and_unknown_values_last() -> None:
     found = graph(topic("/none"), topic("/slow", 1.0, 9), topic("/nan", math.nan), topic("/fast", 100.0, 0))
     assert [each.name for each in topic_rows(found)] == ["/fast", "/slow", "/nan", "/none"]
     assert topic_rows(found, order=TopicOrder.LOST)[0].name == "/slow"
@@ -58,7 +58,7 @@ def test_rows_are_filtered_by_pattern_or_substring(pattern: str, names: list[str
     assert [each.name for each in topic_rows(found, pattern)] == names
 
 
-def test_nodes_show_the_sum_of_their_publishers_and_the_busiest_is_first() -> None:
+def test_nodes_show_the_sum_of_their_publishers_and_are_sorted_by_rate() -> None:
     found = graph(
         topic("/a", publishers=(PUBLISHER, replace(PUBLISHER, id=2, rate_hz=None))),
         topic("/b", publishers=(replace(PUBLISHER, rate_hz=5.0), replace(PUBLISHER, node_id="gone"))),
@@ -93,7 +93,7 @@ def test_unreachable_address_is_reported(type_in: TypeIn) -> None:
     assert "127.0.0.1:1" in done.stderr
 
 
-def test_lost_master_is_reported_and_the_last_figures_stay(
+def test_lost_master_is_reported_and_the_last_values_stay_visible(
     monkeypatch: pytest.MonkeyPatch, type_in: TypeIn
 ) -> None:
     with Master("127.0.0.1:0", learn_s=0.0) as master:

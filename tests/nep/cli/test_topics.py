@@ -33,7 +33,7 @@ def test_record_has_all_message_metadata(capfdbinary):
     }
 
 
-def test_picture_is_shown_by_its_shape_without_decoding(capfdbinary):
+def test_image_is_shown_by_its_shape_without_decoding(capfdbinary):
     given = message(
         b"\xff\xd8\xff no picture", "image", extension={"shape": [240, 320, 3], "encoding": "jpeg"}
     )

@@ -160,7 +160,7 @@ def test_alarm_does_not_move_a_robot_that_connected_later(master, type_in, file)
     assert told == [[]]
 
 
-def test_lost_master_is_waited_for(type_in, file, monkeypatch) -> None:
+def test_watch_command_waits_for_a_lost_master(type_in, file, monkeypatch) -> None:
     with Master("127.0.0.1:0") as first:
         address = first.address
     name = file({"when": {"node": "lidar", "is": "comes"}}, {"when": BELOW})

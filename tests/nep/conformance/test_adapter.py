@@ -68,13 +68,13 @@ def test_unknown_rule_and_missing_command_are_usage_errors() -> None:
         wire.check([], [])
 
 
-def test_list_has_all_rules(capsys: pytest.CaptureFixture[str]) -> None:
+def test_list_option_prints_all_rules(capsys: pytest.CaptureFixture[str]) -> None:
     wire.check([], [], list_rules=True)
     output = capsys.readouterr().out
     assert all(each.id in output for each in select_rules(()))
 
 
-def test_sections_of_rules_are_in_the_documentation() -> None:
+def test_rule_sections_exist_in_the_documentation() -> None:
     root = Path(__file__).parents[3]
     page = (root / "docs" / "wire.md").read_text("utf-8")
     rules = (root / "docs" / "wire-check.md").read_text("utf-8")

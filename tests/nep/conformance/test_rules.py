@@ -35,7 +35,7 @@ def test_correct_client_passes_every_rule() -> None:
 
 
 @pytest.mark.parametrize("rule", list(RULES))
-def test_client_with_one_error_fails_by_its_rule(rule: str, outcomes: Mapping[str, Outcome]) -> None:
+def test_client_with_one_error_fails_the_matching_rule(rule: str, outcomes: Mapping[str, Outcome]) -> None:
     assert outcomes[rule].status == "failed"
     assert outcomes[rule].observed
 

@@ -190,7 +190,7 @@ def test_text_output_has_a_sentence_and_the_next_step(foreign):
     assert lines[2].strip() == f"nep master --port {foreign + 1}"
 
 
-def test_obstacle_to_starting_a_master_is_one_finding(foreign, master):
+def test_reason_why_a_master_cannot_start_is_one_finding(foreign, master):
     one = start_blocker(f"127.0.0.1:{foreign}")
     assert one is not None
     assert one.id == "master:foreign"
@@ -231,7 +231,7 @@ def test_programs_with_nodes_are_checked_for_their_open_files(master):
         assert found.limit == 256 or sys.platform == "darwin"
 
 
-def test_listener_on_another_address_of_a_port_does_not_hold_it_on_loopback():
+def test_listener_on_another_address_does_not_hold_the_port_on_loopback():
     listens = psutil.CONN_LISTEN
     for order in (1, -1):
         sockets = [
@@ -242,7 +242,7 @@ def test_listener_on_another_address_of_a_port_does_not_hold_it_on_loopback():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="its python.exe may be a launcher of another process")
-def test_program_passed_on_the_command_line_is_not_named_by_its_source():
+def test_program_started_with_inline_code_is_not_named_by_its_source():
     text = "import sys; print(flush=True); sys.stdin.read()"
     with subprocess.Popen(
         [sys.executable, "-c", text], stdin=subprocess.PIPE, stdout=subprocess.PIPE

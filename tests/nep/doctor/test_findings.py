@@ -206,7 +206,7 @@ def test_gateway_port_held_by_another_master_is_reported():
 
 
 @pytest.mark.parametrize("gateway", [True, False])
-def test_port_of_an_unknown_process_counts_as_the_masters_unless_it_has_an_alert(gateway):
+def test_port_of_an_unknown_process_is_attributed_to_the_master_unless_an_alert_exists(gateway):
     nodes = [node("gateway", "gateway")] if gateway else []
     told = view(*nodes, alerts=[Alert("port:50000", "taken")])
     made = about_ports(view=told, ports=originals_ports(None, None, numbers=(7000, 50000)))
@@ -224,7 +224,7 @@ def test_airplay_is_named_on_macos(holder):
     assert "AirDrop & Handoff" in made["ports:airplay"].fix
 
 
-def test_other_program_on_port_7000_of_a_mac_is_not_called_airplay():
+def test_other_program_on_port_7000_of_a_mac_is_not_identified_as_airplay():
     made = found(platform="darwin", ports=(PortFact(7000, "", True, OTHER),))
     assert "python3 server.py" in made["ports:taken"].sentence
 
@@ -264,14 +264,14 @@ OTHER_JS = PackageFact("nep-js", "0.1.1", "/home/me/robot/node_modules/nep-js", 
         ((OTHER_JS, OUR_JS), "warning", f'npm uninstall --prefix "{Path("/home/me/robot")}" nep-js'),
     ],
 )
-def test_foreign_nep_js_that_shadows_ours_is_a_warning(packages, severity, command):
+def test_foreign_nep_js_package_that_shadows_nep_js_is_a_warning(packages, severity, command):
     one = found(node_packages=packages)["package:nep-js"]
     assert (one.severity, one.command) == (severity, command)
     assert packages[0].location in one.sentence
     assert "package:nep-js" not in found()
 
 
-def test_original_package_of_the_terminals_python_is_reported():
+def test_original_package_in_the_python_of_the_terminal_is_reported():
     original = PackageFact("nep", "0.5.4.8", "/usr/lib/python3/dist-packages", is_ours=False)
     one = found(path_package=original)["package:python3"]
     assert one.severity == "info"

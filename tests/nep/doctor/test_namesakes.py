@@ -70,7 +70,7 @@ needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="programs have 
 
 @needs_posix
 @pytest.mark.parametrize("info", ["nep-0.5.4.8.dist-info", "nep-0.5.4.8-py3.11.egg-info"])
-def test_original_nep_of_the_terminals_python_is_found(environment, info):
+def test_original_nep_in_the_python_of_the_terminal_is_found(environment, info):
     site = original(environment, info)
     assert looked_up(environment) == PackageFact("nep", "0.5.4.8", str(site), is_ours=False)
     assert looked_up(environment, own=environment) is None

@@ -97,7 +97,7 @@ def test_master_without_listen_option_is_not_reported_as_hung(master: Master, ow
     assert "master" in {each.id for each in diagnose(master.address)}
 
 
-def test_no_master_can_be_started_at_a_network_address(master: Master, own: str) -> None:
+def test_master_cannot_be_started_at_a_network_address(master: Master, own: str) -> None:
     closed = start_blocker(f"{own}:{port_of(master.address)}")
     assert closed is not None
     assert closed.id == "master:closed"

@@ -88,7 +88,7 @@ def test_bare_string_that_starts_with_its_topic_is_not_stripped():
     assert Shape("t", "bare", "string").read(b"t is a letter") == b"t is a letter"
 
 
-def test_picture_frame_is_a_base64_encoded_jpeg():
+def test_image_frame_is_a_base64_encoded_jpeg():
     jpeg = bytes(range(256))
     for framing, prefix in (("prefixed", b"cam "), ("bare", b"")):
         shape = Shape("cam", framing, "image")
@@ -97,7 +97,7 @@ def test_picture_frame_is_a_base64_encoded_jpeg():
         assert shape.read(frame) == jpeg
 
 
-def test_picture_with_invalid_base64_is_rejected():
+def test_image_with_invalid_base64_is_rejected():
     with pytest.raises(FrameError, match="base64"):
         Shape("cam", "bare", "image").read(b"****")
 
@@ -143,7 +143,7 @@ def test_nep_0546_is_recognised_by_its_filter():
     assert not Shape("t", "prefixed", "json").is_from_0546(b"t")
 
 
-def test_filter_matches_a_line_if_it_can_match_a_frame():
+def test_subscription_filter_matches_only_possible_frame_prefixes():
     prefixed, bare = Shape("test", "prefixed", "json"), Shape("test", "bare", "json")
     assert prefixed.matches_filter(b"test")
     assert prefixed.matches_filter(b"")

@@ -83,7 +83,7 @@ def test_native_messages_are_received_and_own_ones_are_not_echoed(scene, master)
         assert not scene.native._subscribers
 
 
-def test_pictures_that_originals_cannot_decode_are_converted_to_jpeg(scene):
+def test_images_that_originals_cannot_decode_are_converted_to_jpeg(scene):
     np = pytest.importorskip("numpy")
     raw = nep.raw_image(np.zeros((4, 6, 3), np.uint8))
     message = Message("cam", raw.data, "image", "image", extension=raw.extension)
@@ -118,7 +118,7 @@ def test_pixel_types_that_originals_cannot_decode_raise_an_alert(scene):
 
 
 @pytest.mark.parametrize("encoding", ["bgr8", ["bgr8"], {"bgr8": 1}, 7, b"jpeg"])
-def test_undecodable_picture_raises_an_alert_and_is_dropped(scene, encoding):
+def test_undecodable_image_raises_an_alert_and_is_dropped(scene, encoding):
     broken = Message("cam", b"123", "image", "image", extension={"encoding": encoding, "shape": [4, 6, 3]})
     assert scene.native.data_of(broken) is None
     assert [alert.id for alert in scene.alerts] == ["message:cam"]

@@ -61,7 +61,7 @@ def test_ports_are_assigned_from_9000_in_even_steps():
     assert next(known.candidates(lambda line: True)) == 9002
 
 
-def test_unused_line_gives_up_its_port_only_when_all_ports_are_assigned():
+def test_port_of_an_unused_topic_line_is_reassigned_only_when_all_ports_are_assigned():
     known = PortMap(None)
     for number, port in enumerate(range(FIRST_PORT, LAST_PORT + 1, 2)):
         known.assign(TopicLine(f"t{number}", "bare", "json", "many2many"), port)

@@ -140,7 +140,7 @@ def test_program_that_publishes_and_subscribes_is_one_node_with_two_links(scene)
     assert len(scene.programs.programs()) == 1
 
 
-def test_line_is_in_use_while_it_is_requested_or_connected(scene):
+def test_topic_line_is_in_use_while_requested_or_connected(scene):
     assert not scene.programs.is_used(LINE)
     scene.pair.connections["publisher"] = 1
     assert scene.programs.is_used(LINE)
@@ -149,7 +149,7 @@ def test_line_is_in_use_while_it_is_requested_or_connected(scene):
     assert scene.programs.is_used(LINE)
 
 
-def test_broadcast_members_list_who_requested_what(scene):
+def test_broadcast_lists_the_requested_topic_role_and_port_of_each_program(scene):
     register(scene)
     (member,) = scene.programs.members()
     assert (member.topic, member.node, member.port, member.socket, member.pid) == (
@@ -162,7 +162,7 @@ def test_broadcast_members_list_who_requested_what(scene):
     assert scene.programs.languages() == {LINE: frozenset({"python"})}
 
 
-def test_unsupported_version_is_shown_if_only_one_program_can_be_meant(scene):
+def test_unsupported_version_is_shown_only_if_the_program_is_unambiguous(scene):
     register(scene)
     scene.pair.connections["subscriber"] = 1
     scene.processes.joined = {(7, 9001)}

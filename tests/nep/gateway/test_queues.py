@@ -85,7 +85,7 @@ def test_buffer_of_a_stalled_subscriber_is_bounded_in_bytes(pair, subscriber, si
     assert sum(map(len, kept)) < MAX_BUFFERED_BYTES + 3 * size + 20_000_000  # plus messages in flight
 
 
-def test_active_reader_receives_everything_next_to_a_stalled_one(pair, subscriber) -> None:
+def test_active_reader_receives_everything_next_to_a_stalled_reader(pair, subscriber) -> None:
     subscriber(keep=1)
     reader = subscriber(keep=1000, filter_=b"t {")
     for number in range(200):

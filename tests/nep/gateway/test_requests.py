@@ -80,7 +80,7 @@ def test_reply_has_the_shape_and_order_that_the_originals_expect():
         (b" " * 70000, "at most"),
     ],
 )
-def test_invalid_request_is_answered_with_a_message(data, sentence):
+def test_invalid_request_receives_an_error_reply(data, sentence):
     with pytest.raises(RequestError, match=sentence) as caught:
         parse_request(data, 7000)
     answer = json.loads(encode_rejection(caught.value))
@@ -88,7 +88,7 @@ def test_invalid_request_is_answered_with_a_message(data, sentence):
     assert sentence in answer["error"]
 
 
-def test_rejection_names_the_topic_which_the_originals_compare():
+def test_rejection_includes_the_topic_that_originals_compare():
     with pytest.raises(RequestError) as caught:
         ask(node=...)
     assert json.loads(encode_rejection(caught.value))["topic"] == "t1"

@@ -138,7 +138,9 @@ def publisher(**changes: object) -> PublisherRecord:
     return replace(PublisherRecord(77, "/arm/state", "json", "json", ("tcp://127.0.0.1:9",)), **changes)  # type: ignore[arg-type]
 
 
-def test_connection_with_the_routing_id_of_a_node_cannot_remove_it(master: Master, victims: Victims) -> None:
+def test_connection_with_the_routing_id_of_a_node_cannot_remove_that_node(
+    master: Master, victims: Victims
+) -> None:
     before = master.view().nodes
     for victim in (victims.arm, victims.eye):
         with attacker_at(master, victim.id.encode()) as attacker:
@@ -149,7 +151,7 @@ def test_connection_with_the_routing_id_of_a_node_cannot_remove_it(master: Maste
     eventually(lambda: any(each.id == "request:127.0.0.1" for each in master.view().alerts))
 
 
-def test_second_connection_with_a_used_routing_id_takes_nothing_over(master: Master) -> None:
+def test_second_connection_with_a_used_routing_id_does_not_replace_the_first(master: Master) -> None:
     mine = node()
     with attacker_at(master, b"first") as first:
         assert isinstance(first.ask(Join(mine)), Found)
@@ -190,7 +192,7 @@ def test_requests_for_another_node_are_rejected(master: Master, victims: Victims
     victims.go_on()
 
 
-def test_forged_renewal_renews_and_counts_nothing(master: Master, victims: Victims) -> None:
+def test_forged_renewal_changes_neither_lease_nor_counts(master: Master, victims: Victims) -> None:
     seen = master.view()
     lie = Renew(
         victims.arm.id,
@@ -225,7 +227,7 @@ def test_id_of_a_publisher_or_subscriber_cannot_be_taken_over(
     victims.go_on()
 
 
-def test_squatted_ids_are_evicted_by_the_owner_with_the_key() -> None:
+def test_squatters_are_evicted_when_the_owner_joins_with_its_key() -> None:
     """A master was started again, and the attacker is quicker than those who come back."""
     with Master("127.0.0.1:0", learn_s=0.0) as master:
         address = master.address
@@ -272,7 +274,7 @@ def test_node_with_a_hung_old_connection_can_rejoin(master: Master) -> None:
         assert [each.node_id for each in master.view().topics["/arm"].publishers] == [OWN_ID]
 
 
-def test_false_report_of_a_missing_subscriber_does_not_stop_others_from_waiting_for_it(
+def test_false_report_of_a_missing_subscriber_does_not_affect_other_publishers(
     master: Master, victims: Victims
 ) -> None:
     """An attacker reports that it does not answer. Who publishes next waits for it all the same."""
@@ -379,7 +381,7 @@ def test_invalid_registrations_are_rejected_counted_and_named(master: Master, vi
     victims.go_on()
 
 
-def test_number_of_publishers_per_node_is_limited(master: Master) -> None:
+def test_number_of_publishers_and_subscribers_per_node_is_limited(master: Master) -> None:
     with attacker_at(master) as attacker:
         many = tuple(publisher(id=n, topic=f"/t{n}") for n in range(1, 5_001))
         assert isinstance(attacker.ask(Join(node(), 0, many)), Found)

@@ -99,7 +99,7 @@ def test_uncertainty_of_a_clock_difference_grows_with_age() -> None:
 
 
 @pytest.mark.parametrize("clock", [None, ()])
-def test_node_with_unknown_clock_gets_and_causes_no_clock_difference(
+def test_node_with_unknown_clock_has_no_clock_difference_to_other_nodes(
     clock: tuple[int, ...] | None,
 ) -> None:
     graph = graph_of("c1", "c2")
@@ -146,7 +146,7 @@ def test_malformed_clock_is_rejected_and_named(clock: object) -> None:
 
 
 @pytest.mark.parametrize("clock", [None, (), (S, 300)])
-def test_fast_path_gives_the_same_clock_reply(clock: tuple[int, ...] | None) -> None:
+def test_fast_path_returns_the_same_clock_reply(clock: tuple[int, ...] | None) -> None:
     quick, long = graph_of("c1", "c2"), graph_of("c1", "c2")
     for graph in (quick, long):
         renewed(graph, 1, (3 * S, 400))

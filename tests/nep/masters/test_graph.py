@@ -65,7 +65,7 @@ def ask(graph: Graph, request: Request, now: float = 0.0) -> tuple[Outgoing, ...
     return graph.apply(request, 1, now, "asker")
 
 
-def test_publisher_is_told_its_subscribers_after_they_are_notified(graph: Graph) -> None:
+def test_publisher_receives_its_subscribers_after_the_subscribers_are_notified(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     push, reply = ask(graph, AddPublisher(node("p"), publisher(2)))
     assert (push.to, push.call) == ("s", None)
@@ -101,7 +101,7 @@ def test_node_with_two_subscribers_is_notified_once(graph: Graph) -> None:
     assert [each.to for each in outgoing] == ["s", "asker"]
 
 
-def test_subscriber_receives_the_publishers_which_are_probed(graph: Graph) -> None:
+def test_new_subscriber_receives_the_publishers_and_each_publisher_is_probed(graph: Graph) -> None:
     ask(graph, AddPublisher(node("p"), publisher(1)))
     ask(graph, AddPublisher(node("original", "A"), publisher(2, at="")))
     probe, reply = ask(graph, AddSubscriber(node("s"), subscriber(3)))
@@ -111,7 +111,7 @@ def test_subscriber_receives_the_publishers_which_are_probed(graph: Graph) -> No
     assert without_nodes(reply.body, frozenset({"p"})) == Found(7, graph.revision)
 
 
-def test_dead_subscribers_are_not_expected() -> None:
+def test_subscribers_of_removed_nodes_are_not_expected() -> None:
     answer = Added(
         1,
         1,
@@ -217,7 +217,7 @@ def test_join_replaces_the_previous_registration(graph: Graph) -> None:
     assert sorted(each.id for each in topic.subscribers) == [1, 5]
 
 
-def test_restarted_master_accepts_known_nodes_before_new_ones() -> None:
+def test_restarted_master_accepts_known_nodes_before_new_nodes() -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=1.0)
     assert ask(graph, AddPublisher(node("new"), publisher(1)), 0.2) == ()
     assert graph.learning_end == 1.0
@@ -255,7 +255,7 @@ def test_name_type_and_message_conflicts_raise_alerts(graph: Graph) -> None:
     assert {each.id for each in graph.view().alerts} == {"message:t"}
 
 
-def test_copies_of_the_gateway_are_not_counted_twice(graph: Graph) -> None:
+def test_messages_relayed_by_the_gateway_are_not_counted_twice(graph: Graph) -> None:
     ask(graph, Join(node("o", "A"), 0, (publisher(1, at=""),), managed=True))
     ask(graph, AddPublisher(node("g", "gateway"), publisher(2)))
     for second in range(2):
@@ -284,7 +284,7 @@ def test_requests_round_trip(request_: Request) -> None:
     assert encoding.decode_request(encoding.encode_request(request_, 42)) == (42, request_)
 
 
-def test_answers_round_trip(graph: Graph) -> None:
+def test_replies_round_trip(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("a", name="S"), publisher(2)))
     ask(graph, Renew("s", 7, 0, (), (SubscriberCount(1, 5, 5),)))
@@ -357,7 +357,7 @@ def test_unknown_fields_of_newer_peers_are_ignored() -> None:
     assert encoding.decode_request(body).request == Leave("a")
 
 
-def test_meter_needs_two_readings_and_resets() -> None:
+def test_rate_meter_needs_two_readings_and_resets_on_restart() -> None:
     meter = Meter()
     assert meter.rates() is None
     meter.add(0.0, 0, 0)

@@ -172,7 +172,7 @@ def test_incremental_view_matches_a_full_view(changes: list[tuple[str, int]]) ->
         assert encoding.decode_reply(packer.encode(answer.body, 3)) == (3, answer.body)
 
 
-def test_unchanged_topics_are_the_same_object() -> None:
+def test_unchanged_topics_are_reused_in_the_next_view() -> None:
     graph = graph_of(3)
     before = graph.view()
     renew(graph, renewal(0, graph), 1.0)
@@ -181,7 +181,7 @@ def test_unchanged_topics_are_the_same_object() -> None:
     assert after.topics["t0"] != before.topics["t0"]
 
 
-def test_slow_listeners_receive_the_last_change_but_not_every_one() -> None:
+def test_slow_listener_receives_the_last_change_but_skips_others() -> None:
     class Slow:
         def __init__(self) -> None:
             self.views: list[GraphView] = []

@@ -54,7 +54,7 @@ class Attached:
         self.events.append("close")
 
 
-def test_malformed_requests_get_an_error_and_the_master_survives(master: Master) -> None:
+def test_malformed_requests_receive_an_error_and_the_master_survives(master: Master) -> None:
     context = zmq.Context()
     socket = context.socket(zmq.DEALER)
     socket.setsockopt(zmq.LINGER, 0)
@@ -168,7 +168,7 @@ def test_closed_master_rejects_requests(master: Master) -> None:
     assert master.wait(0.0)
 
 
-def test_concurrent_submits_from_many_threads_are_answered(master: Master) -> None:
+def test_concurrent_submits_from_many_threads_receive_replies(master: Master) -> None:
     replies: list[object] = []
     threads = [
         threading.Thread(target=lambda: replies.extend(master.submit(Ping()) for _ in range(50)))

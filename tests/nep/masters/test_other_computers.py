@@ -58,11 +58,11 @@ def wait_for(node, wanted):
         ([], "127.0.0.1:7780", ""),
     ],
 )
-def test_nearest_reachable_endpoint_is_chosen(endpoints, master, chosen):
+def test_nearest_reachable_endpoint_is_selected(endpoints, master, chosen):
     assert reachable_endpoint(endpoints, master) == chosen
 
 
-def test_only_addresses_of_this_computer_can_be_served():
+def test_only_addresses_of_this_computer_are_accepted_as_listen_addresses():
     assert check_hosts(["10.8.0.2", ANY_HOST, "10.8.0.2"], HERE) == ("10.8.0.2", ANY_HOST)
     with pytest.raises(NepError, match="'robot' is not an IPv4 address"):
         check_hosts(["robot"], HERE)
@@ -72,7 +72,7 @@ def test_only_addresses_of_this_computer_can_be_served():
         check_hosts(["192.168.1.21"], ())
 
 
-def test_own_addresses_exclude_loopback_and_link_local():
+def test_addresses_of_this_computer_exclude_loopback_and_link_local():
     assert not [own for own in own_addresses() if own.host.startswith(("127.", "169.254."))]
     assert has_address("127.0.0.1")
     assert not has_address("203.0.113.77")
@@ -89,7 +89,7 @@ def test_master_listens_on_loopback_only_until_another_address_is_configured(mas
     assert master.view().listens == ()
 
 
-def test_rejected_listen_address_leaves_served_addresses_unchanged(master):
+def test_rejected_listen_address_leaves_current_listen_addresses_unchanged(master):
     listen([OTHER], master.address)
     with pytest.raises(RequestRefusedError, match=r"'203\.0\.113\.77' is not an address"):
         listen(["203.0.113.77"], master.address)
@@ -134,7 +134,7 @@ def test_nodes_on_two_computers_exchange_all_messages_from_the_first(far, master
         assert to_far.missing == to_near.missing == ()
 
 
-def test_existing_publishers_advertise_a_newly_served_address(master):
+def test_existing_publishers_advertise_a_new_listen_address(master):
     with nep.node("near") as near:
         pub = near.new_pub("t", latched=True)
         pub.publish("before")
@@ -168,7 +168,7 @@ def test_publisher_is_received_after_its_computer_changes_address(far, master, m
         assert sub.listen(True, timeout_s=WAIT_S) == (True, "still")
 
 
-def test_lost_served_address_raises_an_alert_until_it_returns():
+def test_lost_listen_address_raises_an_alert_until_the_address_returns():
     here = [HERE]
     bound = []
 
@@ -216,7 +216,7 @@ def test_failed_bind_of_one_address_unbinds_all():
     assert (bound, listening.hosts) == ([], ())
 
 
-def test_unreachable_addresses_are_not_offered(monkeypatch):
+def test_loopback_link_local_and_down_interfaces_are_excluded_from_listen_addresses(monkeypatch):
     def address(host):
         return types.SimpleNamespace(family=socket.AF_INET, address=host)
 

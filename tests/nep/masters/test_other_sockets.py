@@ -27,12 +27,12 @@ def foreign_socket(kind: int) -> Iterator[tuple[str, Callable[[], object]]]:
 
 
 @pytest.mark.parametrize("kind", [zmq.PUB, zmq.REP, zmq.PULL, zmq.PAIR])
-def test_request_to_a_foreign_socket_times_out(kind: int) -> None:
+def test_request_to_a_socket_of_another_program_times_out(kind: int) -> None:
     with foreign_socket(kind) as (address, _wait), pytest.raises(MasterUnreachable):
         view(address, timeout_s=0.6)
 
 
-def test_node_connects_to_a_master_that_replaces_a_foreign_socket() -> None:
+def test_node_connects_to_a_master_that_replaces_another_socket_at_its_address() -> None:
     with foreign_socket(zmq.PUB) as (address, wait_for_disconnection):
         node = nep.node("early", master=address, wait_s=None)
         registering = Thread(target=node.new_pub, args=("topic",), daemon=True)

@@ -158,7 +158,7 @@ FILE_PNG = cv2.imencode(".png", scene())[1].tobytes()
     st.integers(0, 2000),
 )
 @settings(max_examples=300, deadline=None)
-def test_decoded_image_has_the_examined_size_for_any_corruption(
+def test_decoded_image_has_the_size_in_its_header_despite_corruption(
     data: bytes, changes: list[tuple[int, int]], end: int
 ) -> None:
     changed = bytearray(data[:2000])

@@ -76,5 +76,5 @@ def test_incomplete_json_is_recognized_as_json(text) -> None:
 
 
 @pytest.mark.parametrize("text", ["hello", "", "truest", "- x", "'a'", "Nancy", ".5"])
-def test_other_text_is_not_recognized_as_json(text) -> None:
+def test_text_without_json_syntax_is_not_recognized_as_json(text) -> None:
     assert not looks_like_json(text)

@@ -69,7 +69,7 @@ def test_brackets_inside_strings_do_not_count_as_levels(text: str) -> None:
 
 
 @pytest.mark.parametrize(("before", "after"), [('["]",', '"["]'), ('["\\\\]",', ',"["]'), ('{"}":', "}")])
-def test_strings_with_brackets_do_not_hide_levels(before: str, after: str) -> None:
+def test_brackets_inside_strings_do_not_bypass_the_depth_limit(before: str, after: str) -> None:
     text = before * 70 + "1" + after * 70
     with pytest.raises(DecodeError, match=SENTENCE):
         codec("json").decode(text.encode(), {})

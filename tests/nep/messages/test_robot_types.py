@@ -127,7 +127,7 @@ def test_euler_conversion_preserves_rotation_at_gimbal_lock(roll: float, pitch: 
     assert abs(same) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_known_euler_rotations_and_invalid_quaternions() -> None:
+def test_euler_angles_convert_to_known_quaternions_and_invalid_quaternions_are_rejected() -> None:
     half = math.sqrt(0.5)
     assert Quaternion() == Quaternion.from_euler()
     turned = Quaternion.from_euler(yaw=math.pi / 2)

@@ -448,7 +448,7 @@ class NothingAtAll(TypedDict):
     pass
 
 
-def test_unusual_dataclasses_round_trip() -> None:
+def test_derived_empty_and_private_dataclasses_round_trip() -> None:
     assert read(Odd, sent(Odd(class_=3, _private=1))) == Odd(class_=3)
     assert message_type(Derived).name == "test/Base"
     assert json.loads(bytes(typed_codec(message_type(Base), JSON).encode(Derived(1)).data)) == {"a": 1}

@@ -43,7 +43,7 @@ class Derived(Base):
     b: int = 2
 
 
-def test_message_type_names_in_the_graph() -> None:
+def test_message_type_is_named_after_its_class_or_declared_name() -> None:
     assert [message_type(each).name for each in (Part, Derived, Strict, Twist)] == [
         "Part", "test/Base", "Strict", "geometry_msgs/Twist",
     ]  # fmt: skip

@@ -39,7 +39,7 @@ def test_unsubscribed_payloads_are_validated_once_per_second() -> None:
     assert told.encoded == 10
 
 
-def test_slow_payloads_are_validated_less_often() -> None:
+def test_payloads_with_slow_encoding_are_validated_less_often() -> None:
     told = Told()
     told.takes_s = 0.5
     unsendable = told.new()
@@ -108,5 +108,5 @@ def test_path_of_a_self_referencing_payload_is_bounded() -> None:
     assert unencodable_path(endless, CODECS["json"].encode).startswith("[0][0]")
 
 
-def test_only_powers_of_ten_are_logged() -> None:
+def test_rejections_are_logged_only_at_powers_of_ten() -> None:
     assert [count for count in range(1001) if is_logged(count)] == [1, 10, 100, 1000]

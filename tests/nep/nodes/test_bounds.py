@@ -67,7 +67,7 @@ def test_removed_topics_leave_no_entries_in_master_tables() -> None:
     assert (viewer._topics, viewer._alerts) == ({}, {})
 
 
-def test_topic_registered_again_between_two_graph_views_is_updated() -> None:
+def test_topic_with_a_changed_type_is_updated_in_the_next_graph_view() -> None:
     registry = census_with_node()
     member, viewer = registry.members["n"], GraphViewer(registry)
     registry.add_publisher(member, PublisherRecord(1, "/t", "json", "json"))
@@ -77,7 +77,7 @@ def test_topic_registered_again_between_two_graph_views_is_updated() -> None:
     assert viewer.view(7).topics["/t"].msg_type == "image"
 
 
-def test_renewal_reports_a_topic_whose_last_publisher_left() -> None:
+def test_renewal_reports_a_topic_whose_last_publisher_was_removed() -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=0.0)
     subscriber, publisher = SubscriberRecord(2, "/t", "json"), PublisherRecord(1, "/t", "json", "json")
     graph.apply(Join(NodeRecord("s", "S", "h", 1), 0, (), (subscriber,)), 1, 0.0, "s")
@@ -89,7 +89,9 @@ def test_renewal_reports_a_topic_whose_last_publisher_left() -> None:
     assert reply.body.topics == (TopicPublishers("/t", ()),)
 
 
-def test_bad_requests_of_many_senders_are_logged_at_a_bounded_rate(caplog: pytest.LogCaptureFixture) -> None:
+def test_malformed_requests_of_many_senders_are_logged_at_a_bounded_rate(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     caplog.set_level(logging.WARNING, "nep.master")
     bad = BadRequests()
     for n in range(10_000):
@@ -134,7 +136,7 @@ def test_graph_reply_without_a_pending_call_is_not_decoded(pair: SimpleNamespace
     assert [type(each.content) for each in answers] == [Done]  # type: ignore[attr-defined]
 
 
-def test_many_pushes_are_read_in_slices(pair: SimpleNamespace) -> None:
+def test_many_pushes_are_read_in_batches(pair: SimpleNamespace) -> None:
     pair.calls.send_request(Ping())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, _body = pair.router.recv_multipart()

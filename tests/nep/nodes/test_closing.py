@@ -32,7 +32,7 @@ def test_spin_idles_after_its_callbacks_are_closed(node: nep.Node) -> None:
     assert share < 0.2  # it was all of the time
 
 
-def test_callback_can_close_itself_and_others(node: nep.Node) -> None:
+def test_callback_can_close_any_subscriber_including_its_own(node: nep.Node) -> None:
     got: list[object] = []
 
     def callback(payload: object) -> None:
@@ -100,7 +100,7 @@ tell()
 
 
 @pytest.mark.parametrize("what", ["held", "all"])
-def test_repeated_open_and_close_leaks_nothing(master: Master, what: str) -> None:
+def test_repeated_open_and_close_leaks_no_resources(master: Master, what: str) -> None:
     with running(CYCLES, what, "200") as program:
         before = [int(word) for word in program.line().split()]
         after = [int(word) for word in program.line().split()]

@@ -99,7 +99,7 @@ print(len(node.graph().nodes))
         assert program.end()[1] == ""
 
 
-def test_forked_child_can_exit_in_every_way(master: Master) -> None:
+def test_forked_child_exits_cleanly_by_return_sys_exit_or_multiprocessing(master: Master) -> None:
     code = (
         CHILD
         + """

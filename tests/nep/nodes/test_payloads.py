@@ -104,7 +104,7 @@ def test_callbacks_and_listen_alternate_without_loss(nodes: tuple[nep.Node, nep.
     assert sub.lost == 0
 
 
-def test_undecodable_message_is_skipped_and_keeps_order(nodes: tuple[nep.Node, nep.Node]) -> None:
+def test_undecodable_message_is_skipped_and_the_order_is_kept(nodes: tuple[nep.Node, nep.Node]) -> None:
     sender, reader = nodes
     sub, pub = reader.new_sub("t"), sender.new_pub("t")
     for number in range(FIRST):

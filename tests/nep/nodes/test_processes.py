@@ -149,7 +149,7 @@ def test_hung_subscriber_delays_the_first_publisher_once_and_is_reported(
         eventually(lambda: not node.graph().alerts)
 
 
-def test_stopped_publisher_is_unlisted_but_stays_connected(node: nep.Node) -> None:
+def test_suspended_publisher_is_unlisted_but_stays_connected(node: nep.Node) -> None:
     code = """
     import nep, sys
     pub = nep.node("p").new_pub("topic")
@@ -295,7 +295,7 @@ def test_ctrl_c_interrupts_a_blocking_listen(master: Master) -> None:
         assert program.process.returncode == 0
 
 
-def test_new_pub_without_a_master_raises_an_error_that_explains_how_to_start_one(
+def test_new_pub_without_a_master_raises_an_error_with_the_command_to_start_a_master(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
@@ -309,7 +309,7 @@ def test_new_pub_without_a_master_raises_an_error_that_explains_how_to_start_one
             node.new_sub("topic")
 
 
-def test_wait_none_waits_for_a_master() -> None:
+def test_unlimited_wait_ends_when_a_master_starts() -> None:
     with Master("127.0.0.1:0", learn_s=0.0) as probe:
         address = probe.address
     made: list[nep.Publisher] = []

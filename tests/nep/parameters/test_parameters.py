@@ -235,7 +235,7 @@ def test_parameters_of_a_node_are_found_by_name_or_id(master: Master) -> None:
             tool.parameters_of("aa")
 
 
-def test_declare_without_a_master_raises_and_declares_nothing() -> None:
+def test_declare_without_a_master_raises_and_declares_no_parameter() -> None:
     with nep.node("a", master="127.0.0.1:1", wait_s=0.1) as node:
         with pytest.raises(nep.MasterUnreachable):
             node.parameters.declare("x", 1)

@@ -150,7 +150,7 @@ def test_arbitrary_requests_do_not_raise_in_the_graph_or_break_its_view(
 
 
 @pytest.mark.parametrize("seq", [2**64 - 1, 2**63, 2**40])
-def test_message_with_impossible_sequence_number_raises_an_alert_and_counts_no_loss(
+def test_message_with_implausible_sequence_number_raises_an_alert_and_counts_no_loss(
     master: Master, seq: int
 ) -> None:
     """It comes over the connection of a publisher: straight into the socket, as any program can send it."""
@@ -237,7 +237,7 @@ def test_invalid_cpu_share_is_ignored(value: float) -> None:
         assert graph.view().nodes["n"].cpu_ratio is None
 
 
-def test_summed_counts_saturate() -> None:
+def test_summed_counts_saturate_at_64_bits() -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=0.0)
     subscribers = tuple(SubscriberRecord(n, "/t", "json") for n in (1, 2, 3))
     graph.apply(

@@ -77,7 +77,7 @@ def test_sample_with_the_shortest_round_trip_is_used() -> None:
     assert pair.check() == pytest.approx(1 * MS + drift_ns(95 * MS), abs=1000)
 
 
-def test_only_the_latest_renewals_are_used() -> None:
+def test_clock_offset_uses_only_the_latest_renewals() -> None:
     pair = Pair(0)
     assert pair.renew(0, 0)
     for _ in range(8):
@@ -96,7 +96,7 @@ def test_clock_uncertainty_grows_over_time() -> None:
 
 
 @pytest.mark.parametrize("step_ns", [MS, -MS, 3600 * S, -3600 * S])
-def test_step_of_the_own_clock_resets_the_samples(step_ns: int) -> None:
+def test_step_of_the_local_clock_resets_the_samples(step_ns: int) -> None:
     pair = Pair(0)
     pair.renew(2 * MS, 0)
     pair.apart_ns += step_ns
@@ -148,7 +148,7 @@ def test_slewed_clock_is_not_a_step() -> None:
         (BEGIN_NS, BEGIN_NS + 3600 * S),
     ],
 )
-def test_impossible_times_are_discarded(received_ns: int, answered_ns: int) -> None:
+def test_implausible_clock_samples_are_discarded(received_ns: int, answered_ns: int) -> None:
     pair = Pair(0)
     sent = pair.samples.now()
     pair.steady_ns += MS
@@ -170,7 +170,7 @@ def test_coarse_clock_resolution_increases_the_uncertainty() -> None:
     assert known[1] >= 15_600_000
 
 
-def test_samples_are_cleared_for_another_master() -> None:
+def test_samples_are_cleared_on_a_change_of_master() -> None:
     pair = Pair(0)
     pair.renew(0, 0)
     pair.samples.clear()
@@ -178,7 +178,7 @@ def test_samples_are_cleared_for_another_master() -> None:
     assert pair.samples.steps == 0
 
 
-def test_uncertainty_grows_for_different_clocks_only() -> None:
+def test_clock_uncertainty_grows_only_between_different_clocks() -> None:
     difference = ClockDifference(5, 1000, measured_at_ns=0)
     assert difference.uncertainty_at(20_000) == 1001
     assert difference.uncertainty_at(-(10**12)) == 1000

@@ -31,7 +31,7 @@ EXTENSIONS = st.dictionaries(
 
 
 @given(TOPICS, HEADERS, st.binary(max_size=100), EXTENSIONS)
-def test_joined_message_parts_split_back_into_the_message(
+def test_joined_message_parts_split_into_the_original_message(
     topic: str, header: wire.Header, payload: bytes, extension: dict[str, object]
 ) -> None:
     parts = wire.join(topic, header, payload, extension)

@@ -26,7 +26,7 @@ def path(tmp_path):
     return path
 
 
-def test_bookmarks_and_notes_are_listed_in_time_order_and_saved_beside_the_recording(path):
+def test_bookmarks_and_notes_are_listed_in_time_order_and_saved_next_to_the_recording(path):
     before = path.read_bytes()
     with Recording(path) as recording:
         marks = Bookmarks(recording)
@@ -74,7 +74,7 @@ def test_damaged_bookmark_file_is_ignored_and_backed_up_on_the_next_change(path,
     assert beside.with_name(f"{beside.name}.damaged").read_text() == text
 
 
-def test_bookmark_that_cannot_be_saved_raises_and_changes_nothing(path, monkeypatch):
+def test_bookmark_that_cannot_be_saved_raises_and_changes_no_bookmark(path, monkeypatch):
     with Recording(path) as recording:
         marks = Bookmarks(recording)
         with pytest.raises(RecordingError, match=r"name .*characters"):

@@ -268,7 +268,9 @@ def test_play_command_does_not_move_a_connected_robot_without_permission(master,
         eventually(lambda: len(told) == 2)
 
 
-def test_play_command_stops_publishing_a_topic_when_a_robot_it_moves_connects(master, tmp_path, capfd):
+def test_play_command_stops_publishing_a_topic_when_a_robot_moved_by_the_topic_connects(
+    master, tmp_path, capfd
+):
     path = tmp_path / "Drive.mcap"
     record(path, [[json_message(seq, topic="/drive") for seq in range(1, 601)]])
     told = []

@@ -212,7 +212,7 @@ def test_export_of_a_time_range(recording, tmp_path):
     assert made[0].count == 1
 
 
-def test_export_overwrites_nothing_and_leaves_no_partial_file(recording, tmp_path, monkeypatch):
+def test_export_overwrites_no_file_and_leaves_no_partial_file(recording, tmp_path, monkeypatch):
     export(recording, "csv", tmp_path / "out")
     before = (tmp_path / "out" / "t.csv").read_bytes()
     with pytest.raises(RecordingError, match=r"\.csv'; .*already exists"):

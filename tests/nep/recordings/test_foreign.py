@@ -197,7 +197,7 @@ def test_playing_an_empty_recording_raises(tmp_path: Path) -> None:
         run("play", empty, "--all")
 
 
-def test_playing_all_of_too_many_topics_is_rejected(tmp_path: Path) -> None:
+def test_playing_too_many_topics_at_once_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "many.mcap"
     path.write_bytes(hostile.many_channels(1_001))
     with pytest.raises(NepError, match="1001 matching topics"):
@@ -235,7 +235,7 @@ def test_file_with_only_magic_bytes_is_incomplete_and_cannot_be_repaired(tmp_pat
         repair(tmp_path / "a.mcap", tmp_path / "b.mcap")
 
 
-def test_exported_range_of_own_recording_counts_its_losses(tmp_path: Path) -> None:
+def test_exported_range_of_a_nep_recording_has_loss_counts_of_that_range(tmp_path: Path) -> None:
     messages = [json_message(seq) for seq in (1, 2, 3, 5, 6, 9)]
     record(tmp_path / "a.mcap", [messages])
     with Recording(tmp_path / "a.mcap") as recording:

@@ -154,7 +154,7 @@ def test_damaged_bytes_raise_only_recording_errors(tmp_path: Path, kind: str) ->
             assert error.reason  # noqa: PT017 - either is right
 
 
-def test_writer_continues_after_any_value(tmp_path: Path) -> None:
+def test_writer_continues_after_messages_with_extreme_values(tmp_path: Path) -> None:
     deep = (b"[" * 1000 + b"]" * 1000, b'{"a":' * 1000 + b"1" + b"}" * 1000, b"\x91" * 1000 + b"\x01")
     odd = [
         Message("/odd", data, codec, kind, stamp_ns=stamp, seq=stamp, publisher=stamp, extension=extension)

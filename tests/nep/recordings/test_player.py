@@ -93,7 +93,7 @@ def test_playback_waits_until_the_next_message_and_at_most_50_ms(recording):
     assert count == COUNT
 
 
-def test_seek_returns_the_newest_message_of_each_topic_and_continues_after_them(recording, times):
+def test_seek_returns_newest_message_of_each_topic_and_playback_continues_after_seek(recording, times):
     clock = Clock()
     playback = Playback(recording, clock=clock)
     playback.seek(times[50])
@@ -124,7 +124,7 @@ def test_step_moves_between_messages_of_a_topic(recording, times):
     assert not playback.step("/a")
 
 
-def test_loop_repeats_a_range_until_it_is_ended(recording, times):
+def test_loop_repeats_its_range_until_disabled(recording, times):
     clock = Clock()
     playback = Playback(recording, clock=clock)
     playback.loop(times[20], times[24])
@@ -152,7 +152,7 @@ def test_play_at_the_end_restarts_from_the_beginning(recording):
         assert [seq for _at, seq in run(playback, clock, 1.5)] == list(range(COUNT))
 
 
-def test_slow_consumer_receives_all_messages_and_the_true_speed_is_reported(recording):
+def test_slow_consumer_receives_all_messages_and_the_actual_speed_is_reported(recording):
     clock = Clock()
     playback = Playback(recording, clock=clock)
     playback.speed = 10.0
@@ -207,7 +207,7 @@ def test_played_topics_are_filtered_and_remapped(recording):
     ]
 
 
-def test_playback_of_an_empty_recording_does_nothing(tmp_path):
+def test_playback_of_an_empty_recording_delivers_no_message(tmp_path):
     record(tmp_path / "a.mcap", [])
     with Recording(tmp_path / "a.mcap") as recording:
         playback = Playback(recording, clock=Clock())

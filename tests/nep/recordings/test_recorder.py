@@ -57,7 +57,7 @@ class Heard:
         ((), ("**/camera",), ("**",), ["/x"], ["/x/camera", "camera"]),
     ],
 )
-def test_topic_selection_matches_chosen_topics_only(topics, left_out, subscriptions, chosen, others):
+def test_topic_selection_matches_selected_topics_only(topics, left_out, subscriptions, chosen, others):
     selection = TopicSelection(topics, left_out)
     assert selection.subscriptions == subscriptions
     for topic in (*chosen, *others):
@@ -254,7 +254,9 @@ def test_recording_stops_at_its_duration_or_size_limit(master, tmp_path, limit, 
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows removes no file that is open")
-def test_recording_that_stops_on_its_own_is_reported_and_another_can_start(master, tmp_path, monkeypatch):
+def test_recording_that_ends_unexpectedly_is_reported_and_another_recording_can_start(
+    master, tmp_path, monkeypatch
+):
     events: list[dict[str, object]] = []
 
     def seen(kind: str) -> list[dict[str, object]]:

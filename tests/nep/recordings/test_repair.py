@@ -56,7 +56,7 @@ def test_repair_of_a_truncated_recording_recovers_all_complete_messages(path, tm
         assert damaged.stat().st_size == cut  # as it was
 
 
-def test_repaired_file_is_complete_and_keeps_its_figures(path, tmp_path):
+def test_repaired_file_is_complete_and_has_the_stats_of_the_original(path, tmp_path):
     damaged = tmp_path / "a.mcap"
     damaged.write_bytes(path.read_bytes()[:-300])
     progress = []
@@ -71,7 +71,7 @@ def test_repaired_file_is_complete_and_keeps_its_figures(path, tmp_path):
         assert recording.stats() == before.stats()
 
 
-def test_repair_of_an_undamaged_recording_loses_nothing(path, tmp_path):
+def test_repair_of_an_undamaged_recording_loses_no_message(path, tmp_path):
     report = repair(path, tmp_path / "copy.mcap")
     assert report.is_complete
     assert read(report.path) == [kept(each) for each in ALL]
@@ -149,7 +149,7 @@ def test_repair_of_a_file_without_messages_raises_and_leaves_no_file(tmp_path, d
     assert [each.name for each in tmp_path.iterdir()] == ["a.mcap"]
 
 
-def test_repair_result_that_cannot_be_read_back_is_an_error(path, tmp_path, monkeypatch):
+def test_repair_raises_if_its_result_cannot_be_read_back(path, tmp_path, monkeypatch):
     damaged = tmp_path / "a.mcap"
     damaged.write_bytes(path.read_bytes()[:-300])
     finish = repair_module.FileWriter.finish

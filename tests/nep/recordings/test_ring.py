@@ -64,7 +64,7 @@ def test_flight_recorder_is_limited_by_bytes_before_seconds(tmp_path):
         (tmp_path / "kept").unlink()
 
 
-def test_segment_being_copied_is_removed_after_the_copy(tmp_path, monkeypatch):
+def test_segment_is_removed_only_after_its_copy_is_finished(tmp_path, monkeypatch):
     copying, go_on, made = threading.Event(), threading.Event(), []
 
     class SlowWriter(ring_module.FileWriter):
@@ -91,7 +91,7 @@ def test_segment_being_copied_is_removed_after_the_copy(tmp_path, monkeypatch):
     assert not list((tmp_path / "ring").iterdir())
 
 
-def test_saved_flight_recording_counts_only_losses_of_its_seconds(tmp_path):
+def test_saved_flight_recording_counts_only_losses_within_its_duration(tmp_path):
     clock = TestClock()
     with FlightRecorder(tmp_path / "ring", clock=clock, limits=limits(stats_interval_s=1e-9)) as ring:
         ring.post([json_message(1), json_message(5)])  # three are missing, long ago
@@ -112,7 +112,7 @@ def test_saved_flight_recording_counts_only_losses_of_its_seconds(tmp_path):
         assert recording.stats()["/odom"].lost in {0, 1}  # of this second, never the three
 
 
-def test_segments_of_dead_processes_are_removed_and_others_kept(tmp_path):
+def test_segments_of_dead_processes_are_removed_and_segments_of_live_processes_kept(tmp_path):
     gone = tmp_path / f"ring-{NO_PROCESS}-a-1.mcap"
     others = [tmp_path / f"ring-{os.getppid()}-a-1.mcap", tmp_path / "mine.mcap", tmp_path / "ring-x-1.mcap"]
     for each in (gone, *others):

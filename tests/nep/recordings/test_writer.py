@@ -124,7 +124,7 @@ def test_lost_late_and_undecodable_messages_are_counted_per_topic(tmp_path):
     assert figures == writer.status.topics
 
 
-def test_figures_record_the_time_of_a_loss(tmp_path):
+def test_recorded_stats_contain_the_time_of_a_loss(tmp_path):
     path = tmp_path / "a.mcap"
     with RecordingWriter(path, clock=TestClock(), limits=limits(stats_interval_s=0.001)) as writer:
         for seqs in ((1, 2), (5,), (6,)):
@@ -187,7 +187,7 @@ def test_full_disk_leaves_complete_records_and_counts_the_remaining_messages(tmp
     assert [kept(each) for each in found] == [kept(each) for each in messages[: status.message_count]]
 
 
-def test_writer_reports_a_really_full_disk_and_counts_unwritten_messages(tmp_path):
+def test_writer_reports_a_full_disk_and_counts_unwritten_messages(tmp_path):
     disk = SmallDisk(tmp_path)
     found = disk.run(
         "import json, sys\n"
@@ -334,7 +334,7 @@ for line in sys.stdin:
 """
 
 
-def test_killed_process_loses_only_the_last_moment(tmp_path):
+def test_killed_writer_process_loses_only_unflushed_messages(tmp_path):
     path = tmp_path / "a.mcap"
     child = subprocess.Popen(
         [sys.executable, "-c", _CHILD, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True

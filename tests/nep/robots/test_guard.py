@@ -30,9 +30,7 @@ def describe(robot: nep.Node, name: str, command: str) -> None:
     publisher.publish({"title": name, "rb:robot": {"virtual": True}, "rb:topics": {"command": command}})
 
 
-def test_robot_that_connects_later_is_protected_on_any_topic_it_describes(
-    network: str, node: nep.Node
-) -> None:
+def test_later_robot_is_protected_on_every_topic_of_its_description(network: str, node: nep.Node) -> None:
     guard = MotionGuard(node)
     assert guard.wait_for_descriptions(1.0)
     assert guard.refusal("/orders") == ""

@@ -80,7 +80,7 @@ def test_program_with_unread_description_is_protected_on_all_its_subscriptions()
     assert moving.robots_moved_by("/other") == ()
 
 
-def test_driver_without_a_published_description_yet_is_protected() -> None:
+def test_driver_without_a_published_description_is_protected() -> None:
     answers = topic("/Rover/answer", "robot/answer", publisher="n")
     view = graph(answers, topic("/go", subscriber="n"))
     assert moving_topics(view, ()).robots_moved_by("/go") == ("Rover",)

@@ -53,7 +53,7 @@ def test_server_death_during_a_call_is_reported_immediately(client) -> None:
         assert client.call({}) == {"pid": program.process.pid}
 
 
-def test_call_made_after_server_death_waits_for_the_next_server(client) -> None:
+def test_call_made_after_server_death_waits_for_a_new_server(client) -> None:
     with running(SERVER) as program:
         assert program.line() == "ready"
         client.call({})
@@ -98,7 +98,7 @@ def test_server_suspended_during_a_call_is_replaced_by_another(master: Master, c
         assert client.call(2) == ["other", 2]
 
 
-def test_calls_continue_while_the_master_is_away() -> None:
+def test_calls_continue_while_the_master_is_unreachable() -> None:
     master = Master("127.0.0.1:0", learn_s=0.0).start()
     address = master.address
     with nep.node("server", master=address) as a, nep.node("client", master=address) as b:
@@ -126,7 +126,7 @@ def test_calls_continue_while_the_master_is_away() -> None:
             eventually(is_new)
 
 
-def test_unreachable_server_does_not_hide_a_reachable_one(master: Master, client) -> None:
+def test_call_reaches_a_server_despite_an_unreachable_server_of_the_same_name(master: Master, client) -> None:
     """Something is listed first whose port is closed."""
     key = "k" * 20
     node = NodeRecord(node_id_from(key), "ghost", "", None, key=key)
@@ -346,7 +346,7 @@ def test_spin_wakes_for_a_new_server_and_for_each_call(
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_fork_closes_services_in_the_child_and_keeps_them_in_the_parent(master: Master) -> None:
+def test_fork_closes_services_in_the_child_and_not_in_the_parent(master: Master) -> None:
     with nep.node("server") as a, nep.node("client") as b:
         server = a.new_server("/x", lambda request: request, threads=1)
         client = b.new_client("/x", timeout_s=LONG_S)

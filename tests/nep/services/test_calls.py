@@ -309,7 +309,7 @@ def test_timed_out_calls_are_not_executed(make: Make, spin) -> None:
     assert (server.calls, server.refused) == (1, 1)
 
 
-def test_closing_server_rejects_a_queued_call_and_fails_a_running_one(make: Make) -> None:
+def test_closing_server_rejects_queued_calls_and_fails_the_running_call(make: Make) -> None:
     node = make("server")
     server = node.new_server("/closes", doubled)  # nobody spins
     client = make("client").new_client("/closes", timeout_s=LONG_S)

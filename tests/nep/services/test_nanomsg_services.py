@@ -155,7 +155,7 @@ def test_original_wire_errors_are_sent_as_replies(node: nep.Node, port: int) -> 
         node.new_client("/y", node.direct("127.0.0.1", 1)).call({}, timeout_s=0.1)
 
 
-def test_client_that_does_not_read_does_not_block_others(
+def test_client_that_does_not_read_does_not_block_other_clients(
     node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It asks for large answers and reads none: the others have theirs."""

@@ -63,7 +63,7 @@ def test_all_existing_respondents_reply(make: Make) -> None:
     assert respondents[0].survey == surveyor.survey == "/who"
 
 
-def test_survey_includes_later_respondents_and_excludes_closed_ones(make: Make) -> None:
+def test_survey_includes_new_respondents_and_excludes_closed_respondents(make: Make) -> None:
     surveyor = make("surveyor").new_surveyor("/who", LONG_MS)
     assert surveyor.ask({}) == []
     first, _second = respond(make, 1, 2)
@@ -96,7 +96,7 @@ def test_survey_ends_early_with_the_expected_number_of_replies(make: Make) -> No
     go_on.set()
 
 
-def test_replies_are_yielded_as_they_are_received(make: Make) -> None:
+def test_replies_are_yielded_in_the_order_received(make: Make) -> None:
     go_on = threading.Event()
     make("slow").new_respondent("/who", lambda _question: go_on.wait(LONG_S) and "late", threads=1)
     respond(make, "quick")
@@ -205,7 +205,7 @@ def test_closing_node_closes_its_surveys(make: Make) -> None:
         a.new_respondent("/who")
 
 
-def test_surveys_are_listed_in_the_graph_without_an_alert(make: Make) -> None:
+def test_surveys_are_listed_in_the_graph_and_raise_no_alert(make: Make) -> None:
     respond(make, 1, 2)
     node = make("surveyor")
     surveyor = node.new_surveyor("/who", LONG_MS)
@@ -297,7 +297,7 @@ def test_killed_respondent_does_not_delay_the_survey(master: Master) -> None:
         assert surveyor.failures == 1
 
 
-def test_surveys_continue_while_the_master_is_away() -> None:
+def test_surveys_continue_while_the_master_is_unreachable() -> None:
     master = Master("127.0.0.1:0", learn_s=0.0).start()
     address = master.address
     with nep.node("a", master=address) as a, nep.node("b", master=address) as b:

@@ -310,7 +310,7 @@ def test_plain_tcp_is_rejected_for_topics(node: nep.Node, port: int) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_fork_closes_services_in_the_child_and_keeps_them_in_the_parent(node: nep.Node, port: int) -> None:
+def test_fork_closes_services_in_the_child_and_not_in_the_parent(node: nep.Node, port: int) -> None:
     server = serve(node, port)
     client = node.new_client("/x", node.direct("127.0.0.1", port, wire="tcp"), timeout_s=LONG_S)
     assert client.call(1) == {"heard": 1}

@@ -92,7 +92,7 @@ def test_typed_call_over_msgpack(make: Make) -> None:
     assert client.call(Way([Point(1), Point(2)])) == Length(1.0, [""])
 
 
-def test_untyped_programs_exchange_maps_with_typed_ones(memory: nep.Node) -> None:
+def test_untyped_programs_exchange_maps_with_typed_programs(memory: nep.Node) -> None:
     memory.new_server("/typed", length_of, threads=1, request=Way, answer=Length)
     memory.new_server("/plain", lambda request: request, threads=1)
     plain = memory.new_client("/typed")
@@ -179,7 +179,7 @@ def test_original_style_calls_support_types(memory: nep.Node) -> None:
     assert client.listen_info() == Length(1.0)
 
 
-def test_mismatched_original_style_request_is_rejected_and_the_next_one_read(memory: nep.Node) -> None:
+def test_mismatched_original_style_request_is_rejected_and_the_next_request_is_read(memory: nep.Node) -> None:
     server = memory.new_server("/a", request=Way)
     plain = memory.new_client("/a")
     bad, good = plain.call_async({"points": 5}), plain.call_async({"points": []})

@@ -217,14 +217,14 @@ def test_nep_client_calls_a_zenoh_program(
     queryable.undeclare()
 
 
-def test_first_server_is_called_by_all_clients(make: Make) -> None:
+def test_all_clients_call_the_first_of_several_servers(make: Make) -> None:
     for number in range(3):
         make(f"server {number}").new_server("/x", lambda _request, said=number: said, threads=1)
     clients = [make(f"client {number}").new_client("/x", timeout_s=LONG_S) for number in range(2)]
     assert [client.call({}) for client in clients for _ in range(3)] == [0] * 6
 
 
-def test_all_respondents_are_asked_in_one_survey(make: Make) -> None:
+def test_survey_reaches_all_respondents(make: Make) -> None:
     for number in range(3):
         make(f"respondent {number}").new_respondent(
             "/who", lambda question, said=number: [said, 1 / question], threads=1

@@ -20,7 +20,7 @@ class Hand:
         return CpuLoad(lambda: self.used, lambda: self.now)
 
 
-def test_cpu_share_is_unknown_at_the_first_reading_and_measured_since_the_last() -> None:
+def test_cpu_share_is_unknown_at_the_first_reading_and_then_covers_the_last_interval() -> None:
     hand = Hand()
     load = hand.load()
     assert load.ratio() is None

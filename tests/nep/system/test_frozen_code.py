@@ -75,7 +75,7 @@ def test_hold_code_ignores_a_program_already_removed(program) -> None:
     assert program.archive._filename == str(program.file)
 
 
-def test_hold_code_does_nothing_when_running_from_source(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hold_code_has_no_effect_when_running_from_source(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, LOADER_MODULE, raising=False)
     assert not keep_archive_open()
 

@@ -84,7 +84,7 @@ def test_repeated_latched_message_is_dropped() -> None:
     assert (sources.received, sources.lost) == (1, 0)
 
 
-def test_tail_loss_is_counted_one_renewal_later_and_reverted_if_late() -> None:
+def test_tail_loss_is_counted_at_the_next_renewal_and_reverted_by_a_late_message() -> None:
     sources = PublisherTracker()
     sources.advance_to(1, 0)
     sources.get(1).has_echoed = True
@@ -98,7 +98,7 @@ def test_tail_loss_is_counted_one_renewal_later_and_reverted_if_late() -> None:
     sources.expect_up_to(99, 5)  # nobody we know
 
 
-def test_restarted_publisher_replaces_the_silent_one() -> None:
+def test_restarted_publisher_replaces_its_silent_predecessor() -> None:
     sources = PublisherTracker()
     sources.get(1).remote = remote(1)
     assert sources.replaced_publishers(remote(2)) == []
@@ -144,7 +144,7 @@ def test_single_file_is_discovered_as_a_plug_in(package: Path) -> None:
         discover("plugs_for_test", "BACKEND", Backend)
 
 
-def test_waker_wakes_and_is_cleared() -> None:
+def test_waker_makes_its_descriptor_readable_until_cleared() -> None:
     waker = Waker()
     assert select.select([waker.fd], [], [], 0)[0] == []
     for _ in range(100_000):
@@ -230,7 +230,7 @@ def test_io_thread_serves_a_sender_as_soon_as_its_socket_is_writable() -> None:
         io.close()
 
 
-def test_failing_socket_does_not_block_the_others(caplog: pytest.LogCaptureFixture) -> None:
+def test_failing_socket_does_not_block_other_sockets(caplog: pytest.LogCaptureFixture) -> None:
     io = IoThread("nep-io-test")
     io.start()
     broken, fine = Bell([PollState(due=-1.0)]), Bell([])
@@ -296,7 +296,7 @@ def test_public_names_exist() -> None:
         assert getattr(nep, name) is not None
 
 
-def test_impossible_sequence_jump_is_rejected_and_counts_no_loss() -> None:
+def test_implausible_sequence_jump_is_rejected_and_counts_no_loss() -> None:
     sources = PublisherTracker()
     sources.advance_to(1, 0)
     assert sources.count_message(1, 1, is_alone=False)
@@ -310,7 +310,7 @@ def test_impossible_sequence_jump_is_rejected_and_counts_no_loss() -> None:
     assert (sources.received, sources.lost, sources.get(1).last) == (2, 1, 3)
 
 
-def test_publisher_is_received_again_after_an_impossible_sequence_jump() -> None:
+def test_publisher_is_received_again_after_an_implausible_sequence_jump() -> None:
     sources = PublisherTracker()
     assert sources.count_message(1, 1, is_alone=False)
     far = 1 + 2**32 + 1
@@ -432,7 +432,7 @@ def test_number_of_unlisted_publishers_is_bounded() -> None:
     assert len(sources.by_id) == UNLISTED_MAX + 11
 
 
-def test_number_of_greeted_subscribers_is_bounded() -> None:
+def test_number_of_subscribers_that_get_an_echo_is_bounded() -> None:
     subscriptions = Subscriptions("t", 7)
     for number in range(MAX_SUBSCRIBERS + 1000):
         greeted = subscriptions.handle_event(b"\1" + hello_part(number, "t", tells=True), 0)
@@ -482,7 +482,7 @@ def test_lost_message_that_is_received_later_is_counted_once() -> None:
     assert (sources.received, sources.lost) == (5, 0)
 
 
-def test_newer_message_confirms_the_loss_of_earlier_ones() -> None:
+def test_newer_message_confirms_the_loss_of_earlier_messages() -> None:
     sources = PublisherTracker()
     sources.count_message(1, 1, is_alone=False)
     for _ in range(2):

@@ -42,7 +42,7 @@ def test_page_connects_only_from_an_allowed_origin(origin: str | None, is_allowe
     assert refusal.isprintable()
 
 
-def test_pages_of_the_server_itself_are_allowed_at_its_own_address_only() -> None:
+def test_pages_served_by_the_web_server_are_allowed_at_its_address_only() -> None:
     own = "http://192.168.1.5:9090"
     assert Access().origin_refusal(own, own) == ""
     for other in ("http://192.168.1.5:8000", "https://192.168.1.5:9090", "http://192.168.1.6:9090"):
@@ -76,7 +76,7 @@ def signed(token: str, time_s: int, end_s: int, rand: str = "r") -> Auth:
     return Auth(None, hashlib.sha512(text.encode()).hexdigest(), "c", "d", rand, time_s, "user", end_s)
 
 
-def test_auth_is_valid_once_and_for_a_limited_time() -> None:
+def test_auth_is_accepted_once_and_for_a_limited_time() -> None:
     check = AuthCheck("s3cret", clock=lambda: 1_000.0)
     assert check.verify(signed("s3cret", 1_001, 2_000))
     assert not check.verify(signed("s3cret", 1_001, 2_000))

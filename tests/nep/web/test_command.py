@@ -46,7 +46,7 @@ def test_command_serves_with_a_token_until_terminated(master: Master, tmp_path: 
         assert err == ""
 
 
-def test_command_suggests_a_solution_when_it_cannot_serve(
+def test_command_suggests_a_solution_when_the_server_cannot_start(
     master: Master, taken_port: int, tmp_path: Path, type_in: TypeIn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as probe:

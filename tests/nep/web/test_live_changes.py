@@ -53,7 +53,7 @@ def test_removed_origin_is_disconnected_and_other_pages_stay_connected(
     assert refused_to_connect(server, origin=TABLET)
 
 
-def test_new_token_disconnects_all_users_of_the_old_token(server: WebServer, open_page: Open) -> None:
+def test_new_token_disconnects_all_clients_with_the_old_token(server: WebServer, open_page: Open) -> None:
     before = open_page()
     eventually(lambda: len(server.pages) == 1)
     assert server.set_access(Access(token="first-token-of-all")) == 1
@@ -125,7 +125,9 @@ def connected(server: WebServer) -> Iterator[Callable[..., ConnectedPage]]:
     return shown
 
 
-def test_page_has_a_client_and_a_title(connected: Callable[..., ConnectedPage]) -> None:
+def test_client_name_and_title_of_a_page_are_derived_from_its_request(
+    connected: Callable[..., ConnectedPage],
+) -> None:
     browser = connected("/?title=buttons.html", user_agent_header=CHROME, origin="http://localhost:8000")
     assert (browser.client, browser.title) == ("Chrome", "buttons.html")
     referer = {"Referer": "http://localhost:8000/a/dash%20board.html?x#y"}
@@ -138,7 +140,9 @@ def test_page_has_a_client_and_a_title(connected: Callable[..., ConnectedPage]) 
     assert (len(hostile.title), len(hostile.client)) == (60, 60)
 
 
-def test_topics_of_a_page_have_limits_rates_and_counts(server: WebServer, node: nep.Node, page: Peer) -> None:
+def test_rate_limit_rate_and_message_count_are_reported_for_each_topic_of_a_page(
+    server: WebServer, node: nep.Node, page: Peer
+) -> None:
     odom = node.new_pub("/odom")
     page.send("subscribe", topic="/odom", throttle_rate=100)
     page.send("advertise", topic="/buttons", type="nep/Json")
@@ -160,7 +164,7 @@ def test_page_is_identified_as_a_web_page_in_the_graph(server: WebServer, node: 
     assert names == {each.name for each in server.pages}
 
 
-def test_blocked_page_is_rejected_until_it_is_unblocked(server: WebServer, open_page: Open) -> None:
+def test_blocked_page_is_rejected_until_unblocked(server: WebServer, open_page: Open) -> None:
     own = f"http://127.0.0.1:{server.port}"
     first, twin, other = open_page(origin=own), open_page(origin=own), open_page()
     eventually(lambda: len(server.pages) == 3)

@@ -148,7 +148,7 @@ def test_hostile_message_is_sent_or_rejected(compression: str) -> None:
                 continue
 
 
-def test_reply_that_is_not_json_is_rejected() -> None:
+def test_reply_that_cannot_be_encoded_as_json_is_rejected() -> None:
     with pytest.raises(NepError):
         operation_frames({"op": "service_response", "values": {"x": object()}}, EncodingOptions())
 

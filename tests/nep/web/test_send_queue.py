@@ -36,7 +36,7 @@ def test_slow_page_loses_the_oldest_messages() -> None:
     assert numbers(slow) == [7, 8, 9]
 
 
-def test_image_topic_has_a_short_queue_unless_the_page_asks_for_another() -> None:
+def test_image_topic_has_a_short_queue_unless_the_page_requests_another_length() -> None:
     for queue_length, kept in ((0, [6, 7, 8, 9]), (6, [4, 5, 6, 7, 8, 9])):
         camera = Feed("/camera", "image")
         camera.subscribe(Subscribe("s", "/camera", queue_length=queue_length), as_pixels=False)

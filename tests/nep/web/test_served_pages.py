@@ -47,7 +47,9 @@ def asked(
         (("localhost", "evil.example"), False),
     ],
 )
-def test_page_is_served_only_for_hosts_it_can_connect_from(hosts: tuple[str, ...], is_served: bool) -> None:
+def test_page_is_served_only_for_valid_and_allowed_host_headers(
+    hosts: tuple[str, ...], is_served: bool
+) -> None:
     status, body = asked(hosts=hosts)
     assert status == (HTTPStatus.OK if is_served else HTTPStatus.FORBIDDEN)
     assert is_served or OWN in body
@@ -81,7 +83,7 @@ def test_token_is_required_for_pages_and_absent_from_rejections(path: str) -> No
     assert (status, TOKEN in body) == (HTTPStatus.OK, path == "/starter.html")
 
 
-def test_pages_run_only_their_own_scripts_and_load_no_external_resources() -> None:
+def test_content_security_policy_allows_only_inline_scripts_and_no_external_resources() -> None:
     found = respond(PageRequest("GET", "/", ("localhost:9090",), OWN), Access())
     policy = found.headers["Content-Security-Policy"]
     assert "default-src 'none'" in policy

@@ -30,7 +30,9 @@ from tests.nep.web.test_operations import EXAMPLES
 Open = Callable[..., Peer]
 
 
-def test_page_is_a_node_until_it_disconnects(server: WebServer, node: nep.Node, open_page: Open) -> None:
+def test_connected_page_is_a_node_until_the_page_disconnects(
+    server: WebServer, node: nep.Node, open_page: Open
+) -> None:
     page = open_page(origin="http://localhost:8000")
     port = page.connection.socket.getsockname()[1]
     name = f"web_localhost:8000_{port}"
@@ -229,7 +231,7 @@ def test_message_beyond_the_limit_closes_only_its_page(server: WebServer, open_p
     assert other.refusal("nothing")
 
 
-def test_page_that_does_not_read_does_not_affect_others(
+def test_page_that_does_not_read_does_not_affect_other_pages(
     node: nep.Node, server: WebServer, open_page: Open
 ) -> None:
     slow, quick = open_page(max_queue=1), open_page()
@@ -247,7 +249,7 @@ def test_page_that_does_not_read_does_not_affect_others(
     assert server.counts.dropped + len(got) == 60
 
 
-def test_other_origins_are_rejected_before_they_become_pages(server: WebServer) -> None:
+def test_other_origins_are_rejected_before_a_page_is_created(server: WebServer) -> None:
     for origin in ("http://evil.example", "null"):
         with pytest.raises(InvalidStatus) as refused, connect(server.url, origin=origin):
             pass

@@ -177,7 +177,7 @@ def test_blocking_wait_in_a_coroutine_fails_with_a_hint(drone):
     assert "use `await asyncio.sleep` there" in str(ears.final("1")["error"])
 
 
-def test_coroutine_that_ignores_cancellation_is_reported_until_it_ends(drone):
+def test_coroutine_that_ignores_cancellation_is_reported_until_finished(drone):
     body, ears, clock = drone
     ears.invoke("1", "stubborn")
     eventually(lambda: "begun" in body.events)  # "running" is told before; who has not begun need not listen

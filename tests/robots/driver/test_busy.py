@@ -24,7 +24,7 @@ def test_queue_waits_for_running_and_queued_actions(turtle) -> None:
     assert ears.states("2") == ["accepted", "running", "succeeded"]
 
 
-def test_replace_cancels_the_running_action_and_both_answers_report_it(turtle) -> None:
+def test_replace_cancels_the_running_action_and_both_replies_report_the_replacement(turtle) -> None:
     body, ears, _ = turtle
     ears.invoke("1", "move", distance=1)
     eventually(lambda: body.moving)
@@ -50,7 +50,7 @@ def test_replace_also_cancels_queued_actions(turtle) -> None:
     assert ears.final("3")["state"] == "succeeded"
 
 
-def test_reject_reports_the_action_that_keeps_the_robot_busy(turtle) -> None:
+def test_rejection_names_the_action_that_keeps_the_robot_busy(turtle) -> None:
     body, ears, _ = turtle
     ears.invoke("1", "move", distance=1)
     eventually(lambda: body.moving)
@@ -130,7 +130,7 @@ def test_heartbeat_is_sent_while_an_action_runs_or_waits(turtle) -> None:
 # ---- who must stay alive ---------------------------------------------------------------------------
 
 
-def test_silent_program_without_running_actions_does_not_stop_the_robot(turtle) -> None:
+def test_missing_heartbeat_of_an_idle_program_does_not_stop_the_robot(turtle) -> None:
     body, ears, clock = turtle
     ears.invoke("1", "light", program="tried")
     ears.final("1")
@@ -146,7 +146,7 @@ def test_silent_program_without_running_actions_does_not_stop_the_robot(turtle) 
     assert ears.final("2")["state"] == "succeeded"
 
 
-def test_silent_program_with_a_running_action_stops_the_robot(turtle) -> None:
+def test_missing_heartbeat_of_a_program_with_a_running_action_stops_the_robot(turtle) -> None:
     body, ears, clock = turtle
     ears.invoke("1", "move", program="running", distance=1)
     eventually(lambda: body.moving)

@@ -290,7 +290,7 @@ def test_stop_that_ends_a_program_rejects_its_later_commands(bench) -> None:
     assert "running" not in bench.ears.states(late)
 
 
-def test_stop_with_only_the_name_of_a_program_does_not_end_it(bench) -> None:
+def test_stop_with_only_the_name_of_a_program_does_not_block_its_later_commands(bench) -> None:
     """Its name can be read by everybody: a stop that only names it stops the robot, and no more."""
     assert bench.stop(ends="studio")["state"] == "succeeded"
     asked = bench.invoke(bench.any_action(), "studio")
@@ -346,7 +346,7 @@ def test_action_that_exceeds_its_timeout_fails_with_the_limit(shared) -> None:
     assert late or not any(takes_time(shared, action) for action in shared.long() if action.timeout_s)
 
 
-def test_busy_robot_behaves_as_declared_in_its_description(shared) -> None:
+def test_busy_robot_queues_replaces_or_rejects_actions_as_declared(shared) -> None:
     for action in (each for each in shared.long() if each.uses):
         with at_its_start(shared.kind, f"Busy {shared.kind.model}") as bench:
             first = bench.invoke(action)
@@ -370,7 +370,7 @@ def test_busy_robot_behaves_as_declared_in_its_description(shared) -> None:
             bench.running(second)
 
 
-def test_robot_stops_when_its_moving_program_falls_silent(bench) -> None:
+def test_missing_heartbeat_of_the_program_stops_a_moving_robot(bench) -> None:
     wanted = bench.begun("silent")
     bench.clock.advance((bench.robot.safe_stop.watchdog_s or 0) + 0.05)
     ended = bench.ears.final(wanted)

@@ -84,7 +84,7 @@ def contract(folder: Path, *drivers: str, only: str = "") -> subprocess.Complete
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
-def test_correct_drivers_are_accepted(tmp_path):
+def test_correct_drivers_pass_the_contract(tmp_path):
     done = contract(tmp_path, QUICK, ASYNC)
     assert done.returncode == 0, done.stdout
     assert "pepper" not in done.stdout

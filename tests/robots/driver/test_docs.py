@@ -46,7 +46,7 @@ def test_documented_driver_listing_works(rover, node):
             assert ears.final("2")["state"] == "canceled"
 
 
-def test_how_to_shows_the_example_of_at_most_thirty_lines():
+def test_how_to_guide_contains_the_example_of_at_most_thirty_lines():
     page = (ROOT / "docs" / "write-a-driver.md").read_text(encoding="utf-8")
     (listing,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     assert listing == EXAMPLE.read_text(encoding="utf-8")

@@ -43,7 +43,7 @@ def test_action_is_accepted_runs_and_succeeds(turtle):
     assert isinstance(body.done[0][1], float)
 
 
-def test_invalid_input_never_reaches_the_function(turtle):
+def test_action_with_invalid_input_is_rejected_without_calling_its_function(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "move", distance=3)
     assert ears.final("1")["error"] == "move: distance must be between -2 and 2 m"
@@ -132,7 +132,7 @@ def test_busy_policies_queue_replace_and_reject(turtle):
     assert [entry for entry in body.done if entry[0] == "say"] == [("say", "one"), ("say", "two")]
 
 
-def test_non_cancellable_call_reports_it(turtle):
+def test_call_of_a_non_cancellable_action_is_marked_as_non_cancellable(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "light", colour="#102030")
     assert ears.final("1")["state"] == "succeeded"
@@ -160,7 +160,7 @@ def test_queued_actions_beyond_the_limit_are_rejected(turtle):
 # ---- stop -----------------------------------------------------------------------------------------
 
 
-def test_stop_is_answered_after_the_robot_stands_still(turtle):
+def test_stop_is_answered_only_after_the_robot_has_stopped(turtle):
     body, ears, _ = turtle
     body.may_stop.clear()
     for wanted, action, given in (
@@ -183,7 +183,7 @@ def test_stop_is_answered_after_the_robot_stands_still(turtle):
     assert body.stops == 1
 
 
-def test_ineffective_stop_is_reported_as_failure(turtle):
+def test_stop_that_does_not_end_an_action_is_reported_as_failed(turtle):
     body, ears, clock = turtle
     ears.invoke("1", "ignore")
     eventually(lambda: "running" in ears.states("1"))
@@ -284,7 +284,7 @@ def test_late_command_of_a_stopped_program_is_canceled(turtle):
     assert ears.final("2")["state"] == "succeeded"
 
 
-def test_stop_with_a_forged_program_name_locks_no_program_out(turtle):
+def test_stop_with_a_forged_program_name_blocks_no_program(turtle):
     """Everybody reads who a command is from: that name alone, or anything like it, ends no program."""
     body, ears, _ = turtle
     name = program_of("key")
@@ -304,7 +304,7 @@ def test_stop_can_be_invoked_as_an_action(turtle):
     assert body.stops == 1
 
 
-def test_silent_program_stops_the_robot(turtle):
+def test_missing_heartbeat_stops_the_robot(turtle):
     body, ears, clock = turtle
     ears.invoke("1", "move", program="p")
     eventually(lambda: body.moving)
@@ -393,7 +393,7 @@ def test_forged_heartbeat_does_not_keep_the_robot_moving(turtle, node):
     assert not body.moving
 
 
-def test_forged_heartbeat_does_not_sustain_motion_after_the_action():
+def test_forged_heartbeat_does_not_prevent_the_watchdog_stop_after_an_action():
     """Also after the action: what it left in motion is its own program's, whoever writes its name."""
     dog = Watchdog(1.0)
     program, forger = ProgramId("p", 1), ProgramId("p", 2)
@@ -413,7 +413,7 @@ def test_forged_heartbeat_does_not_sustain_motion_after_the_action():
     assert dog.check_expired(1.0, [])
 
 
-def test_only_the_caller_can_cancel_and_everyone_can_stop(turtle, node):
+def test_only_the_caller_can_cancel_and_every_program_can_stop(turtle, node):
     body, ears, _ = turtle
     attacker = node.new_pub("/Turtle/command", "robot/command")
     ears.invoke("1", "move", program="p")
@@ -447,7 +447,7 @@ def test_flood_of_commands_is_bounded_and_a_stop_is_still_executed(node, clock):
         assert driver.body.stops >= 1
 
 
-def test_programs_without_running_actions_or_after_a_stop_are_not_watched(turtle):
+def test_watchdog_ignores_programs_without_running_actions_and_stopped_programs(turtle):
     body, ears, clock = turtle
     ears.command(op="alive", **{"from": "looker"})
     ears.invoke("1", "dig", program="p")

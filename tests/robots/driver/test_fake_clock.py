@@ -7,7 +7,7 @@ import threading
 from tests.robots.conftest import FakeClock
 
 
-def test_fake_clock_wait_ends_if_time_passes_before_the_wait_begins(clock: FakeClock) -> None:
+def test_fake_clock_wait_ends_if_its_time_passed_before_the_wait_started(clock: FakeClock) -> None:
     due = clock.now() + 0.5
     rest = due - clock.now()
     clock.advance(0.6)  # the waiting thread had no turn yet

@@ -51,7 +51,7 @@ def test_robot_stops_after_every_hostile_message(turtle, node):
     assert threads <= set(threading.enumerate())
 
 
-def test_moving_robot_is_stopped_after_a_deep_command(turtle, node):
+def test_moving_robot_can_be_stopped_after_a_deeply_nested_command(turtle, node):
     body, ears, _clock = turtle
     ears.invoke("1", "move")
     eventually(lambda: body.moving)
@@ -61,7 +61,7 @@ def test_moving_robot_is_stopped_after_a_deep_command(turtle, node):
     assert not body.moving
 
 
-def test_deep_rize_message_does_not_disable_the_robots_it_names(node, clock):
+def test_deeply_nested_rize_message_does_not_disable_the_robots_named_in_its_header(node, clock):
     deep = (
         b'{"node":"action","robots":["Ann","Bob"],"state":"idle","primitives":{"primitive":'
         + b"[" * 1000
@@ -89,7 +89,7 @@ def test_command_of_more_than_64_kb_is_rejected_with_a_message(turtle, caplog):
     assert body.done == []
 
 
-def test_unknown_names_are_checked_in_bounded_time():
+def test_unknown_input_names_are_checked_in_bounded_time():
     """Issue 26: looking for a similar name for each of 200 000 names took 3.5 s."""
     parameters = (Parameter("text", "text", "text"),)
     given = {"text": "hi"} | {f"text{number}": 1 for number in range(20_000)}
@@ -122,7 +122,7 @@ def test_stop_is_executed_while_the_command_thread_is_busy(busy):
 
 
 @pytest.mark.parametrize("how", ["native", "action", "rize"])
-def test_commands_received_before_a_stop_are_not_run_after_it(busy, how):
+def test_commands_received_before_a_stop_are_not_run_after_the_stop(busy, how):
     driver, ears, go_on = busy
     for number in range(100):
         ears.invoke(f"q{number}", "light")
@@ -166,7 +166,7 @@ def test_large_stop_command_is_executed(busy, order):
     assert ears.final("s", "stop")["state"] == "succeeded"
 
 
-def test_stop_is_confirmed_by_a_run_that_ended_after_the_last_action(turtle):
+def test_stop_is_confirmed_only_by_a_stop_call_that_ended_after_the_last_action(turtle):
     """An action that outlives the stop function may have moved the robot again."""
     body, ears, _clock = turtle
     ears.invoke("1", "ignore")
@@ -232,7 +232,7 @@ def test_stops_from_many_threads_are_each_answered_once(node):
 
 
 @pytest.mark.parametrize("error", [ValueError(), RecursionError(), MemoryError(), SystemExit(3)], ids=repr)
-def test_exception_in_one_queued_call_is_counted_and_the_next_one_runs(node, error, caplog):
+def test_exception_in_a_queued_call_is_counted_and_the_next_call_runs(node, error, caplog):
     with Driver(TURTLE, "Other", node) as driver:
 
         def fail() -> None:

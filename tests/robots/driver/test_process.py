@@ -101,7 +101,7 @@ def test_driver_process_does_not_start_without_its_owner(network):
     )
 
 
-def test_driver_prints_its_name_and_when_it_waits_for_and_finds_the_master():
+def test_driver_prints_its_name_and_when_the_master_is_missing_and_found():
     with nep.Master("127.0.0.1:0") as gone:
         address = gone.address
     process = start("examples/thirty_line_driver.py", "--name", "Table", network=address)

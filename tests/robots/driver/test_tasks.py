@@ -56,7 +56,7 @@ def ran(world: World, *names: str) -> Callable[[], bool]:
     return lambda: world.began == [*names]
 
 
-def test_tasks_do_not_overtake_one_waiting_for_more_resources(world: World) -> None:
+def test_task_does_not_overtake_a_task_that_waits_for_more_resources(world: World) -> None:
     world.ask("wave", ("arm",))
     eventually(ran(world, "wave"))
     world.ask("dance", ("arm", "legs"))

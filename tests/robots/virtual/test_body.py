@@ -49,7 +49,7 @@ def test_robot_walks_in_its_heading():
     assert body.x == pytest.approx(-1.0)
 
 
-def test_robot_stops_in_front_of_a_person_and_publishes_a_bumped_event():
+def test_robot_stops_in_front_of_a_person_and_publishes_a_bump_event():
     body = Body()
     motion = body.walk(2.0, 0.35)
     run(body, lambda: motion.done)
@@ -146,7 +146,7 @@ def test_short_tap_lasts_a_minimum_time_and_a_held_touch_lasts_longer():
     assert list(body.touched) == ["head"]
 
 
-def test_spoken_share_of_a_speech_is_published():
+def test_speech_progress_is_published():
     body = Body()
     speech = body.speak("x" * 100)
     body.step(speech.duration_s / 2)
@@ -185,7 +185,7 @@ def test_reset_restores_pose_touches_and_room():
     assert (body.x, body.theta_deg, body.touched, body.room) == (-0.5, 0.0, {}, Room())
 
 
-def test_drawable_state_has_the_fields_that_studio_draws():
+def test_drawing_state_has_the_fields_that_studio_renders():
     body = Body()
     body.touch("head", down=True)
     body.speak("Hi")
@@ -217,7 +217,7 @@ def test_robot_never_overlaps_obstacles(plan):
 
 
 @given(st.floats(-3, 3), st.floats(0.05, 0.5))
-def test_motion_ends_exactly_at_its_amount(amount, speed):
+def test_motion_ends_exactly_at_the_requested_distance(amount, speed):
     motion = Motion.walk(amount, speed)
     total = 0.0
     for _ in range(20000):
@@ -229,7 +229,7 @@ def test_motion_ends_exactly_at_its_amount(amount, speed):
     assert total == pytest.approx(amount, abs=1e-9)
 
 
-def test_joint_holds_its_angle():
+def test_held_joint_keeps_its_angle():
     joint = Joint(100, -10, 10)
     joint.set_target(5)
     joint.step(0.01)

@@ -24,7 +24,7 @@ def eyes() -> ObjectDetector:
     return ObjectDetector()
 
 
-def test_lens_projects_a_point_ahead_to_the_centre_and_a_left_point_to_the_left():
+def test_lens_projects_a_point_ahead_to_the_image_centre_and_a_left_point_to_the_left():
     lens = Lens((0, 0, 1), 0.0, 0.0)
     ahead, left, up = lens.to_pixels(
         lens.to_camera(np.array([[2, 0, 1], [2, 0.5, 1], [2, 0, 1.5]], dtype=float))
@@ -119,7 +119,7 @@ def test_detection_message_has_the_name_of_the_largest_detection(eyes):
     assert message([], lens_of(body))["name"] is None
 
 
-def test_same_state_gives_the_same_camera_image(camera):
+def test_equal_states_give_equal_camera_images(camera):
     body = Body()
     first = camera.picture(body.room, lens_of(body))
     again = Camera(Room()).picture(body.room, lens_of(body))

@@ -7,7 +7,7 @@ import pytest
 from app.robots.virtual.room import Room
 
 
-def test_space_is_free_only_where_no_obstacle_stands():
+def test_position_that_overlaps_an_obstacle_is_not_free():
     room = Room()
     assert room.is_free(-0.5, 0.0, 0.27)
     assert not room.is_free(room.people[0].x + 0.3, room.people[0].y, 0.27)
@@ -33,7 +33,7 @@ def test_objects_are_moved_by_name_and_stay_inside_the_room():
     assert room.with_moved("piano", 1, 1) == room
 
 
-def test_ball_is_pushed_away():
+def test_robot_pushes_the_ball():
     room = Room().with_moved("ball", 0.0, 0.0)
     pushed = room.with_pushed_ball(-0.3, 0.0, 0.27)
     assert pushed.balls[0].x == pytest.approx(-0.3 + 0.27 + room.balls[0].radius)
@@ -41,7 +41,7 @@ def test_ball_is_pushed_away():
     assert room.with_pushed_ball(0.0, 0.0, 0.27).balls[0].x == pytest.approx(0.42)
 
 
-def test_furniture_hides_low_points_behind_it():
+def test_low_points_behind_furniture_are_hidden():
     room = Room()
     table = room.boxes[0]
     behind = (table.x, table.y + table.depth, 0.3)

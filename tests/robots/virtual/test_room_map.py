@@ -91,7 +91,7 @@ def test_objects_stay_inside_and_their_number_per_kind_is_limited() -> None:
     ],
     ids=str,
 )  # fmt: skip
-def test_damaged_messages_change_nothing(things) -> None:
+def test_damaged_messages_do_not_change_the_room_map(things) -> None:
     made = RoomMap()
     assert not made.merge({"things": things})
     assert made.room() == Room()

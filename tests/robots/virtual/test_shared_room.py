@@ -44,7 +44,7 @@ def test_robot_stops_in_front_of_another_robot_and_measures_its_distance() -> No
     assert not away.is_blocked
 
 
-def test_overlapping_robot_can_only_move_away() -> None:
+def test_robot_that_overlaps_another_robot_can_only_drive_away() -> None:
     body = WheelBody(room=with_other(Room()), x=0.65, y=0.0, theta_deg=0.0)
     body.drive(0.3, 0.0)
     body.step(1.0)
@@ -70,7 +70,7 @@ def test_camera_shows_the_other_robots() -> None:
 # ---- held by a person -----------------------------------------------------------------------------
 
 
-def test_held_robot_stands_still_and_continues_after_release() -> None:
+def test_lifted_robot_pauses_its_motion_and_resumes_when_put_down() -> None:
     body = Body(theta_deg=180.0)
     motion = body.walk(0.5, 0.3)
     body.step(0.5)
@@ -86,7 +86,7 @@ def test_held_robot_stands_still_and_continues_after_release() -> None:
     assert body.y == -1.0
 
 
-def test_stop_ends_the_motion_of_a_held_robot() -> None:
+def test_stop_ends_the_motion_of_a_lifted_robot() -> None:
     body = Body(theta_deg=180.0)
     motion = body.walk(0.5, 0.3)
     body.step(0.5)
@@ -98,7 +98,7 @@ def test_stop_ends_the_motion_of_a_held_robot() -> None:
 
 
 @pytest.mark.parametrize("body", [Body(), WheelBody()], ids=["pepper", "turtle"])
-def test_robot_is_carried_up_to_walls_and_furniture_but_not_into_them(body) -> None:
+def test_carried_robot_does_not_overlap_walls_or_furniture(body) -> None:
     body.carry(99.0, 0.6)
     assert body.room.x_max - 0.3 < body.x < body.room.x_max
     before = (body.x, body.y)
@@ -111,7 +111,7 @@ def test_robot_is_carried_up_to_walls_and_furniture_but_not_into_them(body) -> N
 # ---- who is there ------------------------------------------------------------------------------------
 
 
-def test_silent_robot_is_removed_from_the_neighbours() -> None:
+def test_robot_that_stops_publishing_is_removed_from_the_neighbours() -> None:
     time = FakeClock()
     seen = Neighbours("Pepper", time, began_ns=5)
     told: list[dict[str, object]] = []
@@ -125,7 +125,7 @@ def test_silent_robot_is_removed_from_the_neighbours() -> None:
     assert seen.present_robots() == ()
 
 
-def test_later_robot_makes_way() -> None:
+def test_robot_started_later_gives_way_to_an_overlapping_robot() -> None:
     time = FakeClock()
     first, second = Neighbours("A", time, began_ns=1), Neighbours("B", time, began_ns=2)
     first.publish_position(OtherRobot("A", 0, 0, 0, 0.27, 1.2), second.receive)
@@ -176,7 +176,7 @@ def place(ears: Ears, name: str) -> tuple[float, float]:
     return next(((t["x"], t["y"]) for t in things if t["name"] == name), (99.0, 99.0))
 
 
-def test_object_moved_by_a_person_moves_for_all_robots_including_later_ones(robots: Robots) -> None:
+def test_object_moved_by_the_user_moves_for_all_robots_including_later_robots(robots: Robots) -> None:
     pepper = robots.start(PEPPER, "Pepper")
     here = RoomMap()
     here.move("ball", 0.3, -1.5)
@@ -219,7 +219,7 @@ def test_distance_sensor_measures_another_robot_until_its_process_ends(robots: R
     eventually(lambda: pepper.heard["distance"][-1]["value"] > 3.0)
 
 
-def test_two_robots_of_a_kind_do_not_start_overlapping(robots: Robots) -> None:
+def test_two_robots_of_the_same_kind_do_not_start_overlapping(robots: Robots) -> None:
     first, second = robots.start(PEPPER, "Ada"), robots.start(PEPPER, "Bob")
 
     def gap() -> float:
@@ -230,7 +230,7 @@ def test_two_robots_of_a_kind_do_not_start_overlapping(robots: Robots) -> None:
     assert (first.heard["state"][-1]["x"], first.heard["state"][-1]["y"]) == (-0.5, 0.0)
 
 
-def test_robots_return_to_their_start_and_objects_of_the_room_stay(robots: Robots) -> None:
+def test_reset_moves_robots_to_their_start_and_keeps_objects_of_the_room(robots: Robots) -> None:
     ears = {name: robots.start(PEPPER, name) for name in ("Ada", "Bob")}
 
     def pose(name: str) -> tuple[float, float, float]:

@@ -126,7 +126,7 @@ def test_stop_is_answered_while_moving(pepper):
         eventually(lambda: not pepper.newest("state")["moving"])
 
 
-def test_robot_stops_when_its_program_falls_silent(pepper):
+def test_missing_heartbeat_of_the_program_stops_the_virtual_robot(pepper):
     pepper.invoke("1", "turn", program="p", angle=360, speed=20)
     assert pepper.final("1")["error"] == "its program hasn't responded for 1 s"
     eventually(lambda: not pepper.newest("state")["moving"])
@@ -141,7 +141,7 @@ def test_moving_robot_publishes_pose_and_distance(pepper):
     eventually(lambda: pepper.newest("distance") == {"value": pytest.approx(2.5 - 0.27, abs=0.01)})
 
 
-def test_person_in_the_way_fails_the_walk(pepper):
+def test_walk_fails_when_a_person_blocks_the_path(pepper):
     bumps = pepper.listen("bumped")
     pepper.world(move="Aiko", x=0.1, y=0.0)
     eventually(lambda: any(o["x"] == 0.1 for o in pepper.newest("state")["objects"]))
@@ -176,7 +176,7 @@ def test_short_tap_is_visible_in_the_touch_sensor(pepper):
     eventually(lambda: told[-1] == {"value": False})
 
 
-def test_person_can_trigger_every_event_of_the_description(pepper):
+def test_user_can_trigger_every_event_of_the_description(pepper):
     for leaf in ("touched", "released", "heard", "bumped", "face_seen"):
         pepper.listen(leaf)
     pepper.world(happen="bumped", side="back")
@@ -211,7 +211,7 @@ def test_detections_of_faces_balls_and_markers_are_published(pepper):
     assert pepper.final("2")["error"] == "look at: no ball in the picture"
 
 
-def test_robot_looks_at_the_ball(pepper):
+def test_robot_turns_its_head_to_the_ball(pepper):
     pepper.listen("balls")
     eventually(lambda: pepper.newest("balls"))
     pepper.invoke("1", "look_at", target="ball")
@@ -234,7 +234,7 @@ def test_camera_images_are_published_while_subscribed(node, pepper):
         assert cv2.Laplacian(picture.payload, cv2.CV_64F).var() > 20  # something is on it
 
 
-def test_seed_determines_the_object_positions():
+def test_same_seed_gives_the_same_object_positions():
     assert create_room(5) == create_room(5)
     assert create_room(5) != create_room(6)
     assert create_room(None).balls[0].x == 1.95

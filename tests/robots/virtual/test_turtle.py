@@ -85,7 +85,7 @@ def test_robot_pushes_the_ball_and_measures_the_distance_ahead() -> None:
     assert near(body.distance, body.room.x_max - body.x - RADIUS, 0.01)
 
 
-def test_pressed_bumper_stops_the_robot_and_is_released_after_a_moment() -> None:
+def test_pressed_bumper_stops_the_robot_and_is_released_after_its_press_duration() -> None:
     body = WheelBody(x=0.0, y=-1.0, theta_deg=180.0)
     body.drive(0.5, 0.0)
     body.step(0.5)
@@ -150,7 +150,7 @@ def pose(ears: Ears) -> tuple[float, float, float]:
     return told["x"], told["y"], told["theta"]
 
 
-def test_robot_moves_turns_and_goes_to_a_place(turtle) -> None:
+def test_robot_moves_turns_and_drives_to_a_position(turtle) -> None:
     _, ears = turtle
     x, y, theta = START_POSE
     ears.invoke("1", "move", distance=0.3)
@@ -190,7 +190,7 @@ def test_triggered_colour_event_is_validated_against_the_description(turtle) -> 
     assert ears.heard["bump"] == []
 
 
-def test_driving_robot_stops_when_its_program_falls_silent(turtle) -> None:
+def test_missing_heartbeat_of_the_program_stops_a_driving_robot(turtle) -> None:
     body, ears = turtle
     ears.invoke("1", "drive", program="test", speed=-0.2, turn=30)
     assert ears.final("1")["state"] == "succeeded"
@@ -214,7 +214,7 @@ def test_robot_keeps_driving_while_its_program_sends_heartbeats_until_stopped(tu
     assert body.wheels.still()
 
 
-def test_stop_during_a_move_ends_it_immediately(turtle) -> None:
+def test_stop_during_a_move_ends_the_move_immediately(turtle) -> None:
     body, ears = turtle
     ears.invoke("1", "move", distance=1.0)
     eventually(lambda: not body.wheels.still())
@@ -228,7 +228,7 @@ def test_stop_during_a_move_ends_it_immediately(turtle) -> None:
     assert pose(ears) == where
 
 
-def test_obstacle_fails_the_move_and_is_published(turtle) -> None:
+def test_move_into_an_obstacle_fails_and_publishes_a_bump_event(turtle) -> None:
     _, ears = turtle
     ears.invoke("1", "go_to", x=0.3, y=-2.2)  # into the shelf
     ended = ears.final("1")

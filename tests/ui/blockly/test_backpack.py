@@ -129,7 +129,9 @@ def test_backpack_stack_can_be_dragged_into_another_file_repeatedly(qtbot, view,
     assert window.types == [["wait", "wait"]], "it stays in the backpack"
 
 
-def test_click_on_a_backpack_stack_adds_it_to_the_canvas_as_one_undo_step(qtbot, view, them, window) -> None:
+def test_click_on_a_backpack_stack_adds_the_stack_to_the_canvas_as_one_undo_step(
+    qtbot, view, them, window
+) -> None:
     put_in(them, window, "two")
     show(them, "b")
     open_it(them, 1)
@@ -182,7 +184,7 @@ def test_removing_one_or_all_backpack_stacks_can_be_undone(qtbot, view, them, wi
     them.wait_for(f"{STACKS}.length", 2)
 
 
-def test_backpack_context_menus(qtbot, view, them, window) -> None:
+def test_backpack_menus_add_open_and_remove_stacks(qtbot, view, them, window) -> None:
     them.click(BLOCK.format("one"))
     them.press(Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
     row = "[...document.querySelectorAll('.blocklyMenuItem')].find(e => e.textContent.includes({}))"
@@ -260,7 +262,7 @@ def test_stack_dragged_from_the_backpack_is_not_stored_again(qtbot, view, them, 
 
 
 @pytest.mark.parametrize("held", ["block", "note"])
-def test_only_blocks_of_a_mixed_selection_are_stored_and_the_user_is_notified(
+def test_blocks_of_a_mixed_selection_are_stored_without_notes_and_the_user_is_notified(
     qtbot, view, them, window, held: str
 ) -> None:
     note = {"height": 100, "width": 160, "id": "note", "x": 520, "y": 56, "text": "Look"}

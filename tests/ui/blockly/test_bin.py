@@ -76,7 +76,7 @@ def test_block_dragged_over_the_toolbox_shows_the_bin_and_is_deleted_with_undo_o
     qtbot.waitUntil(lambda: ids(them) == ["one", "start"], timeout=WAIT_MS)
 
 
-def test_dropping_a_block_on_the_open_flyout_deletes_it(qtbot, view, them, told):
+def test_dropping_a_block_on_the_open_flyout_deletes_the_block(qtbot, view, them, told):
     view.set_toolbox_pinned(True)
     them.box(".nepCategory.blocklyFlyout .blocklyBlock")
     right = them.box(".nepCategory.blocklyFlyout")["right"]
@@ -88,7 +88,7 @@ def test_dropping_a_block_on_the_open_flyout_deletes_it(qtbot, view, them, told)
     qtbot.waitUntil(lambda: told == [2], timeout=WAIT_MS)
 
 
-def test_new_block_returned_to_the_toolbox_is_not_a_deletion(qtbot, view, them, told):
+def test_new_block_returned_to_the_toolbox_does_not_count_as_a_deletion(qtbot, view, them, told):
     them.open_category("Control")
     start = them.hold(".nepCategory .control_wait")
     them.move(start, QPoint(600, 300))
@@ -102,7 +102,7 @@ def test_new_block_returned_to_the_toolbox_is_not_a_deletion(qtbot, view, them, 
     assert told == []
 
 
-def test_dropping_on_the_bin_deletes_and_the_newest_is_listed_first(qtbot, view, them, told):
+def test_dropping_a_block_on_the_bin_deletes_the_block_and_lists_newest_first(qtbot, view, them, told):
     delete_the_hat(them)
     bin_ = centre(them, ".nepBin")
     start = them.hold("[data-id=one] > .blocklyPath")
@@ -116,7 +116,7 @@ def test_dropping_on_the_bin_deletes_and_the_newest_is_listed_first(qtbot, view,
     them.wait_for(IN_BIN, ["one", "start"])
 
 
-def test_click_in_the_bin_restores_the_block_at_a_visible_place(qtbot, view, them, told):
+def test_click_on_a_block_in_the_bin_restores_the_block_at_a_visible_position(qtbot, view, them, told):
     start = them.hold("[data-id=one] > .blocklyPath")
     them.move(start, TOOLBOX)
     them.drop(TOOLBOX)
@@ -158,7 +158,7 @@ def test_bin_works_with_the_keyboard_only(qtbot, them):
     them.wait_for("document.activeElement.closest('[data-id=start]') !== null")
 
 
-def test_undo_empties_the_bin_and_redo_fills_it(qtbot, view, them, told):
+def test_undo_of_a_deletion_empties_the_bin_and_redo_fills_the_bin(qtbot, view, them, told):
     delete_the_hat(them)
     full = "document.querySelector('.nepBin').classList.contains('nepFull')"
     them.wait_for(full)
@@ -179,7 +179,7 @@ def test_block_removed_by_undo_is_not_in_the_bin(qtbot, view, them, told):
     assert (them.ask(IN_BIN), told) == ([], [])
 
 
-def test_fix_that_moves_blocks_is_not_a_deletion(qtbot, view, them, told):
+def test_fix_that_moves_blocks_does_not_count_as_a_deletion(qtbot, view, them, told):
     hat = {**START, "id": "other", "x": 400, "next": {"block": {"type": "control_wait", "id": "three"}}}
     view.apply_edit(workspace(START, WAITS, hat))
     them.wait_for("!!document.querySelector('[data-id=other] [data-id=three]')")

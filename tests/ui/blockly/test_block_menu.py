@@ -71,7 +71,7 @@ def choose(them: Person, id: str, words: str) -> None:
     them.wait_for("document.querySelector('.blocklyContextMenu') === null")
 
 
-def test_context_menu_fits_on_a_low_page(view, them) -> None:
+def test_context_menu_fits_into_a_low_page(view, them) -> None:
     view.resize(700, 480)
     them.wait_for("innerHeight", 480)
     open_menu(them, "b")  # in the middle of the page
@@ -105,7 +105,7 @@ def test_block_menu_has_tall_rows_with_icons_and_shortcuts(view, them, dark):
     them.press(Qt.Key_Escape)
 
 
-def test_canvas_context_menu(qtbot, them):
+def test_canvas_context_menu_lists_paste_undo_redo_and_tidy_up(qtbot, them):
     QTest.mouseClick(them.target, Qt.RightButton, pos=QPoint(900, 500))
     them.wait_for("!!document.querySelector('.blocklyContextMenu')")
     rows = them.ask(ROWS)
@@ -121,7 +121,7 @@ def test_canvas_context_menu(qtbot, them):
     them.wait_for("document.querySelector('.blocklyContextMenu') === null")
 
 
-def test_disabled_block_is_skipped_and_the_next_one_runs(qtbot, them):
+def test_disabled_block_is_skipped_and_the_next_block_runs(qtbot, them):
     choose(them, "first", "Disable block")
     them.wait_for("document.querySelector('[data-id=first]').classList.contains('blocklyDisabled')")
     looked_at(them, "off")
@@ -135,7 +135,7 @@ def test_disabled_block_is_skipped_and_the_next_one_runs(qtbot, them):
     qtbot.waitUntil(lambda: "wait(3)" in compile_behaviour(them.newest(), []).source, timeout=WAIT_MS)
 
 
-def test_disabled_script_is_grey_as_a_whole(qtbot, them):
+def test_disabling_the_event_block_greys_out_its_script(qtbot, them):
     choose(them, "start", "Disable block")
     them.wait_for("document.querySelectorAll('.blocklyDisabled').length >= 5")
     made = compile_behaviour(them.newest(), [])
@@ -159,13 +159,13 @@ def test_double_click_collapses_a_block_that_still_shows_running_and_error_state
     them.wait_for(outlined("error"), ["b"])
 
 
-def test_double_click_next_to_the_fields_of_a_small_block_does_nothing(them):
+def test_double_click_next_to_the_fields_of_a_small_block_has_no_effect(them):
     before = them.newest()
     double_click(them, "first")
     assert them.newest() == before
 
 
-def test_pause_here_marks_the_block_is_saved_and_undone(qtbot, view, them):
+def test_pause_here_sets_a_breakpoint_that_is_saved_and_can_be_undone(qtbot, view, them):
     choose(them, "first", "Pause here")
     them.wait_for("document.querySelector('.nepPauseMark').parentElement.dataset.id", "first")
     looked_at(them, "pause")

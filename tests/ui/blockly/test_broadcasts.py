@@ -77,7 +77,7 @@ def test_suggested_broadcast_name_can_be_accepted_with_the_mouse(qtbot, person):
         qtbot.waitUntil(lambda name=name: name_of(them, 0) == name, timeout=WAIT_MS)
 
 
-def test_empty_broadcast_name_changes_nothing(qtbot, person):
+def test_empty_broadcast_name_is_ignored(qtbot, person):
     them = person(state=scripts())
     them.click("[data-id=b] .blocklyDropdownField", dx=8, dy=8)
     them.wait_for(f"{OFFERED}.length", 3)

@@ -95,7 +95,9 @@ BEFORE = [["started"], ["wait", "wait", "wait"]]
 
 
 @pytest.mark.parametrize("to", [ABOVE, LEFT])
-def test_block_dropped_outside_the_page_returns_without_an_edit(qtbot, view, them, told, to) -> None:
+def test_block_dropped_outside_the_page_returns_to_its_position_without_an_edit(
+    qtbot, view, them, told, to
+) -> None:
     before, changes = them.newest(), []
     view.changed.connect(lambda key, _program: changes.append(key))
     carry(them, told, TWO, to)
@@ -152,7 +154,7 @@ def test_undo_from_the_toast_reverts_the_move_in_both_tabs(qtbot, view, them, to
     qtbot.waitUntil(lambda: chains(them) == rest, timeout=WAIT_MS)
 
 
-def test_multi_selection_is_moved_together_or_stays_in_place(qtbot, view, them, told) -> None:
+def test_multi_selection_is_moved_together_or_not_at_all(qtbot, view, them, told) -> None:
     before = them.newest()
     path = ".nepTab:not([hidden]) [data-id='{}'] > .blocklyPath"
     them.click(path.format("one"))
@@ -265,7 +267,7 @@ def test_drag_continues_in_the_opened_tab_and_connects_to_a_script(qtbot, view, 
     assert told.deleted == []
 
 
-def test_drag_through_a_tab_leaves_no_changes_in_it(qtbot, view, them, told) -> None:
+def test_drag_through_a_tab_leaves_the_tab_unchanged(qtbot, view, them, told) -> None:
     changes: list[str] = []
     view.changed.connect(lambda key, _program: changes.append(key))
     histories: list[tuple[bool, bool]] = []
@@ -290,7 +292,7 @@ def test_drag_through_a_tab_leaves_no_changes_in_it(qtbot, view, them, told) -> 
 
 
 @pytest.mark.parametrize("how", ["outside", "toolbox", "escape"])
-def test_drag_released_elsewhere_or_cancelled_after_opening_a_tab_restores_the_block(
+def test_drag_released_elsewhere_or_cancelled_in_another_tab_restores_the_block(
     qtbot, view, them, told, how: str
 ) -> None:
     before = them.newest()

@@ -60,7 +60,7 @@ def apart(boxes: list[list[float]]) -> bool:
     )
 
 
-def test_duplicates_are_placed_unattached_and_visible_next_to_the_original(qtbot, them):
+def test_duplicates_are_placed_unattached_next_to_the_original_in_the_viewport(qtbot, them):
     them.click("[data-id=w] > .blocklyPath")
     them.wait_for("document.hasFocus() && document.querySelector('.blocklySelected')?.dataset.id", "w")
     for count in range(2, 6):
@@ -77,7 +77,7 @@ def test_duplicates_are_placed_unattached_and_visible_next_to_the_original(qtbot
     assert "next" in them.tops()[0]  # nothing was torn off, nothing was put in between
 
 
-def test_rapid_duplicates_leave_the_focus_on_the_newest(them):
+def test_rapid_duplicates_leave_the_focus_on_the_newest_duplicate(them):
     """Faster than the page draws, as when the keys are held."""
     them.click("[data-id=w] > .blocklyPath")
     them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "w")
@@ -106,7 +106,7 @@ def test_copies_are_pasted_at_the_mouse_and_undone_in_one_step(qtbot, them):
     qtbot.waitUntil(lambda: types(them) == ["events_started"], timeout=WAIT_MS)
 
 
-def test_blocks_cut_in_one_tab_are_pasted_in_another(qtbot, view, them):
+def test_blocks_cut_in_one_tab_are_pasted_in_another_tab(qtbot, view, them):
     view.show_tab("first", them.newest())
     take_the_keys(them)
     them.click(".nepTab:not([hidden]) [data-id=w] > .blocklyPath")
@@ -122,7 +122,7 @@ def test_blocks_cut_in_one_tab_are_pasted_in_another(qtbot, view, them):
     assert types(them) == ["events_started"]
 
 
-def test_paste_works_while_the_focus_is_elsewhere_in_the_window(qtbot, view, them):
+def test_paste_works_while_another_widget_of_the_window_has_focus(qtbot, view, them):
     window, other = QWidget(), QLineEdit()
     qtbot.addWidget(window)
     column = QVBoxLayout(window)
@@ -144,7 +144,7 @@ def test_paste_works_while_the_focus_is_elsewhere_in_the_window(qtbot, view, the
     view.setParent(None)
 
 
-def test_edit_menu_works_on_blocks(qtbot, view, them):
+def test_edit_menu_cuts_copies_and_pastes_blocks(qtbot, view, them):
     them.click("[data-id=w] > .blocklyPath")
     them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "w")
     view.edit_from_menu("copy")  # the page has the keys: from the menu it is done all the same
@@ -157,7 +157,7 @@ def test_edit_menu_works_on_blocks(qtbot, view, them):
     qtbot.waitUntil(lambda: types(them) == [], timeout=WAIT_MS)
 
 
-def test_edit_menu_works_in_a_text_field_of_the_page(qtbot, view, them):
+def test_edit_menu_applies_to_a_text_field_of_the_page(qtbot, view, them):
     QGuiApplication.clipboard().setText("seven")
     view.open_find()
     them.wait_for("document.activeElement?.tagName", "INPUT")
@@ -170,7 +170,7 @@ def test_edit_menu_works_in_a_text_field_of_the_page(qtbot, view, them):
     assert types(them) == ["events_started"]
 
 
-def test_block_text_of_another_studio_is_pasted_and_other_text_is_ignored(qtbot, them):
+def test_blocks_copied_as_text_in_another_studio_are_pasted_and_other_text_is_ignored(qtbot, them):
     clipboard = QGuiApplication.clipboard()
     press(them, Qt.Key_V)
     clipboard.setText("a shopping list")

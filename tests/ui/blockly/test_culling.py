@@ -28,7 +28,7 @@ def drawn(*names: str) -> str:
     return f"{list(names)}.filter(name => {DRAWN}.some(e => e.dataset.id === name))"
 
 
-def test_script_is_rendered_when_the_viewport_comes_near(person):
+def test_script_is_rendered_when_scrolled_into_the_viewport(person):
     them = person(script("here", 40, 40), script("below", 40, 1400), script("right", 2400, 40))
     them.wait_for(drawn("here", "below", "right"), ["here"])
     them.view.show_block("below_wait")

@@ -45,7 +45,7 @@ LOOPS = at(
 VALUES = at(compare("whole", compare("part", {"type": "values_number", "id": "number"})), 420, 56)
 
 
-def test_block_nested_in_one_of_its_colour_has_an_outline(person) -> None:
+def test_block_nested_in_a_block_of_the_same_colour_has_an_outline(person) -> None:
     them = person(LOOPS, VALUES, at(repeat("other", SAY), 420, 200))
     assert them.ask(INSIDE) == ["beside", "deep", "deeper", "inner", "number", "part"]
 

@@ -50,7 +50,7 @@ def test_damaged_file_is_preserved_unchanged(person):
     assert person(state=damaged).newest() == damaged
 
 
-def test_view_returns_its_program_before_the_page_is_loaded(qtbot, view):
+def test_flush_before_the_page_is_loaded_returns_the_program(qtbot, view):
     got: list[WorkspaceJson] = []
     view.load(PICTURE)
     view.flush(got.append)
@@ -63,7 +63,7 @@ def test_unknown_blocks_round_trip(person):
     assert them.ask("document.querySelectorAll('.blocklyBlockCanvas .nepAbsent').length") >= 7
 
 
-def test_stack_that_cannot_be_created_is_preserved(person):
+def test_stack_with_invalid_shadow_blocks_is_preserved(person):
     number = {"type": "values_number", "id": "n", "fields": {"NUMBER": 1}}
     compare = {"type": "values_compare", "id": "c", "fields": {"OP": "<"}, "inputs": {"A": {"block": number}}}
     # A shadow block cannot hold a real one.
@@ -86,7 +86,7 @@ def test_unknown_blocks_survive_moving_deleting_and_undo(qtbot, view, person):
     qtbot.waitUntil(lambda: them.tops() == [moved], timeout=WAIT_MS)
 
 
-def test_unknown_block_becomes_active_when_its_definition_arrives(qtbot, view, person):
+def test_unknown_block_is_enabled_when_its_definition_arrives(qtbot, view, person):
     rover = {"type": "robot_rover_do_wave", "id": "r", "x": 140, "y": 140, "fields": {"TIMES": 2}}
     them = person(rover)
     more = copy.deepcopy(DEFINITIONS)
@@ -164,7 +164,7 @@ def test_random_programs_round_trip(view, person):
         assert them.newest() == program, f"seed {seed}"
 
 
-def test_canvas_is_covered_while_the_blocks_of_a_long_program_are_created(view, person):
+def test_overlay_covers_the_canvas_while_a_long_program_is_loaded(view, person):
     them = person({**WAIT, "id": "old"})
     them.ask("""(seen => new MutationObserver(() => window.seen = [...(window.seen ?? []), seen()])
         .observe(document.body, {childList: true}) ?? 0)(() => [!!document.querySelector('.nepOpening'),

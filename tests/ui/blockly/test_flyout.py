@@ -106,7 +106,7 @@ def test_saved_pin_setting_applies_at_start(opened):
     them.wait_for(SHOWN, "block")
 
 
-def test_blocks_are_shown_next_to_the_open_flyout(opened):
+def test_blocks_are_placed_next_to_the_open_flyout(opened):
     far = {"type": "events_started", "id": "far", "x": 1500, "y": 900}
     them = opened(WIDE, far)
     right = them.box(".blocklyFlyout")["right"]
@@ -215,7 +215,7 @@ def test_new_variable_appears_in_the_flyout_immediately(qtbot, opened, width):
 
 
 @pytest.mark.parametrize("width", [WIDE, NARROW])
-def test_block_returned_to_the_flyout_leaves_nothing_to_undo(opened, width):
+def test_block_returned_to_the_flyout_adds_no_undo_step(opened, width):
     them = opened(width)
     told: list[tuple[bool, bool]] = []
     them.view.history_changed.connect(lambda *history: told.append(history))

@@ -42,7 +42,7 @@ def middle_of(person: Person, selector: str) -> QPoint:
     return QPoint(round((box["left"] + box["right"]) / 2), round((box["top"] + box["bottom"]) / 2))
 
 
-def test_empty_canvas_shows_the_first_step_and_offers_a_robot_until_one_exists(
+def test_empty_canvas_shows_the_first_step_and_offers_a_robot_until_a_robot_connects(
     empty: Person, view: BlocklyView
 ) -> None:
     assert empty.ask(SAID) == "Drag “when started” here"
@@ -67,7 +67,7 @@ def test_empty_canvas_hint_does_not_overlap_the_zoom_buttons_on_a_low_page(
     empty.wait_for(low)
 
 
-def test_block_dropped_on_the_empty_canvas_hint_hides_it(empty: Person) -> None:
+def test_block_dropped_on_the_empty_canvas_hides_the_hint(empty: Person) -> None:
     empty.open_category("Events")
     place = middle_of(empty, ".nepBeginPlace")
     start = empty.hold(FIRST)
@@ -100,7 +100,9 @@ def test_behaviour_with_blocks_has_no_empty_canvas_hint(
     made.wait_for(SHOWN, False)
 
 
-def test_show_me_points_to_the_category_then_to_the_block_until_it_is_placed(empty: Person) -> None:
+def test_show_me_points_to_the_category_and_then_to_the_block_until_the_block_is_placed(
+    empty: Person,
+) -> None:
     empty.click(".nepBegin button:nth-child(2)", dx=20)
     empty.wait_for(BUBBLE, "You'll find “when started” under Events")
     ring, row = empty.box(".nepRing"), empty.box(".blocklyToolboxCategory")
@@ -113,7 +115,7 @@ def test_show_me_points_to_the_category_then_to_the_block_until_it_is_placed(emp
     assert len(empty.tops()) == 1
 
 
-def test_keyboard_user_is_shown_keyboard_hints_and_led_to_the_category(empty: Person) -> None:
+def test_keyboard_user_is_shown_keyboard_hints_and_the_category_is_focused(empty: Person) -> None:
     said = "document.querySelector('.nepBeginKeys').textContent"
     assert empty.ask(said).startswith("With the keyboard: press Ctrl+B, choose it with the arrow keys")
     empty.view.setFocus()
@@ -129,7 +131,7 @@ def test_keyboard_user_is_shown_keyboard_hints_and_led_to_the_category(empty: Pe
     empty.wait_for(f"({BUBBLE}).startsWith('Press Enter to pick it up')")
 
 
-def test_escape_and_the_window_remove_the_hint_ring(empty: Person, view: BlocklyView) -> None:
+def test_hint_ring_is_removed_by_escape_and_by_the_window(empty: Person, view: BlocklyView) -> None:
     view.point_at("events_started", "when started", "Drag it")
     empty.wait_for(RING)
     empty.click(".blocklySvg", 500, 20)
@@ -141,7 +143,7 @@ def test_escape_and_the_window_remove_the_hint_ring(empty: Person, view: Blockly
     empty.wait_for(RING, False)
 
 
-def test_unknown_block_gets_no_hint_ring(empty: Person, view: BlocklyView) -> None:
+def test_unknown_block_shows_no_hint_ring(empty: Person, view: BlocklyView) -> None:
     view.point_at("robot_nobody_do_say", "say", "Drag it")
     empty.open_category("Events")
     assert not empty.ask(RING)

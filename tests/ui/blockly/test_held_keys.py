@@ -37,7 +37,7 @@ def keys(field) -> HeldKeys:
     return keys
 
 
-def test_held_keys_are_delivered_in_order(field, keys):
+def test_queued_keys_are_delivered_in_order(field, keys):
     QTest.keyClicks(field, "a")
     keys.hold()
     QTest.keyClicks(field, "bc")
@@ -48,7 +48,7 @@ def test_held_keys_are_delivered_in_order(field, keys):
 
 
 @pytest.mark.parametrize("how", ["mouse", "focus"])
-def test_click_or_focus_change_delivers_held_keys(field, keys, how):
+def test_click_or_focus_change_delivers_queued_keys(field, keys, how):
     keys.hold()
     QTest.keyClicks(field, "ab")
     if how == "mouse":
@@ -59,7 +59,7 @@ def test_click_or_focus_change_delivers_held_keys(field, keys, how):
     assert field.text() == "abc"
 
 
-def test_keys_held_for_a_crashed_page_are_discarded(field, keys):
+def test_keys_queued_for_a_crashed_page_are_discarded(field, keys):
     keys.hold()
     QTest.keyClicks(field, "ab")
     keys.discard_all()

@@ -54,7 +54,7 @@ def sheet_is_seen(them: Person, seen: bool) -> None:
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_collapsed_block_has_a_mark_for_each_kind_of_hidden_content(view, them, dark):
+def test_collapsed_block_shows_a_mark_for_each_kind_of_hidden_content(view, them, dark):
     view.set_theme(TOKENS, dark)
     them.wait_for(MARKS, BOTH)
     sheet_is_seen(them, False)
@@ -75,7 +75,7 @@ def test_click_on_a_mark_expands_the_block_and_focuses_the_marked_item(qtbot, vi
     sheet_is_seen(them, False)
 
 
-def test_block_menu_leads_to_the_hidden_items_that_exist(them):
+def test_block_menu_lists_and_focuses_existing_hidden_items(them):
     double_click(them, "loop")
     them.wait_for(MARKS, [])
     choose(them, "a", "Don't pause here")

@@ -156,7 +156,7 @@ def test_search_finds_blocks_by_synonyms_and_word_parts_and_reports_no_match(vie
     them.wait_for("getComputedStyle(document.querySelector('.blocklyFlyout')).display", "none")
 
 
-def test_down_in_an_empty_search_focuses_the_categories(view, them):
+def test_down_key_in_an_empty_search_focuses_the_categories(view, them):
     view.open_search()
     goes_to(them, "Find a block")
     press(them, Qt.Key_Down)
@@ -231,7 +231,7 @@ def test_context_menu_help_explains_blocks_on_canvas_and_in_the_toolbox(view, th
     them.wait_for(f"({CARD}).includes('Waits this number of seconds')")
 
 
-def test_colour_is_chosen_with_the_keyboard(qtbot, view, person):
+def test_colour_is_selected_with_the_keyboard(qtbot, view, person):
     light = block("robot_pepper_do_light", "l", ROBOT="Pepper", WHERE="eyes", COLOUR="#ffffff")
     them = person(state=workspace(light | {"x": 60, "y": 60}))
     take_the_keys(them)
@@ -248,7 +248,7 @@ def test_colour_is_chosen_with_the_keyboard(qtbot, view, person):
     assert them.tops()[0]["fields"]["COLOUR"] == "#0a5cff"
 
 
-def test_aria_labels_of_blocks_contain_only_words(them):
+def test_aria_labels_of_blocks_contain_no_placeholders(them):
     press(them, Qt.Key_Tab)
     to_the_canvas(them)
     press(them, Qt.Key_Down)
@@ -287,7 +287,7 @@ def test_enter_on_a_text_field_opens_its_editor(qtbot, view, person):
     qtbot.waitUntil(lambda: "Good day" in str(them.tops()), timeout=WAIT_MS)
 
 
-def test_value_that_does_not_fit_the_focused_slot_shows_the_reason(qtbot, view, them):
+def test_value_of_the_wrong_type_for_the_focused_slot_shows_the_reason(qtbot, view, them):
     to_the_canvas(them)
     press(them, Qt.Key_Down, Qt.Key_Down, Qt.Key_Right)
     goes_to(them, "Edit number: 5")
@@ -301,7 +301,7 @@ def test_value_that_does_not_fit_the_focused_slot_shows_the_reason(qtbot, view, 
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
 
 
-def test_shift_tab_leaves_the_search(them):
+def test_shift_tab_moves_focus_out_of_the_search(them):
     begin_to_search(them)
     them.press(Qt.Key_Tab, Qt.ShiftModifier)
     them.wait_for("document.activeElement.closest('.blocklyToolbox') === null")

@@ -72,7 +72,7 @@ def on_a_block_of_the_toolbox(them: Person) -> None:
 
 
 @pytest.mark.parametrize("go", [on_the_canvas, on_a_block, on_a_block_of_the_toolbox])
-def test_letters_and_digits_without_a_modifier_do_nothing(them, go):
+def test_letters_and_digits_without_a_modifier_have_no_effect(them, go):
     go(them)
     program, shown = them.newest(), them.ask(SHOWN)
     assert len(json.loads(shown)) == 7
@@ -108,7 +108,7 @@ def test_block_commands_have_ctrl_shortcuts(qtbot, them):
     them.wait_for("document.activeElement.closest('.blocklyToolbox') === null")
 
 
-def test_second_delete_deletes_nothing_more(qtbot, them):
+def test_repeated_delete_removes_only_the_selected_block(qtbot, them):
     on_a_block(them)
     them.press(Qt.Key_Delete)
     qtbot.waitUntil(lambda: "next" not in them.tops()[0], timeout=WAIT_MS)
@@ -120,7 +120,7 @@ def test_second_delete_deletes_nothing_more(qtbot, them):
     assert [top["id"] for top in them.tops()] == ["start"]
 
 
-def test_focus_stays_where_the_deleted_block_was(qtbot, them):
+def test_focus_moves_to_the_connection_of_the_deleted_block(qtbot, them):
     on_a_block(them)
     them.press(Qt.Key_Up)
     them.press(Qt.Key_Down)

@@ -62,7 +62,7 @@ def test_running_blocks_are_outlined(view, person):
     them.wait_for(outlined("stopped"), ["say_touch"])
 
 
-def test_frequent_highlights_are_cheap(qtbot, view, person):
+def test_layout_stays_fast_after_300_highlights(qtbot, view, person):
     them = person(state=PICTURE)
     ids = ["say_touch", "battery", "wave"]
     for number in range(300):
@@ -160,7 +160,7 @@ def test_live_values_are_shown_without_an_edit(qtbot, view, person):
     assert them.newest() == PICTURE
 
 
-def test_empty_program_shows_only_the_grid(person):
+def test_empty_program_shows_only_the_grid_and_zoom_buttons(person):
     them = person()
     assert them.ask("document.querySelectorAll('.blocklyBlockCanvas .blocklyBlock').length") == 0
     assert them.ask("document.querySelectorAll('.blocklyTrash, .blocklyZoom').length") == 0
@@ -168,7 +168,7 @@ def test_empty_program_shows_only_the_grid(person):
     assert them.view.web.fence.blocked == []
 
 
-def test_zoom_and_fit(qtbot, view, person):
+def test_zoom_in_zoom_out_and_zoom_to_fit_change_the_scale(qtbot, view, person):
     them = person(state=PICTURE)
     canvas = "document.querySelector('svg.blocklySvg .blocklyBlockCanvas')"
     scale = f"Math.round(new DOMMatrix(getComputedStyle({canvas}).transform).a * 1000) / 1000"
@@ -237,7 +237,7 @@ def test_live_values_are_shown_in_the_flyout(view, person):
     them.wait_for(live, "84 %")
 
 
-def test_stale_live_values_are_faint_and_changing_digits_keep_the_block_width(view, person):
+def test_stale_live_values_are_faint_and_changing_digits_do_not_change_the_block_width(view, person):
     them = person(state=PICTURE)
     view.set_live_values({"Pepper/battery": "84 %"})
     live = "document.querySelector('.blocklyBlockCanvas .nepLive')"

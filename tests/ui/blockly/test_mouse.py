@@ -15,7 +15,7 @@ pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 
-def test_block_dragged_under_the_event_block_snaps_to_it(qtbot, view, person):
+def test_block_dragged_under_the_event_block_snaps_to_the_event_block(qtbot, view, person):
     them = person(START)
     hat = them.box("[data-id=start] > .blocklyPath")
     them.open_category("Control")
@@ -31,7 +31,7 @@ def test_block_dragged_under_the_event_block_snaps_to_it(qtbot, view, person):
     assert them.newest() == changed.args[1].blocks
 
 
-def test_fast_drag_connects_to_the_targeted_gap(qtbot, person):
+def test_fast_drag_connects_to_the_targeted_connection(qtbot, person):
     """The preview of a gap on the way pushes the blocks below it apart, and nobody could see that yet."""
     wait = {"type": "control_wait", "inputs": {"SECONDS": {"shadow": {"type": "math_number"}}}}
     last = {**wait, "id": "last"}
@@ -86,7 +86,7 @@ def test_undo_and_redo_emit_history_changes(qtbot, view, person):
     assert history == [(True, False), (False, True), (True, False), (False, True)]
 
 
-def test_copy_and_paste_with_the_keyboard(qtbot, person):
+def test_block_is_copied_and_pasted_with_the_keyboard(qtbot, person):
     them = person(START)
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.press(Qt.Key_C, Qt.ControlModifier)
@@ -115,7 +115,7 @@ def test_typing_in_a_text_field_changes_the_program(qtbot, view, person):
     qtbot.waitUntil(lambda: typed() == "Hello, you", timeout=WAIT_MS)
 
 
-def test_colour_is_chosen_from_the_palette_or_typed(qtbot, view, person):
+def test_colour_is_selected_from_the_palette_or_typed(qtbot, view, person):
     them = person({"type": "robot_pepper_do_light", "id": "light", "x": 28, "y": 28})
 
     def colour() -> str:
@@ -133,7 +133,7 @@ def test_colour_is_chosen_from_the_palette_or_typed(qtbot, view, person):
     qtbot.waitUntil(lambda: colour() == "#01abef", timeout=WAIT_MS)
 
 
-def test_topic_that_does_not_exist_yet_can_be_typed(qtbot, view, person):
+def test_name_of_a_nonexistent_topic_can_be_typed(qtbot, view, person):
     them = person({"type": "events_message", "id": "on", "x": 56, "y": 56})
     them.click("[data-id=on] .blocklyDropdownField", dx=12, dy=10)
     topics = "[...document.querySelectorAll('.blocklyMenuItemContent')].map(e => e.textContent)"

@@ -96,7 +96,7 @@ def test_list_slots_are_added_and_removed_with_undo(qtbot, view, person):
     qtbot.waitUntil(lambda: [len(top.get("inputs", ())) for top in them.tops()] == [2], timeout=WAIT_MS)
 
 
-def test_number_input_is_visible_only_for_an_item_by_number(qtbot, view, person):
+def test_list_index_input_is_visible_only_if_items_are_selected_by_index(qtbot, view, person):
     it = block("lists_get", "i", WHERE="number", NUMBER=number(7) | {"id": "n"}, LIST=list_of())
     them = person(state=workspace(at(it, 28, 28)))
     shown = "document.querySelector('[data-id=n]').getBoundingClientRect().width > 0"

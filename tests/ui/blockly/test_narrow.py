@@ -70,7 +70,7 @@ def test_tile_shows_its_name_on_hover_and_opens_its_blocks_on_click(view, person
     them.box(".nepTab:not([hidden]) .blocklyFlyout .blocklyBlock")
 
 
-def test_search_expands_the_narrow_toolbox_until_it_ends(qtbot, view, person) -> None:
+def test_search_expands_the_narrow_toolbox_until_the_search_is_closed(qtbot, view, person) -> None:
     them = narrow(view, person)
     them.click(".nepTab:not([hidden]) .nepSearch input")
     them.wait_for(WIDE, 196)

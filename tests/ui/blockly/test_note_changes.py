@@ -102,7 +102,7 @@ def test_resizing_a_note_is_reported_and_is_one_undo_step(qtbot, them, told, whi
     assert after["height"] > was["height"] + 20
 
 
-def test_closing_a_note_is_reported_and_is_one_undo_step_and_it_reopens_in_place(qtbot, them, told):
+def test_closing_and_reopening_a_note_are_reported_as_edits_and_closing_is_one_undo_step(qtbot, them, told):
     before = them.newest()
     them.click(".nepNoteSign", dx=8, dy=8)
     assert one_step(qtbot, them, told, "block", before)["pinned"] is False

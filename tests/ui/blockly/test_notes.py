@@ -104,7 +104,7 @@ def test_escape_returns_the_focus_from_note_to_block_and_undo_reverts_the_text(q
     qtbot.waitUntil(lambda: note_of(them).get("text") == WORDS, timeout=WAIT_MS)
 
 
-def test_empty_note_is_removed_on_leaving_it(qtbot, them):
+def test_empty_note_is_removed_when_its_focus_is_lost(qtbot, them):
     choose(them, "first", "Add a note")
     them.wait_for(TYPES)
     them.press(Qt.Key_Escape)

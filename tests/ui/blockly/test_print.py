@@ -65,7 +65,9 @@ def colours(image: QImage) -> set[str]:
     }
 
 
-def test_stacks_move_whole_to_next_page_and_long_stack_is_split_between_blocks(qtbot, view, person) -> None:
+def test_stacks_move_unsplit_to_the_next_page_and_a_long_stack_is_split_between_blocks(
+    qtbot, view, person
+) -> None:
     person(
         state=workspace(
             started(stack(16)) | {"id": "start", "x": 60, "y": 60},

@@ -106,7 +106,7 @@ def test_list_item_under_mouse_is_removed_by_context_menu(view, person):
     assert not any(words.startswith("Remove item") for words in them.ask(MENU))
 
 
-def test_removing_a_function_input_updates_its_calls_and_undo_restores_it(view, person):
+def test_removing_a_function_input_updates_its_calls_and_can_be_undone(view, person):
     greet = define("g", "greet", ("who", "when"), write(given("who")))
     use = call("g", id="c", who=text("Ada"), when=text("now"))
     them = person(state=workspace(started(use) | {"x": 28, "y": 28}, greet | {"x": 28, "y": 252}))

@@ -236,7 +236,7 @@ def found(them: Person, words: str) -> str:
 
 
 @pytest.mark.parametrize(("wanted", "table"), [("en", ENGLISH), ("es", SPANISH)])
-def test_search_terms_and_synonyms_find_the_intended_block(opened, wanted, table):
+def test_search_terms_and_synonyms_find_the_expected_block(opened, wanted, table):
     them = opened(wanted)
     assert {words: found(them, words) for words in table} == table
 
@@ -248,7 +248,7 @@ def test_scratch_search_terms_rank_the_block_among_the_first_two(opened, wanted,
     assert {words: types for words, types in first.items() if not set(table[words]) <= set(types)} == {}
 
 
-def test_search_shows_blocks_and_enter_takes_the_first(qtbot, opened):
+def test_search_shows_matching_blocks_and_enter_inserts_the_first_match(qtbot, opened):
     them = opened("en")
     them.click(FIELD)
     QTest.keyClicks(them.target, "nap pause")
@@ -258,7 +258,7 @@ def test_search_shows_blocks_and_enter_takes_the_first(qtbot, opened):
     qtbot.waitUntil(lambda: "control_wait" in json.dumps(them.tops()), timeout=WAIT_MS)
 
 
-def test_search_without_results_suggests_what_to_try(opened):
+def test_search_without_results_shows_suggestions(opened):
     them = opened("en")
     them.click(FIELD)
     QTest.keyClicks(them.target, "zzyzx")
@@ -321,7 +321,7 @@ def test_more_results_button_shows_the_remaining_blocks(opened):
 
 
 @pytest.mark.parametrize("wanted", ["search", "find"])
-def test_keys_typed_right_after_new_behaviour_and_search_all_arrive(opened, wanted):
+def test_keys_typed_right_after_opening_the_search_are_all_entered(opened, wanted):
     them = opened("en")
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.view.show_tab("new", workspace(*({**START, "id": f"many{at}"} for at in range(60))))
@@ -363,7 +363,7 @@ def test_search_text_and_focus_are_kept_when_a_robot_connects(opened):
     them.wait_for(f"document.activeElement === document.querySelector({FIELD!r})")
 
 
-def test_partial_name_keeps_its_text_selection_when_a_robot_connects(opened):
+def test_text_selection_in_the_search_field_is_kept_when_a_robot_connects(opened):
     them = opened("en")
     them.click(FIELD)
     QTest.keyClicks(them.target, "wait")

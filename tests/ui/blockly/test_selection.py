@@ -86,7 +86,7 @@ def ids(top: dict) -> list[str]:
     return [top["id"], *(ids(below) if below else [])]
 
 
-def test_rubber_band_selects_the_blocks_it_touches_without_scrolling_the_canvas(them):
+def test_rubber_band_selects_intersected_blocks_without_scrolling_the_canvas(them):
     before = them.box("[data-id=e] > .blocklyPath")
     frame(them, "d", "e")
     them.wait_for(CHOSEN, ["d", "e"])
@@ -115,7 +115,7 @@ def test_modifier_click_toggles_selection_and_plain_click_clears_it(them, key):
     them.wait_for(CHOSEN, [])
 
 
-def test_dragging_moves_all_selected_blocks_and_one_undo_reverts_it(qtbot, them, can_undo):
+def test_dragging_moves_all_selected_blocks_and_a_single_undo_reverts_the_move(qtbot, them, can_undo):
     before = them.tops()
     click(them, "d")
     click(them, "e", Qt.ControlModifier)
@@ -133,7 +133,7 @@ def test_dragging_moves_all_selected_blocks_and_one_undo_reverts_it(qtbot, them,
     qtbot.waitUntil(lambda: them.tops() == before, timeout=WAIT_MS)
 
 
-def test_selected_blocks_inside_a_script_move_along_and_the_gap_closes(qtbot, them, can_undo):
+def test_selected_blocks_inside_a_script_are_moved_and_the_remaining_blocks_reconnect(qtbot, them, can_undo):
     before = them.tops()
     click(them, "a")
     click(them, "b", Qt.ControlModifier)
@@ -174,7 +174,7 @@ def test_dropping_on_the_bin_deletes_all_dragged_blocks(qtbot, them, can_undo):
     qtbot.waitUntil(lambda: by_id(them) == before, timeout=WAIT_MS)
 
 
-def test_copies_keep_their_relative_positions(qtbot, them, can_undo):
+def test_pasted_copies_keep_their_relative_positions(qtbot, them, can_undo):
     before = by_id(them)
     frame(them, "d", "e")
     them.wait_for(CHOSEN, ["d", "e"])

@@ -124,7 +124,7 @@ def test_modifier_click_toggles_selection_of_a_note(them):
 
 
 @pytest.mark.parametrize("held", ["d", "one"])
-def test_dragging_moves_blocks_and_notes_and_one_undo_reverts_it(qtbot, them, can_undo, held):
+def test_dragging_moves_blocks_and_notes_and_a_single_undo_reverts_the_move(qtbot, them, can_undo, held):
     before = them.newest()
     frame_right(them)
     start = press_head(them, "one") if held == "one" else them.hold("[data-id=d] > .blocklyPath")

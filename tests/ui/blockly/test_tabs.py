@@ -140,7 +140,7 @@ def test_every_tab_is_restored_after_the_web_process_is_killed(qtbot, view, two)
 
 
 @pytest.mark.web
-def test_tab_applies_missed_definitions_and_theme_when_it_is_shown(qtbot, view, two) -> None:
+def test_hidden_tab_applies_changed_definitions_and_theme_when_shown(qtbot, view, two) -> None:
     changed = copy.deepcopy(DEFINITIONS)
     next(each for each in changed["blocks"] if each["type"] == "control_wait")["message0"] = "%1 pause %2 s"
     view.set_definitions(changed)

@@ -23,7 +23,7 @@ def asked(view) -> list[dict]:
     return made
 
 
-def test_click_in_the_flyout_tries_the_block_and_adds_nothing(qtbot, view, person, asked):
+def test_click_in_the_flyout_runs_the_block_and_adds_no_block_to_the_canvas(qtbot, view, person, asked):
     them = person(START)
     them.open_category("Control")
     them.click(".blocklyFlyout .control_wait > .blocklyPath", dx=8, dy=8)
@@ -41,7 +41,7 @@ def test_click_in_the_flyout_tries_the_block_and_adds_nothing(qtbot, view, perso
     )
 
 
-def test_dragging_out_of_the_flyout_tries_nothing(qtbot, view, person, asked):
+def test_dragging_out_of_the_flyout_runs_no_block(qtbot, view, person, asked):
     them = person(START)
     them.open_category("Control")
     start = them.hold(".blocklyFlyout .control_wait")
@@ -52,7 +52,7 @@ def test_dragging_out_of_the_flyout_tries_nothing(qtbot, view, person, asked):
     assert asked == []
 
 
-def test_round_button_tries_the_selected_block(qtbot, view, person, asked):
+def test_try_button_next_to_the_selected_block_runs_its_stack(qtbot, view, person, asked):
     them = person(state=PICTURE)
     them.wait_for(f"document.querySelectorAll('{HANDLE}').length", 0)
     them.click("[data-id=wave] > .blocklyPath", dx=10, dy=10)
@@ -74,7 +74,7 @@ def test_trying_an_event_block_runs_its_script(qtbot, view, person, asked):
     qtbot.waitUntil(lambda: asked == [{"id": "start", "kind": "hat"}], timeout=WAIT_MS)
 
 
-def test_value_is_shown_at_its_block_until_the_next_press(qtbot, view, person):
+def test_value_is_shown_at_its_block_until_the_next_key_or_mouse_press(qtbot, view, person):
     them = person(state=PICTURE)
     view.show_value("wave", "84 %")
     them.wait_for(ANSWER, "84 %")

@@ -132,7 +132,7 @@ def test_block_menu_shows_the_value_of_its_variable(qtbot, view, them) -> None:
     qtbot.waitUntil(lambda: asked == ["variable.watch:score"], timeout=WAIT_MS)
 
 
-def test_page_only_sends_known_commands_to_the_window(qtbot, view, them) -> None:
+def test_page_can_only_trigger_allowed_commands(qtbot, view, them) -> None:
     asked: list[str] = []
     view.command_requested.connect(asked.append)
     view._bridge.command("file.quit")
@@ -163,7 +163,7 @@ def test_new_list_becomes_the_default_of_the_list_blocks(qtbot, view, them) -> N
     assert len(them.newest()["variables"]) == 3
 
 
-def test_list_blocks_default_to_a_list_that_is_assigned_in_a_block(qtbot, view, person) -> None:
+def test_list_blocks_default_to_a_variable_that_is_assigned_a_list(qtbot, view, person) -> None:
     saved = workspace(
         started(block("variables_set", VAR={"id": "names"}, VALUE=list_of(number(1)))),
         variables=("names", "x"),

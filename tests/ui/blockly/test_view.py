@@ -42,7 +42,7 @@ def with_rover() -> dict:
 WHEELS = "document.querySelector('.blocklyToolbox').textContent.includes('Wheels')"
 
 
-def test_robot_that_connects_during_a_drag_does_not_break_it(qtbot, view, person):
+def test_robot_that_connects_during_a_drag_does_not_interrupt_the_drag(qtbot, view, person):
     them = person(START)
     hat = them.box("[data-id=start] > .blocklyPath")
     them.open_category("Control")
@@ -88,7 +88,7 @@ DOTS = """Object.fromEntries([...document.querySelectorAll('.nepHeading.robot')]
     .filter(([name]) => name.startsWith('Rover')))"""
 
 
-def test_robot_that_may_still_move_has_no_green_dot_even_during_a_drag(view, person):
+def test_robot_that_may_still_move_has_no_green_status_dot_even_during_a_drag(view, person):
     them = person(START)
     view.set_definitions(with_rover())
     them.wait_for(DOTS, {"Rover": "on"})
@@ -171,7 +171,7 @@ def test_killed_web_process_loses_no_edits(qtbot, view, person, caplog):
 @pytest.mark.parametrize(
     ("language", "words"), [("de", "Baustein löschen"), ("pt-BR", "Deletar bloco"), ("xx", "Delete")]
 )
-def test_blockly_uses_the_chosen_language_or_falls_back_to_english(qtbot, language, words):
+def test_blockly_uses_the_selected_language_or_falls_back_to_english(qtbot, language, words):
     view = BlocklyView(language=language)
     qtbot.addWidget(view)
     view.set_definitions(DEFINITIONS)

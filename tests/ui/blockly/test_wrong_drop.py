@@ -67,7 +67,9 @@ def corner(them: Person, selector: str, side: str = "top") -> QPoint:
         ("start", "[data-id=turn] > .blocklyPath", "bottom", "“when started” starts a script"),
     ],
 )
-def test_invalid_drop_shows_the_reason_and_uncovers_the_target(qtbot, them, id, selector, side, words):
+def test_invalid_drop_shows_the_reason_and_moves_the_block_off_the_target(
+    qtbot, them, id, selector, side, words
+):
     before = them.newest()
     place = corner(them, selector, side)
     drop(them, id, place)
@@ -82,7 +84,7 @@ def test_invalid_drop_shows_the_reason_and_uncovers_the_target(qtbot, them, id, 
     qtbot.waitUntil(lambda: them.newest() == before, timeout=WAIT_MS)
 
 
-def test_block_moved_aside_after_invalid_drop_covers_no_other_script(qtbot, view, them):
+def test_block_moved_off_the_target_of_an_invalid_drop_covers_no_other_script(qtbot, view, them):
     """The way to the right of the place leads onto the script there."""
     state = workspace(START, TURN, EVER, {**FACE, "y": 476}, {**BATTERY, "x": 300, "y": 196})
     view.load(state)
@@ -95,7 +97,7 @@ def test_block_moved_aside_after_invalid_drop_covers_no_other_script(qtbot, view
         assert apart or mine["top"] >= each["bottom"] or mine["bottom"] <= each["top"]
 
 
-def test_invalid_drop_message_disappears_on_next_touch(them):
+def test_invalid_drop_message_disappears_on_the_next_click(them):
     drop(them, "face", corner(them, "[data-id=angle] > .blocklyPath"))
     them.wait_for(f"{SAID} !== ''")
     them.click("[data-id=ever] > .blocklyPath")

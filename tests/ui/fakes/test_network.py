@@ -110,7 +110,7 @@ def test_master_is_found_before_the_graph_is_reported(world: World) -> None:
     assert world.events[0] == MasterFound(world.source.address)
 
 
-def test_messages_reach_every_sink_while_their_topic_is_watched(world: World) -> None:
+def test_messages_of_a_watched_topic_reach_every_sink(world: World) -> None:
     world.begin()
     world.send("nobody listens")
     assert world.heard == []
@@ -138,7 +138,7 @@ def test_missed_messages_are_counted_for_watched_topics_only(world: World) -> No
     until(lambda: world.source.lost_counts() == {})
 
 
-def test_jobs_get_a_node_run_in_order_and_failures_are_reported(world: World) -> None:
+def test_jobs_run_in_order_with_a_node_and_failures_are_reported(world: World) -> None:
     world.begin()
     done: list[object] = []
 

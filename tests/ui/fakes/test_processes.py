@@ -111,7 +111,9 @@ def test_robot_process_that_exits_reports_its_last_output_once(
     assert (launcher.virtual_robots, launcher.ended) == (("Pepper",), frozenset())
 
 
-def test_process_killed_from_outside_is_reported_as_such(launcher: Launcher, started_here, told) -> None:
+def test_process_killed_by_another_program_is_reported_as_killed(
+    launcher: Launcher, started_here, told
+) -> None:
     launcher.start_virtual_robot("Pepper")
     killed = started_here.made[0]
     killed.kill()

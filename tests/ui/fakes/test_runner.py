@@ -184,7 +184,7 @@ def test_program_runs_pauses_steps_resumes_and_stops(run: Run) -> None:
     assert (runs.running_blocks, runs.stopped_blocks) == ((), ("c",))
 
 
-def test_pause_at_a_block_applies_at_once_and_is_not_a_pending_edit(run: Run) -> None:
+def test_breakpoint_applies_immediately_and_is_not_a_pending_edit(run: Run) -> None:
     runs, blocks = run.session.runs, endless()
     run.session.document.apply_edit(blocks)
     runs.run()
@@ -207,7 +207,7 @@ def pressed_long_ago(run: Run) -> None:
     runs._run = replace(runs._run, started_s=runs._run.started_s - 10)
 
 
-def test_run_again_stops_the_running_program_and_restarts_it(run: Run) -> None:
+def test_run_again_restarts_the_running_program(run: Run) -> None:
     runs = run.session.runs
     run.session.document.apply_edit(endless())
     runs.run()
@@ -292,7 +292,7 @@ def test_edits_during_a_run_are_reported_as_pending_until_undone(run: Run) -> No
     tick_until(run.session, lambda: runs.view().state == "ready")
 
 
-def test_tried_stack_runs_alone_and_never_beside_another_program(run: Run) -> None:
+def test_tried_stack_runs_only_after_the_running_program_has_stopped(run: Run) -> None:
     runs = run.session.runs
     run.session.document.apply_edit(endless())
     runs.run()
@@ -313,7 +313,7 @@ def test_tried_stack_runs_alone_and_never_beside_another_program(run: Run) -> No
     assert (view.title, view.detail) == ("Tried “change by”", "Finished")
 
 
-def test_tried_variable_has_the_value_of_the_run_and_stops_nothing(run: Run) -> None:
+def test_trying_a_variable_shows_its_value_in_the_run_without_stopping_the_program(run: Run) -> None:
     runs = run.session.runs
     run.session.document.apply_edit(endless())
     tried = Stack("toolbox", "value", block("variables_get", VAR={"id": "n"}))
@@ -398,7 +398,7 @@ def test_step_starts_a_program_at_its_first_block(run: Run) -> None:
     tick_until(run.session, lambda: runs.view().state == "ready")
 
 
-def test_program_that_ends_is_finished_and_another_can_run(run: Run) -> None:
+def test_finished_program_is_reported_and_another_program_can_run(run: Run) -> None:
     runs = run.session.runs
     run.session.document.apply_edit(workspace(started(write(text("Hi")))))
     for _ in range(2):

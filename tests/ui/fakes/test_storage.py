@@ -31,7 +31,7 @@ def settings(is_real: bool, tmp_path: Path) -> Settings:
     return Settings(tmp_path / "home") if is_real else storage.Settings()
 
 
-def test_setting_is_kept_and_value_of_another_type_is_ignored(settings: Settings) -> None:
+def test_setting_is_saved_and_a_value_of_another_type_is_ignored(settings: Settings) -> None:
     assert settings.get("theme", "light") == "light"
     settings.set("theme", "dark")
     assert settings.get("theme", "light") == "dark"
@@ -93,7 +93,7 @@ FIRST = workspace(started(write(text("one"))))
 SECOND = workspace(started(write(text("two"))))
 
 
-def test_edit_is_in_the_journal_until_it_is_saved(kept: Kept, tmp_path: Path) -> None:
+def test_edit_is_in_the_journal_until_the_behaviour_is_saved(kept: Kept, tmp_path: Path) -> None:
     document = kept.document
     assert (kept.blocks, document.dirty, document.edits) == (None, False, 0)
     document.apply_edit(FIRST)
@@ -170,7 +170,7 @@ def look(is_real: bool) -> Callable[[list[Finding]], Doctor]:
     return found
 
 
-def test_doctor_keeps_its_findings(look: Callable[[object], Doctor]) -> None:
+def test_doctor_stores_its_findings(look: Callable[[object], Doctor]) -> None:
     fine = Finding("master", "ok", "A master runs.")
     doctor = look([fine])
     assert (tuple(doctor.findings), doctor.is_running) == ((fine,), False)

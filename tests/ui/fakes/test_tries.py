@@ -39,7 +39,7 @@ def ends(session: fakes.Session) -> None:
     session.runs.confirm_stopped()  # the robot of the test does not answer a stop
 
 
-def test_real_robot_asks_once_for_permission_and_then_runs_the_tried_block(session: fakes.Session) -> None:
+def test_permission_is_requested_once_before_a_tried_block_moves_a_real_robot(session: fakes.Session) -> None:
     session.join(ROVER, virtual=False)
     assert tried(session, LIGHT) == "", "what does not move needs no answer"
     assert tried(session, TURN) == "Allow Rover to move?"
@@ -49,7 +49,9 @@ def test_real_robot_asks_once_for_permission_and_then_runs_the_tried_block(sessi
     assert tried(session, TURN) == ""
 
 
-def test_after_denied_permission_nothing_moves_and_the_next_try_asks_again(session: fakes.Session) -> None:
+def test_denied_permission_prevents_motion_and_is_requested_again_at_the_next_try(
+    session: fakes.Session,
+) -> None:
     session.join(ROVER, virtual=False)
     assert tried(session, TURN) == "Allow Rover to move?"
     session.fleet.permission.answer(let=False)
@@ -57,6 +59,6 @@ def test_after_denied_permission_nothing_moves_and_the_next_try_asks_again(sessi
     assert tried(session, TURN) == "Allow Rover to move?"
 
 
-def test_virtual_robot_never_asks_for_permission(session: fakes.Session) -> None:
+def test_virtual_robot_requires_no_motion_permission(session: fakes.Session) -> None:
     session.join(ROVER, virtual=True)
     assert tried(session, TURN) == ""

@@ -64,13 +64,13 @@ def test_remaining_time_is_counted_down(card) -> None:
     assert not card.left.isVisible()
 
 
-def test_missed_deadline_is_shown_as_a_sentence_below_the_card(card) -> None:
+def test_timeout_is_shown_as_a_sentence_below_the_card(card) -> None:
     card.show_invocation(tried("failed", error="go far took longer than 10 s"))
     assert (card.result.text, card.error.text()) == ("failed", "Go far took longer than 10 s.")
     assert card.try_button.text() == "Try"
 
 
-def test_replaced_action_names_its_replacement_and_plain_stop_adds_no_text(card) -> None:
+def test_replaced_action_names_its_replacement_and_stopped_action_shows_no_text(card) -> None:
     card.show_invocation(tried("canceled", error="replaced by turn", elapsed_s=1.0))
     assert (card.result.text, card.error.text()) == ("stopped after 1.0 s", "Replaced by turn.")
     assert card.error.property("role") == "textSecondary"  # that is no error
@@ -80,7 +80,7 @@ def test_replaced_action_names_its_replacement_and_plain_stop_adds_no_text(card)
     assert not card.error.isVisible()
 
 
-def test_robot_reply_is_shown_beside_the_result(card) -> None:
+def test_robot_reply_is_shown_next_to_the_result(card) -> None:
     card.show_invocation(tried("succeeded", output={"moved": 0.5, "seconds": 1.4}, elapsed_s=1.5))
     assert card.words.text() == "moved 0.50 m"
 
@@ -115,7 +115,7 @@ def show(card: ActionCard, tries: Sequence[Invocation]) -> list[str]:
     return [f"{row.given}: {row.result}" for row in card.tries.rows]
 
 
-def test_last_tries_are_listed_and_restore_their_input_values(card) -> None:
+def test_last_tries_are_listed_with_buttons_that_restore_their_input_values(card) -> None:
     assert not card.past.isVisible()
     done = Invocation(
         "1", "go_far", "succeeded", given={"distance": 0.25}, output={"moved": 0.25}, elapsed_s=1

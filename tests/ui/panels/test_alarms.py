@@ -94,7 +94,7 @@ def test_empty_panel_explains_how_to_create_an_alarm(panel, window) -> None:
     assert window.session.alarms.alarms.evaluator.topics == {"/robot/camera"}
 
 
-def test_words_of_an_alarm_sentence_are_chosen_by_keyboard(panel) -> None:
+def test_parts_of_an_alarm_sentence_are_edited_by_keyboard(panel) -> None:
     panel.alarms.set_rule(BELOW)
     panel.refresh()
     press(slot(panel, "kind"))
@@ -136,7 +136,7 @@ def test_every_control_in_a_row_has_an_accessible_name(panel) -> None:
     assert slot(panel, "limit").accessibleName() == "Limit: 20"
 
 
-def test_suggestion_is_accepted_as_soon_as_it_is_chosen(panel, qtbot) -> None:
+def test_selected_suggestion_is_accepted_immediately(panel, qtbot) -> None:
     panel.add_alarm()
     field = panel.field
     assert field is not None
@@ -250,7 +250,7 @@ def test_history_is_filtered_and_saved(panel, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_alarm_kind_has_a_sentence_and_each_slot_accepts_what_it_shows(kind: str) -> None:
+def test_every_alarm_kind_has_a_sentence_and_slot_texts_round_trip(kind: str) -> None:
     rule = with_kind(AlarmRule("r", AlarmCondition("silent", "/t", for_s=2.0)), kind)
     condition = rule.condition
     name = condition.name or "node"

@@ -37,7 +37,7 @@ def topics(qtbot, window: MainWindow, commands: object) -> Dock:
     return dock
 
 
-def test_failed_panel_does_not_affect_others_and_works_again_when_reopened(
+def test_failed_panel_does_not_affect_other_panels_and_works_again_when_reopened(
     window: MainWindow, topics: Dock
 ) -> None:
     bench = window.bench

@@ -186,7 +186,7 @@ def test_sensor_blocks_show_their_newest_value(panel, window) -> None:
     assert window.session.looked_at == []
 
 
-def test_sensors_in_the_open_flyout_are_watched_until_it_closes(panel, window) -> None:
+def test_sensors_in_the_open_flyout_are_watched_until_the_flyout_closes(panel, window) -> None:
     window.session.document.sensors, window.session.document.edits = (), 5
     panel.refresh()
     assert window.session.looked_at == []
@@ -208,7 +208,7 @@ def test_robot_that_connects_while_its_sensors_are_shown_is_watched(panel, windo
     assert window.session.looked_at == ["Ada"]
 
 
-def test_python_view_shows_the_newest_program_and_copies_it(panel, window) -> None:
+def test_python_view_shows_and_copies_the_newest_program(panel, window) -> None:
     editor(panel).late = {"blocks": {"blocks": [{"type": "late"}]}}
     panel.title_widget().show()
     press(button(panel.title_widget(), "Python"))
@@ -240,7 +240,7 @@ def test_function_keys_in_the_page_trigger_window_commands(panel, window) -> Non
     assert window.commands == ["key:F12", "key:F5"]  # the window knows what a person made of them
 
 
-def test_title_shows_the_name_of_the_behaviour_and_whether_it_is_saved(panel, window) -> None:
+def test_title_shows_name_and_save_state_of_the_behaviour(panel, window) -> None:
     (tab,) = panel._bar.tabs.tabs.values()
     assert tab.accessibleName() == "Greeting"
     window.session.document.dirty = True
@@ -268,7 +268,7 @@ def test_empty_canvas_shows_the_first_step_and_its_buttons_run_commands(qtbot, q
     assert [call for call in editor(panel).told if call[0] == "set_first_step"][-1][2] is True
 
 
-def test_highlighted_block_shows_its_name_and_where_to_drag_it(panel, window) -> None:
+def test_highlighted_block_shows_its_name_and_where_to_drop_the_block(panel, window) -> None:
     panel.set_mode("python")
     panel.point_at("events_started")
     assert panel.mode == "blocks"
@@ -339,7 +339,7 @@ def test_toast_describes_the_result_of_dropping_blocks_on_a_tab(count: int, how:
     assert transfer_text(count, how, "Quiz") == words
 
 
-def test_block_dropped_on_its_own_tab_or_outside_tabs_is_not_moved(panel, window) -> None:
+def test_block_dropped_on_the_same_tab_or_outside_the_tab_bar_is_not_moved(panel, window) -> None:
     title = panel.title_widget()
     title.resize(900, 34)
     title.show()
@@ -414,7 +414,7 @@ def test_tab_under_a_dragged_block_opens_and_the_drag_image_follows(qtbot, panel
     assert not shown.isVisible(), "it came too late"
 
 
-def test_block_dropped_on_a_tab_opened_during_the_drag_goes_to_that_tab(panel, window) -> None:
+def test_block_dropped_on_a_tab_opened_during_the_drag_is_moved_to_that_tab(panel, window) -> None:
     session = window.session
     home = session.document
     home.apply_edit(WorkspaceJson.from_blocks({"blocks": {"blocks": [{"type": "events_started"}]}}))
@@ -448,7 +448,7 @@ def test_plus_button_is_highlighted_under_a_dragged_block_and_creates_a_behaviou
     assert editor(panel).count("move_dragged_blocks") == 0, "no new one came: the block stays"
 
 
-def test_missing_system_libraries_replace_the_blocks_by_a_message_and_python_still_works(
+def test_missing_system_libraries_show_a_message_and_the_python_view_still_works(
     qtbot, window: Window
 ) -> None:
     tries: list[QWidget] = []

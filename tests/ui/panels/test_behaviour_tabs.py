@@ -59,7 +59,7 @@ def test_tab_is_selected_and_closed_by_mouse(tabs) -> None:
     assert closed == [("c",), ("b",)]
 
 
-def test_press_on_close_button_released_outside_does_nothing(tabs) -> None:
+def test_press_on_the_close_button_released_outside_does_not_close_the_tab(tabs) -> None:
     closed, chosen = heard(tabs.close_requested), heard(tabs.selected)
     tab = tabs.tabs["b"]
     QTest.mousePress(tab, Qt.MouseButton.LeftButton, pos=tab.close_rect().center().toPoint())
@@ -97,14 +97,14 @@ def test_focus_follows_the_current_tab(qtbot, tabs) -> None:
     assert tabs.tabs["b"].hasFocus()
 
 
-def test_closed_tab_disappears_and_the_others_move_up(tabs) -> None:
+def test_closed_tab_is_removed_and_the_other_tabs_move_left(tabs) -> None:
     before = tabs.tabs["c"].x()
     tabs.show_tabs([A, C], "a")
     assert set(tabs.tabs) == {"a", "c"}
     assert tabs.tabs["c"].x() < before
 
 
-def test_narrow_tab_bar_shortens_all_tabs_and_keeps_the_current_one_visible(tabs) -> None:
+def test_narrow_tab_bar_shortens_all_tabs_and_keeps_the_current_tab_visible(tabs) -> None:
     many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
     tabs.show_tabs(many, "11")
     room = tabs.add.x()
@@ -154,7 +154,7 @@ def test_wheel_scrolls_the_tab_bar(tabs) -> None:
     assert tabs.tabs["0"].x() == -60
 
 
-def test_nothing_is_clipped_at_200_per_cent_text_size(tabs, theme) -> None:
+def test_tabs_are_not_clipped_at_200_per_cent_text_size(tabs, theme) -> None:
     theme.set_text_percent(200)
     tabs.resize(1400, tabs.sizeHint().height())
     for tab in tabs.tabs.values():
@@ -251,7 +251,7 @@ def test_folder_suffix_of_a_tab_is_not_editable(tabs) -> None:
 # -- blocks from the page -------------------------------------------------------------------------
 
 
-def test_drop_target_at_a_position_is_a_tab_or_plus_button_or_none(qtbot, tabs) -> None:
+def test_drop_target_is_the_tab_or_plus_button_at_the_position_if_any(qtbot, tabs) -> None:
     tab = tabs.tabs["b"]
     assert tabs.target_at(tab.mapToGlobal(tab.rect().center())) == "b"
     assert tabs.target_at(tabs.add.mapToGlobal(tabs.add.rect().center())) == NEW_TAB
@@ -262,7 +262,7 @@ def test_drop_target_at_a_position_is_a_tab_or_plus_button_or_none(qtbot, tabs) 
     assert tabs.target_at(tab.mapToGlobal(tab.rect().center())) == ""
 
 
-def test_scrolled_out_tab_is_no_drop_target(qtbot, tabs) -> None:
+def test_scrolled_out_tab_is_not_a_drop_target(qtbot, tabs) -> None:
     tabs.resize(150, 30)
     tabs.show_tabs([A, B, C], "a")
     hidden = tabs.tabs["c"]

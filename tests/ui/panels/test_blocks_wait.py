@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 from app.ui.panels.behaviour.panel import LOADING_TEXT_DELAY_S, LoadingMessage
 
 
-def test_loading_message_appears_after_a_delay_and_disappears_with_the_page(qtbot) -> None:
+def test_loading_message_appears_after_a_delay_and_disappears_when_the_page_is_loaded(qtbot) -> None:
     place = QWidget()
     qtbot.addWidget(place)
     place.resize(600, 400)

@@ -53,7 +53,7 @@ def test_new_lines_are_inserted_without_a_model_reset(qtmodeltester, panel, wind
     assert inserted.count() == 1  # nothing new, nothing done
 
 
-def test_evicted_records_are_removed_from_the_list(qtbot, qapp) -> None:
+def test_evicted_records_are_removed_from_the_console_list(qtbot, qapp) -> None:
     session = Session()
     session.console = Console(capacity=3)
     window = Window(session)
@@ -101,7 +101,7 @@ def test_lines_are_copied_in_chronological_order(panel, window) -> None:
     assert window.toasts == ["Copied 6 lines"]
 
 
-def test_empty_console_explains_what_will_appear(qtbot, qapp) -> None:
+def test_empty_console_shows_an_empty_state_until_the_first_record(qtbot, qapp) -> None:
     window = Window(Session())
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
@@ -149,7 +149,7 @@ def test_large_text_leaves_room_for_the_message(panel, window, percent: int, wid
         assert {"time", "level"} <= shown.keys()
 
 
-def test_hidden_console_decodes_nothing(window) -> None:
+def test_hidden_console_decodes_no_messages(window) -> None:
     class Unread(Message):
         @property
         def payload(self) -> object:

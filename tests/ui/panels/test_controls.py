@@ -133,7 +133,7 @@ def test_text_that_is_too_long_is_kept_and_reported_when_editing_ends(qtbot, the
     assert not form._sentences["t"].isVisible()
 
 
-def test_zero_is_a_valid_choice_and_an_invalid_advanced_value_expands_its_row(qtbot, theme) -> None:
+def test_zero_is_a_valid_choice_and_an_invalid_advanced_value_shows_its_row(qtbot, theme) -> None:
     form = form_of(
         qtbot,
         theme,
@@ -244,7 +244,7 @@ def test_colour_swatches_emit_the_pressed_colour(qtbot, theme) -> None:
     assert (swatches.value, told) == ("#102030", ["#ff6b5e"])
 
 
-def test_custom_colour_is_chosen_from_the_strip_or_by_hex_code(qtbot, theme) -> None:
+def test_custom_colour_is_selected_from_the_strip_or_by_hex_code(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("c", "colour", "colour", default="#35c26b"))
     choice, strip = child(form, ColourChoice), child(form, HueStrip)
     assert not strip.isVisible()
@@ -313,7 +313,7 @@ def test_image_file_is_previewed_and_sent_as_base64_at_most_1280_px_wide(qtbot, 
     assert choice.field.text() == "red.png"
 
 
-def test_file_that_is_no_image_is_reported_and_not_sent(qtbot, theme, tmp_path) -> None:
+def test_file_that_is_not_an_image_is_reported_and_not_sent(qtbot, theme, tmp_path) -> None:
     form = form_of(qtbot, theme, Parameter("p", "picture", "image"))
     choice = child(form, PictureChoice)
     (tmp_path / "not.png").write_text("hello")
@@ -397,7 +397,7 @@ def test_cameras_are_offered_in_a_menu(qtbot, theme, monkeypatch) -> None:
     assert choice.field.text() == "newest image of /Pepper/camera"
 
 
-def test_try_sends_the_newest_image_of_the_chosen_topic(qtbot, theme) -> None:
+def test_try_button_sends_the_newest_image_of_the_selected_topic(qtbot, theme) -> None:
     cameras = Cameras()
     form = form_of(qtbot, theme, Parameter("p", "picture", "image"), pictures=cameras)
     choice = child(form, PictureChoice)

@@ -40,7 +40,7 @@ def panel(qtbot, window) -> DoctorPanel:
     return made
 
 
-def test_doctor_runs_when_first_shown_and_lists_the_worst_finding_first(panel, window) -> None:
+def test_doctor_runs_when_first_shown_and_lists_the_most_severe_finding_first(panel, window) -> None:
     assert window.session.doctor.looked == 1
     assert panel.shown == list(FOUND)
     assert len(panel.rows) == len(FOUND)
@@ -50,7 +50,7 @@ def test_doctor_runs_when_first_shown_and_lists_the_worst_finding_first(panel, w
     assert window.session.doctor.looked == 1  # nothing changed, nothing done
 
 
-def test_findings_are_shown_as_they_are_found(qtbot, window) -> None:
+def test_findings_are_shown_incrementally_during_a_check(qtbot, window) -> None:
     window.session.master = MasterState("none", "127.0.0.1:7780")
     doctor = window.session.doctor
     doctor.found = (FINE, ALSO_FINE, FULL)
@@ -88,7 +88,9 @@ def test_findings_are_shown_as_they_are_found(qtbot, window) -> None:
     assert (panel.looked.text(), panel.chip.accessibleName()) == ("All 2 checks passed", "no problems")
 
 
-def test_waiting_panels_are_listed_with_the_suggested_topic(qtbot, panel, window, monkeypatch) -> None:
+def test_panels_waiting_for_a_topic_are_listed_with_the_suggested_topic(
+    qtbot, panel, window, monkeypatch
+) -> None:
     now = [time.monotonic()]
     monkeypatch.setattr("app.ui.panels.doctor.time.monotonic", lambda: now[0])
     near, far, silent = (window.make(INSPECTOR) for _ in range(3))
@@ -118,7 +120,7 @@ def test_waiting_panels_are_listed_with_the_suggested_topic(qtbot, panel, window
     assert len(panel.rows) == before
 
 
-def test_command_is_copied(qtbot, panel, window) -> None:
+def test_suggested_command_is_copied(qtbot, panel, window) -> None:
     row = panel.rows[0]
     assert row.button.accessibleName() == "Copy the command"
     qtbot.mouseClick(row.button, Qt.MouseButton.LeftButton)
@@ -127,7 +129,7 @@ def test_command_is_copied(qtbot, panel, window) -> None:
     assert not panel.rows[1].button.isVisible()
 
 
-def test_doctor_starts_the_master_and_checks_again_when_it_runs(qtbot, panel, window) -> None:
+def test_doctor_starts_the_master_and_checks_again_when_the_master_runs(qtbot, panel, window) -> None:
     missing = Finding("master:none", "error", "No master runs.", "Start a master.", "nep master")
     window.session.doctor.found = (missing,)
     qtbot.mouseClick(panel.again, Qt.MouseButton.LeftButton)
@@ -226,7 +228,7 @@ def test_without_an_originating_panel_the_topic_opens_in_a_matching_panel(qtbot,
     assert window.opened == ["/robot/depth"]
 
 
-def test_paused_panel_is_the_first_finding_and_is_resumed(qtbot, panel, window, asker) -> None:
+def test_paused_panel_is_the_first_finding_and_can_be_resumed(qtbot, panel, window, asker) -> None:
     window.session.doctor.found = (NEAR,)
     window.session.doctor.expect_topic("/robot/deph")
     panel.check_panel(asker)
@@ -239,7 +241,7 @@ def test_paused_panel_is_the_first_finding_and_is_resumed(qtbot, panel, window, 
     assert names(panel) == ["Use /robot/depth"]
 
 
-def test_closed_panel_is_not_queried(qtbot, panel, window) -> None:
+def test_doctor_does_not_query_a_closed_panel(qtbot, panel, window) -> None:
     asker = Asker(window.context())
     panel.check_panel(asker)
     assert "paused" in panel.rows[0].accessibleName()
@@ -248,7 +250,7 @@ def test_closed_panel_is_not_queried(qtbot, panel, window) -> None:
     assert "paused" not in panel.rows[0].accessibleName()
 
 
-def test_open_recording_is_reported_as_hiding_the_live_topic(qtbot, panel, window, tmp_path) -> None:
+def test_open_recording_that_hides_the_live_topic_is_reported(qtbot, panel, window, tmp_path) -> None:
     window.session.open_recording(tmp_path / "none.mcap")
     try:
         panel.refresh()
@@ -312,7 +314,7 @@ def test_topic_of_an_unresponsive_network_is_reported(panel, window) -> None:
     assert panel.terminal.text() == "In a terminal: nep doctor"
 
 
-def test_every_panel_that_may_be_empty_opens_the_doctor_with_its_topic(qtbot, qapp) -> None:
+def test_doctor_is_opened_from_every_empty_panel_with_its_topic(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.master = MasterState("connected", "127.0.0.1:7780")
     for name in ("inspector", "image", "console", "services"):
@@ -327,7 +329,7 @@ def test_every_panel_that_may_be_empty_opens_the_doctor_with_its_topic(qtbot, qa
         made.dispose()
 
 
-def test_panels_report_that_they_are_paused(qtbot, window) -> None:
+def test_paused_panels_are_reported_to_the_doctor(qtbot, window) -> None:
     for name in ("inspector", "image", "plot"):
         made = window.make(importlib.import_module(f"app.ui.panels.{name}").PANEL)
         qtbot.addWidget(made)
@@ -340,7 +342,7 @@ def test_panels_report_that_they_are_paused(qtbot, window) -> None:
         made.dispose()
 
 
-def test_console_reports_its_filters(qtbot, window) -> None:
+def test_console_filters_are_reported_to_the_doctor(qtbot, window) -> None:
     made = window.make(console.PANEL)
     qtbot.addWidget(made)
     assert list(made.blockers()) == []
@@ -362,7 +364,7 @@ def test_empty_plot_opens_the_doctor(qtbot, window) -> None:
     made.dispose()
 
 
-def test_doctor_shows_that_it_is_checking_before_the_first_result(qtbot, qapp) -> None:
+def test_doctor_shows_a_check_in_progress_before_the_first_result(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.doctor.start = lambda: None
     panel = window.make(PANEL)

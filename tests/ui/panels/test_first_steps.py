@@ -41,7 +41,7 @@ def page(*tops: dict) -> dict:
 SAYS, TURNS = "robot_pepper_do_say", "robot_pepper_do_turn"
 
 
-def test_blocks_nested_below_when_started_count_and_loose_blocks_do_not() -> None:
+def test_blocks_nested_below_when_started_count_and_detached_blocks_do_not() -> None:
     assert find_tutorial_blocks({}) == TutorialBlocks()
     assert find_tutorial_blocks(page(block("events_started"))) == TutorialBlocks(started=True)
     inside = block("events_started", block("control_repeat", block(TURNS), BODY=block(SAYS)))
@@ -52,14 +52,14 @@ def test_blocks_nested_below_when_started_count_and_loose_blocks_do_not() -> Non
     )
 
 
-def test_malformed_files_complete_no_steps() -> None:
+def test_malformed_behaviours_complete_no_steps() -> None:
     assert find_tutorial_blocks({"blocks": 3}) == TutorialBlocks()
     assert find_tutorial_blocks(
         {"blocks": {"blocks": [3, {"type": "events_started", "next": 3, "inputs": 4}]}}
     ) == TutorialBlocks(True)
 
 
-def test_each_step_is_completed_by_its_evidence_and_stays_completed() -> None:
+def test_each_step_is_completed_once_and_stays_completed() -> None:
     now, done = TutorialState(), frozenset[str]()
     for change, step in (
         ({"can_speak": True}, "robot"),
@@ -85,12 +85,12 @@ def test_blocks_of_an_example_complete_no_step(panel, window) -> None:
     assert panel.done == {"robot", "start", "say", "turn"}
 
 
-def test_stopping_other_blocks_does_not_complete_the_last_step() -> None:
+def test_stopping_a_program_without_tutorial_blocks_does_not_complete_the_last_step() -> None:
     done = {"robot", "start", "say", "run", "turn"}
     assert completed_steps(TutorialState(True, TutorialBlocks(), was_stopped=True), done) == done
 
 
-def test_stop_before_any_run_completes_no_step() -> None:
+def test_stop_before_any_run_completes_no_tutorial_step() -> None:
     built = TutorialBlocks(True, frozenset({"a"}), True)
     assert "stop" not in completed_steps(TutorialState(True, built, was_stopped=True), ())
 
@@ -174,7 +174,7 @@ def test_show_me_points_at_the_block_of_the_connected_robot(panel, window) -> No
     assert window.commands[-1] == "point.button:run.run"
 
 
-def test_loose_block_gets_a_hint_where_to_attach_it(panel, window) -> None:
+def test_detached_block_shows_a_hint_where_to_attach_the_block(panel, window) -> None:
     window.session.join(pepper())
     build(panel, block("events_started"))
     assert panel.rows[2].hint.text() == "You'll find it under Speech, on the left."
@@ -197,7 +197,7 @@ def test_completed_steps_are_restored_after_restart(panel, window, qtbot) -> Non
     assert FirstStepsPanel(window.context()).done == frozenset()
 
 
-def test_after_twenty_idle_seconds_the_next_step_is_pointed_out_once(panel, window, clock) -> None:
+def test_next_step_is_highlighted_once_after_twenty_idle_seconds(panel, window, clock) -> None:
     window.session.join(pepper())
     panel.refresh()
     clock.now = HINT_AFTER_S - 1
@@ -215,7 +215,7 @@ def test_after_twenty_idle_seconds_the_next_step_is_pointed_out_once(panel, wind
     assert window.commands[-1] == "point.block:-", "the ring goes with its step"
 
 
-def test_completed_first_steps_show_what_comes_next_and_can_be_restarted(panel, window) -> None:
+def test_completed_first_steps_show_next_steps_and_can_be_restarted(panel, window) -> None:
     panel.done = frozenset(step.id for step in STEPS) - {"robot"}
     window.session.join(pepper())
     panel.refresh()

@@ -103,7 +103,7 @@ def test_choices_offered_by_the_robot_at_runtime_fill_the_list(qtbot, theme) -> 
     assert isinstance(control_for(theme, parameter, []).widget, QLineEdit)
 
 
-def test_problems_are_shown_below_their_rows_and_others_at_the_end(qtbot, theme) -> None:
+def test_problems_are_shown_below_their_rows_and_general_problems_at_the_end(qtbot, theme) -> None:
     form = ActionForm(
         theme, action(Parameter("t", "text", "text", required=True), Parameter("s", "speed", "number", 0, 1))
     )
@@ -120,7 +120,7 @@ def test_problems_are_shown_below_their_rows_and_others_at_the_end(qtbot, theme)
     assert not form.problem.isVisible()
 
 
-def test_advanced_parameters_are_shown_by_more(qtbot, theme) -> None:
+def test_advanced_parameters_are_shown_by_the_more_button(qtbot, theme) -> None:
     form = ActionForm(
         theme, action(Parameter("a", "a", "text"), Parameter("b", "b", "text", default="x", advanced=True))
     )

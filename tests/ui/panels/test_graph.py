@@ -151,7 +151,7 @@ def words_at(panel: GraphPanel) -> set[str]:
     return {item.stats.label for item in panel.canvas.scene.lines}
 
 
-def test_graph_shows_nodes_edges_and_figures(panel: GraphPanel) -> None:
+def test_graph_shows_nodes_edges_and_rates(panel: GraphPanel) -> None:
     assert panel.count.text() == "5 nodes, 3 topics, 1 service"
     assert names(panel) == {"pepper_driver", "blackboard", "greeting", "studio", "RIZE"}
     assert words_at(panel) == {"/touch 20/s", "/blackboard 10/s", "robot_action 0.5/s", "remember"}
@@ -201,7 +201,9 @@ def test_items_outside_the_viewport_are_updated_when_scrolled_into_view(
     assert "/touch 31/s" in words_at(panel)
 
 
-def test_click_on_an_edge_shows_its_topic_and_inspect_opens_it(panel: GraphPanel, window: Window) -> None:
+def test_click_on_an_edge_shows_its_topic_and_inspect_opens_the_topic(
+    panel: GraphPanel, window: Window
+) -> None:
     scene = panel.canvas.scene
     assert scene is not None
     item = next(each for each in scene.lines if each.line.topics == ("/blackboard",))
@@ -337,7 +339,9 @@ def test_edge_with_several_topics_has_a_submenu_for_each(qtbot, panel: GraphPane
 
 
 @pytest.mark.parametrize("rate", [float("nan"), float("inf"), 0.0, 2.0**64, -1.0])
-def test_invalid_figures_do_not_break_the_graph(panel: GraphPanel, window: Window, rate: float) -> None:
+def test_invalid_rates_and_counts_do_not_break_the_graph(
+    panel: GraphPanel, window: Window, rate: float
+) -> None:
     more = graph()
     odd = replace(more.topics["/touch"], rate_hz=rate, bandwidth_Bps=rate, loss_ratio=rate, lost=2**64 - 1)
     odd = replace(
@@ -351,7 +355,7 @@ def test_invalid_figures_do_not_break_the_graph(panel: GraphPanel, window: Windo
     assert any(words.startswith("/touch") for words in words_at(panel))
 
 
-def test_theme_change_keeps_the_layout_and_larger_text_recomputes_it(
+def test_theme_change_keeps_the_layout_and_larger_text_recomputes_the_layout(
     panel: GraphPanel, window: Window, qtbot
 ) -> None:
     scene = panel.canvas.scene
@@ -390,7 +394,7 @@ def test_enter_on_a_node_moves_focus_into_its_card(panel: GraphPanel) -> None:
     assert panel.card.first_focus_widget().accessibleName() == "/blackboard"
 
 
-def test_filter_fades_items_that_do_not_match(panel: GraphPanel) -> None:
+def test_filter_dims_items_that_do_not_match(panel: GraphPanel) -> None:
     panel.canvas.setFocus()
     QTest.keyClick(panel.canvas, Qt.Key.Key_Slash)
     panel.tools.filter.setText("TOUCH")
@@ -502,7 +506,7 @@ def test_positions_are_stable_when_nodes_leave_and_join(panel: GraphPanel, windo
     assert len(places()) == 6
 
 
-def test_graph_with_many_nodes_starts_with_collapsed_groups(qtbot, window: Window) -> None:
+def test_groups_of_a_graph_with_many_nodes_are_collapsed_initially(qtbot, window: Window) -> None:
     many = tuple(NodeInfo(f"{n:x}", f"n{n}", f"host{n % 3}", 1, "", "native", n) for n in range(1, 202))
     show(window, GraphView(1, 2, {node.id: node for node in many}))
     window.session.nodes.update_ages(window.session.clock() + 100)
@@ -584,7 +588,7 @@ def test_export_menu_opens_a_file_dialog(panel: GraphPanel, window: Window, tmp_
     assert set(actions) == {"Image (SVG)", "Graph (DOT)"}
 
 
-def test_empty_graph_explains_what_to_do(qtbot, qapp) -> None:
+def test_empty_graph_suggests_next_steps(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.master = MasterState("connected", "127.0.0.1:7780")
     made = window.make(PANEL)

@@ -71,7 +71,7 @@ def test_unresponsive_robot_shows_a_next_step(panel, asked, virtual: bool, does:
     assert asked.commands == [does]
 
 
-def test_without_a_robot_the_panel_explains_what_to_do(qapp) -> None:
+def test_health_panel_without_a_robot_suggests_next_steps(qapp) -> None:
     asked = Window(Session())
     panel = asked.make(PANEL, (384, 300))
     assert panel.pages.currentWidget() is panel.empty
@@ -84,7 +84,7 @@ def test_without_a_robot_the_panel_explains_what_to_do(qapp) -> None:
     panel.dispose()
 
 
-def test_panel_follows_the_shown_robot_and_names_it_when_there_are_two(panel, asked) -> None:
+def test_panel_follows_the_selected_robot_and_names_the_robot_if_several_are_connected(panel, asked) -> None:
     assert asked.session.looked_at == ["Pepper"]
     assert panel.subtitle() == ""
     asked.session.join(pepper("Turtle"))
@@ -125,7 +125,7 @@ def test_health_panel_opens_with_robots_below_the_sensors(
     assert not bench.tabifiedDockWidgets(health)
 
 
-def test_health_panel_fits_the_smallest_window_and_stays_in_a_wider_one(
+def test_health_panel_opened_in_the_smallest_window_stays_open_in_a_wider_window(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     window.show()

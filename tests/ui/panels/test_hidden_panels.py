@@ -99,7 +99,7 @@ def settle(qtbot, case: Case, dock: Dock) -> None:
     case.tick()
 
 
-def test_closed_panel_watches_nothing_and_resumes_when_reopened(qtbot, case: Case) -> None:
+def test_closed_panel_watches_no_topics_and_resumes_when_reopened(qtbot, case: Case) -> None:
     case.window.show_layout("behaviour")
     camera = case.dock("camera")
     settle(qtbot, case, camera)
@@ -118,9 +118,7 @@ def test_closed_panel_watches_nothing_and_resumes_when_reopened(qtbot, case: Cas
 
 
 @pytest.mark.parametrize("how", ["closed", "behind a tab", "in the other layout", "minimised"])
-def test_hidden_panel_stops_watching_with_the_real_clock_too(
-    qtbot, theme: Theme, home: Path, how: str
-) -> None:
+def test_hidden_panel_ends_its_watches_with_the_real_clock(qtbot, theme: Theme, home: Path, how: str) -> None:
     case = Case(home, theme, own_clock=False)
     qtbot.addWidget(case.window)
     case.window.show()
@@ -145,7 +143,7 @@ def test_hidden_panel_stops_watching_with_the_real_clock_too(
     case.window.close()
 
 
-def test_panel_behind_another_tab_watches_nothing(qtbot, case: Case) -> None:
+def test_panel_behind_another_tab_watches_no_topics(qtbot, case: Case) -> None:
     case.window.show_layout("developer")
     image, inspector = case.dock("image"), case.dock("inspector")
     image.panel.show_topic(OTHER)
@@ -178,7 +176,7 @@ def test_quick_tab_switch_does_not_resubscribe(qtbot, case: Case) -> None:
     assert len(case.source.asked) == asked
 
 
-def test_hidden_layout_and_its_floating_panels_watch_nothing(qtbot, case: Case) -> None:
+def test_hidden_layout_and_its_floating_panels_watch_no_topics(qtbot, case: Case) -> None:
     case.window.show_layout("developer")
     image = case.dock("image")
     image.panel.show_topic(OTHER)
@@ -193,7 +191,7 @@ def test_hidden_layout_and_its_floating_panels_watch_nothing(qtbot, case: Case) 
     assert OTHER in case.source.wanted
 
 
-def test_minimised_window_watches_nothing_and_slows_its_timer(qtbot, case: Case) -> None:
+def test_minimised_window_watches_no_topics_and_slows_its_timer(qtbot, case: Case) -> None:
     case.window.show_layout("behaviour")
     camera = case.dock("camera")
     settle(qtbot, case, camera)
@@ -289,7 +287,7 @@ def test_robot_values_from_before_hiding_are_unknown_when_shown_again(qtbot, cas
     assert "battery" not in link.values
 
 
-def test_failed_panel_watches_nothing_until_it_is_retried(qtbot, case: Case) -> None:
+def test_failed_panel_watches_no_topics_until_retried(qtbot, case: Case) -> None:
     case.window.show_layout("behaviour")
     camera = case.dock("camera")
     settle(qtbot, case, camera)
@@ -306,7 +304,7 @@ def test_failed_panel_watches_nothing_until_it_is_retried(qtbot, case: Case) -> 
     assert CAMERA in case.source.wanted
 
 
-def test_every_panel_declares_its_watches_so_that_hiding_ends_them(case: Case) -> None:
+def test_hiding_all_panels_ends_every_watch(case: Case) -> None:
     """Whatever a panel opens is among its `looks`: nothing of it is wanted while no panel can be seen."""
     assert isinstance(case.window, QMainWindow)
     for layout in ("behaviour", "developer"):

@@ -96,7 +96,7 @@ def test_fluctuating_frame_rate_is_updated_once_per_second() -> None:
     assert words.for_stream(rates) == ""  # type: ignore[arg-type]
 
 
-def test_detection_boxes_of_a_frozen_image_are_frozen_too(view) -> None:
+def test_detection_boxes_of_a_frozen_image_are_frozen(view) -> None:
     stream, boxes = stream_of(picture()), boxes_of(FACES)
     view.show_image(stream, boxes)  # type: ignore[arg-type]
     stream.set_frozen(True)
@@ -117,7 +117,7 @@ def test_each_image_is_counted_as_shown_once(view) -> None:
     assert len(stream.painted) == 2
 
 
-def test_silent_stream_is_grey_and_shows_the_age_of_its_image(view) -> None:
+def test_stale_image_is_grey_and_shows_its_age(view) -> None:
     view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     before = view.grab().toImage().pixelColor(20, 80)
     view.show_image(stream_of(view._picture, silent_s=4.2))  # type: ignore[arg-type]
@@ -256,7 +256,7 @@ def test_image_panel_marks_detections_of_the_camera_robot(qtbot, qapp) -> None:
     assert window.session.looked_at == []
 
 
-def test_panel_without_images_explains_what_will_appear(qtbot, qapp) -> None:
+def test_image_panel_without_images_shows_an_empty_state_with_the_reason(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.images.camera = lambda _topic: None
     panel = made(qtbot, window)
@@ -407,7 +407,7 @@ def test_image_sequence_is_recorded_and_exported_from_a_recording_as_files(qtbot
     assert not action.isEnabled()
 
 
-def test_pixel_is_described_as_colour_or_number_or_left_out() -> None:
+def test_pixel_value_is_formatted_as_colour_or_number() -> None:
     assert pixel_text(1, 2, (255, 0, 16)) == "(1, 2)  255 0 16  #FF0010"
     assert pixel_text(1, 2, 820) == "(1, 2)  820"
     assert pixel_text(1, 2, 0.125) == "(1, 2)  0.125"
@@ -526,7 +526,7 @@ def test_zoom_rotation_and_flip_are_kept_per_topic(qtbot, qapp) -> None:
     assert panel.actions_of["across"].isChecked()
 
 
-def test_job_reports_in_the_gui_thread_and_not_after_closing(qtbot, qapp, tmp_path) -> None:
+def test_snapshot_job_reports_in_the_gui_thread_and_not_after_closing(qtbot, qapp, tmp_path) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     told: list[int] = []
@@ -561,7 +561,7 @@ def test_topic_without_images_offers_the_inspector(qtbot, qapp) -> None:
     assert panel.fit.isHidden()
 
 
-def test_camera_panel_shows_the_chosen_robot(qtbot, qapp) -> None:
+def test_camera_panel_shows_the_selected_robot(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.images.camera = lambda _topic: picture()
     for name in ("Pepper", "Nao"):
@@ -580,7 +580,7 @@ def test_camera_panel_shows_the_chosen_robot(qtbot, qapp) -> None:
     panel.dispose()
 
 
-def test_narrow_title_keeps_its_name_and_the_menu_has_all_actions(qtbot, qapp) -> None:
+def test_narrow_title_hides_buttons_and_the_menu_has_all_actions(qtbot, qapp) -> None:
     panel = made(qtbot, Window(Session.full()))
     assert not panel.fit.isHidden()
     panel.resize(220, 220)

@@ -85,7 +85,7 @@ def test_depth_image_has_a_colour_bar_with_selectable_colours_and_range(panel, w
     assert np.array_equal(shown(panel), usual)
 
 
-def test_brightness_and_contrast_apply_to_a_frozen_image_too(panel, window) -> None:
+def test_brightness_and_contrast_apply_to_a_frozen_image(panel, window) -> None:
     panel.show_topic(CAMERA)
     sends(window, panel, CAMERA, np.full((24, 32, 3), 100, np.uint8), "bgr8")
     assert panel.view.picture.scale is None

@@ -78,7 +78,7 @@ def click(qtbot, window: Window, panel: ImagePanel, x: float, y: float, key=LEFT
     return told.args[0]
 
 
-def test_panel_names_what_to_arm_and_one_click_publishes_one_message(qtbot, window, panel) -> None:
+def test_panel_names_the_topic_to_arm_and_one_click_publishes_one_message(qtbot, window, panel) -> None:
     session, points = window.session, panel.points
     assert not points.isVisible()
     QTest.keyClick(panel.view, Qt.Key.Key_P)
@@ -119,7 +119,7 @@ def test_panel_names_what_to_arm_and_one_click_publishes_one_message(qtbot, wind
     assert session.acting.repeat(entry.number).endswith(" isn't armed. Arm it first.")
 
 
-def test_keys_move_the_pixel_cursor_and_enter_publishes_it(qtbot, window, panel) -> None:
+def test_arrow_keys_move_the_pixel_cursor_and_enter_publishes_its_point(qtbot, window, panel) -> None:
     view = panel.view
     for key in (Qt.Key.Key_Left, Qt.Key.Key_Return):
         QTest.keyClick(view, key)  # not armed: nothing is pointed at
@@ -183,7 +183,7 @@ def test_keys_move_the_pixel_cursor_and_enter_publishes_it(qtbot, window, panel)
     assert view.pointed is None
 
 
-def test_drag_double_click_and_click_outside_publish_nothing(qtbot, window, panel) -> None:
+def test_drag_double_click_and_click_outside_the_image_publish_no_point(qtbot, window, panel) -> None:
     heard, view = arm(window, panel), panel.view
     told: list[PicturePoint] = []
     view.clicked.connect(told.append)
@@ -233,7 +233,7 @@ def test_two_clicks_at_two_positions_publish_two_points(qtbot, window, panel) ->
     assert words == ["Point (20, 50), received by 1", "Point (300, 50), received by 1"]
 
 
-def test_arming_elsewhere_does_not_arm_the_image_and_closing_disarms(qtbot, window, panel) -> None:
+def test_arming_elsewhere_does_not_arm_the_image_panel_and_closing_disarms(qtbot, window, panel) -> None:
     acting, points = window.session.acting, panel.points
     acting.arm()
     acting.allow(Target("topic", POINTS))
@@ -265,7 +265,7 @@ def test_arming_elsewhere_does_not_arm_the_image_and_closing_disarms(qtbot, wind
     assert points.kind.value == TYPES[1]
 
 
-def test_robot_command_topic_asks_again_and_another_source_disarms(qtbot, window, panel) -> None:
+def test_robot_command_topic_requires_confirmation_and_another_source_disarms(qtbot, window, panel) -> None:
     acting, points = window.session.acting, panel.points
     topic = window.session.fleet.connected[0].robot.topics.command
     panel.restore_state({**panel.save_state(), "point": {"on": True, "topic": topic, "type": "json"}})

@@ -56,7 +56,7 @@ def test_without_a_topic_the_inspector_links_to_the_topics_panel(panel, window) 
     assert window.commands == ["panel:topics"]
 
 
-def test_inspector_watches_exactly_the_shown_topic(panel, window) -> None:
+def test_inspector_watches_only_the_shown_topic(panel, window) -> None:
     panel.show_topic("/blackboard")
     panel.show_topic("/odom")
     assert window.session.watched == ["/odom"]
@@ -78,7 +78,7 @@ def test_newest_message_is_shown_as_a_tree_with_its_metadata(panel, window) -> N
     assert panel.live.text == "live"
 
 
-def test_latched_message_shows_when_it_was_sent(panel, window) -> None:
+def test_latched_message_shows_the_time_since_publication(panel, window) -> None:
     now = time.time_ns()
     half_an_hour_ago = Message("/a", b"1", "json", "json")
     half_an_hour_ago.kind = message_kind("/a", "json", "json", is_latched=True)
@@ -161,7 +161,7 @@ def test_changing_metadata_does_not_relayout_the_window(qapp, panel, window) -> 
     assert layouts.count == 0
 
 
-def test_fast_messages_are_shown_at_ten_hertz_and_the_last_one_always(panel, window) -> None:
+def test_fast_messages_are_shown_at_ten_hertz_and_the_last_message_always(panel, window) -> None:
     now = [0.0]
     panel.clock = lambda: now[0]
     panel.show_topic("/odom")
@@ -180,7 +180,7 @@ def test_fast_messages_are_shown_at_ten_hertz_and_the_last_one_always(panel, win
     assert panel.foot.facts.text().split("   ")[:2] == message_facts(panel._shown).split("   ")[:2]
 
 
-def test_new_topic_and_resumed_panel_show_the_current_message_at_once(panel, window) -> None:
+def test_new_topic_and_resumed_panel_show_the_current_message_immediately(panel, window) -> None:
     panel.clock = lambda: 5.0
     for topic, number, size in (("/blackboard", 1, "8 B"), ("/odom", 22, "9 B")):
         panel.show_topic(topic)
@@ -224,7 +224,7 @@ def test_undecodable_message_is_shown_as_bytes_with_the_reason(panel, window) ->
     assert not panel.body.sentence.isVisible()
 
 
-def test_raw_view_shows_the_bytes_of_a_valid_message_too(panel, window) -> None:
+def test_raw_view_shows_the_bytes_of_a_valid_message(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"a": 1})
     panel.refresh()
@@ -239,7 +239,7 @@ def test_raw_view_shows_the_bytes_of_a_valid_message_too(panel, window) -> None:
     assert panel.model.node(panel.model.index(0, 0)).key == "b"
 
 
-def test_freeze_holds_the_message_until_it_is_pressed_again(panel, window) -> None:
+def test_freeze_button_holds_the_message_until_released(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"n": 1})
     panel.refresh()
@@ -410,7 +410,7 @@ def test_search_finds_keys_and_values(panel, window) -> None:
     assert panel.finder.field.property("wrong") == "true"
 
 
-def test_vanished_topic_shows_since_when_and_keeps_its_last_message(panel, window) -> None:
+def test_removed_topic_shows_the_time_since_removal_and_keeps_its_last_message(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"n": 1})
     panel.refresh()
@@ -438,7 +438,7 @@ def test_values_are_copied_to_the_clipboard_as_plain_text(value: object, words: 
     assert clipboard_text(value) == words
 
 
-def test_search_counts_matches_and_steps_both_ways_across_messages(panel, window) -> None:
+def test_search_counts_matches_and_steps_forwards_and_backwards_across_messages(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"a": "x1", "b": "x2", "c": "x3"})
     panel.refresh()
@@ -463,7 +463,7 @@ def test_search_counts_matches_and_steps_both_ways_across_messages(panel, window
     assert panel.finder.field.count == "none"
 
 
-def test_message_is_compared_with_the_previous_one_and_only_changes_can_be_shown(panel, window) -> None:
+def test_message_is_compared_with_the_previous_message_and_only_changes_can_be_shown(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"same": 1, "n": 1, "gone": 2})
     panel.refresh()
@@ -485,7 +485,7 @@ def test_message_is_compared_with_the_previous_one_and_only_changes_can_be_shown
     assert [node.mark for node in top(panel)] == ["", "", ""]
 
 
-def test_pinned_message_stays_the_reference_of_the_comparison(panel, window) -> None:
+def test_pinned_message_is_kept_as_the_reference_of_the_comparison(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"n": 1})
     panel.refresh()

@@ -41,7 +41,7 @@ def test_missing_value_differs_from_null() -> None:
     assert mark_of(None, NO_BASE) == ""
 
 
-def test_changed_children_are_marked_and_removed_ones_are_listed_last() -> None:
+def test_changed_children_are_marked_and_removed_children_are_listed_last() -> None:
     before, after = {"x": 1, "gone": 2, "same": 3}, {"x": 5, "same": 3, "new": {"deep": 1}}
     parts, total = parts_of(after, before, "changed", 9, changes_only=False)
     assert total == 4
@@ -107,14 +107,14 @@ def test_changes_only_hides_equal_items_and_switching_back_shows_all(qtmodeltest
     qtmodeltester.check(model)
 
 
-def test_changes_only_is_empty_without_differences() -> None:
+def test_changes_only_view_is_empty_without_differences() -> None:
     model = TreeModel()
     model.set_value(AFTER, 0.0)
     model.set_value(AFTER, 1.0, dict(AFTER), changes_only=True)
     assert model.rowCount() == 0
 
 
-def test_scalar_messages_are_compared_too() -> None:
+def test_scalar_messages_are_compared() -> None:
     model = TreeModel()
     model.set_value(5, 0.0, 4)
     node = model.node(model.index(0, 0))

@@ -90,7 +90,7 @@ def test_input_starting_with_dollar_is_a_query_and_the_tree_shows_its_results(pa
     assert panel.strip.isVisible()
 
 
-def test_invalid_query_shows_an_error_until_it_is_corrected(panel, window, soon) -> None:
+def test_invalid_query_shows_an_error_until_corrected(panel, window, soon) -> None:
     send(window, panel, seen(7))
     panel.finder.field.setText("$.people[")
     assert panel.query.words.text().startswith("the query is incomplete: ")
@@ -165,7 +165,9 @@ def test_list_of_objects_is_a_table_whose_order_is_stable_while_values_change(pa
     assert window.toasts[-1] == "Copied 4 rows as CSV"
 
 
-def test_table_shows_the_first_or_the_chosen_list_and_reports_when_there_is_none(panel, window) -> None:
+def test_table_shows_the_first_or_the_selected_list_and_reports_a_message_without_lists(
+    panel, window
+) -> None:
     send(window, panel, seen(7))
     as_table(panel)
     assert table(panel) == [["0", "Ann", "7"]]
@@ -181,7 +183,7 @@ def test_table_shows_the_first_or_the_chosen_list_and_reports_when_there_is_none
     assert not panel.body.objects.copy.isEnabled()
 
 
-def test_query_result_is_shown_as_a_table_too(panel, window, soon) -> None:
+def test_query_result_is_shown_as_a_table(panel, window, soon) -> None:
     send(window, panel, seen(7, 41, 30))
     panel.finder.field.setText("$.people[?@.age > 18]")
     as_table(panel)

@@ -97,7 +97,7 @@ def test_only_changed_values_are_marked(model) -> None:
     assert told.count() == 2  # one for each container with changes
 
 
-def test_nan_that_stays_nan_is_not_a_change() -> None:
+def test_nan_followed_by_nan_is_not_a_change() -> None:
     model = TreeModel()
     model.set_value({"x": float("nan")}, 0.0)
     model.set_value({"x": float("nan")}, 1.0)

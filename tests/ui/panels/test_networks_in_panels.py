@@ -99,7 +99,7 @@ def test_network_column_is_hidden_without_other_networks(qtbot, window: Window, 
     assert panel.table.isColumnHidden(place)
 
 
-def test_ros_topics_are_listed_with_native_ones_and_mark_unknown_values(
+def test_ros_topics_are_listed_with_native_topics_and_mark_unknown_values(
     qtbot, window: Window, look: Look
 ) -> None:
     panel = window.make(TOPICS)

@@ -87,7 +87,7 @@ def test_toast_closes_once_its_condition_is_met(qtbot, theme: Theme) -> None:
 
 
 @pytest.mark.parametrize("panel", [camera.PANEL, health.PANEL, robot.PANEL, robots.PANEL, sensors.PANEL])
-def test_newly_opened_panel_shows_the_robot_at_once(qtbot, panel) -> None:
+def test_newly_opened_panel_shows_the_robot_immediately(qtbot, panel) -> None:
     made = panel.make(Window(fakes.Session.full()).context())
     qtbot.addWidget(made)
     for widget in made.header_widgets():

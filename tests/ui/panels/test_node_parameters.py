@@ -145,7 +145,7 @@ def test_value_is_set_with_return_and_rejected_input_is_kept(qtbot, world: World
     assert part.model.cell_at(0, 1).tint == ""
 
 
-def test_typed_text_is_not_overwritten_by_updates_and_esc_discards_it(world: World) -> None:
+def test_typed_text_is_not_overwritten_by_updates_and_is_discarded_by_esc(world: World) -> None:
     part = world.part
     part.table.select_key("speed")
     part.field.selectAll()
@@ -160,7 +160,7 @@ def test_typed_text_is_not_overwritten_by_updates_and_esc_discards_it(world: Wor
     assert part.field.text() == "1.0"
 
 
-def test_choice_applies_at_once(qtbot, world: World) -> None:
+def test_selected_parameter_choice_is_applied_immediately(qtbot, world: World) -> None:
     part = world.part
     part.table.select_key("gait")
     assert part.editors.currentIndex() == CHOICE
@@ -190,7 +190,7 @@ def test_disabled_field_explains_why_a_parameter_cannot_be_set(world: World) -> 
     assert part.model.cell_at(0, 0).role == "textDisabled"
 
 
-def test_node_without_parameters_explains_what_to_do(world: World) -> None:
+def test_node_without_parameters_suggests_next_steps(world: World) -> None:
     world.choose("bare")
     assert not world.part.isVisibleTo(world.panel)
     assert (

@@ -77,7 +77,7 @@ def shown(panel: NodesPanel) -> list[list[str]]:
     return [[model.data(model.index(row, place)) for place in places] for row in range(model.rowCount())]
 
 
-def test_every_node_is_listed_with_its_facts(panel) -> None:
+def test_every_node_is_listed_with_its_details(panel) -> None:
     here = platform.node()
     assert shown(panel) == [
         ["camera_driver", "native", "Python", "lab-pc", "411", "12 %", "2", "0"],
@@ -86,7 +86,7 @@ def test_every_node_is_listed_with_its_facts(panel) -> None:
     ]
 
 
-def test_expanded_node_shows_its_topics_and_a_click_opens_one(panel, window) -> None:
+def test_expanded_node_shows_its_topics_and_a_click_opens_a_topic(panel, window) -> None:
     panel.table.select_key(NodeRow(next(iter(window.session.nodes))).key)
     QTest.keyClick(panel.table, Qt.Key.Key_Return)
     assert [line[:2] for line in shown(panel)][:3] == [
@@ -116,7 +116,7 @@ def test_arrow_keys_expand_and_collapse(panel, window) -> None:
     assert panel.table.selected_key() == NodeRow(window.session.nodes.get("1")).key
 
 
-def test_node_without_topics_expands_too(panel, window) -> None:
+def test_node_without_topics_can_be_expanded(panel, window) -> None:
     window.session.nodes.update(graph(2, (*NODES, NodeInfo("4", "idle", "h", 1, "", "native", 1))), 1.0)
     panel.refresh()
     place = [line[0] for line in shown(panel)].index("idle")
@@ -143,7 +143,7 @@ def test_new_nodes_are_bold_until_expanded_except_studio(panel, window) -> None:
     assert chip("arm") is None
 
 
-def test_vanished_node_is_struck_through_for_ten_seconds(panel, window) -> None:
+def test_removed_node_is_struck_through_for_ten_seconds(panel, window) -> None:
     nodes = window.session.nodes
     nodes.update(graph(2, NODES[1:]), 1.0)
     nodes.update_ages(5.2)
@@ -190,7 +190,7 @@ def test_unsupported_version_is_flagged_with_the_fix() -> None:
     assert limits_of(node).endswith("Install 0.5.4.8 or 0.5.4.5.")
 
 
-def test_unknown_facts_are_left_out() -> None:
+def test_unknown_node_details_are_omitted() -> None:
     assert facts_of(NodeEntry("1", "bare")) == "bare"
     assert cpu_text(None) == ""
     assert (cpu_text(0.0), cpu_text(0.099), cpu_text(0.0999)) == ("0.0 %", "9.9 %", "10 %")
@@ -222,7 +222,7 @@ def test_cpu_load_is_updated_when_reported_and_sorted_once_per_second(panel, win
     ("kind", "words", "pressed"),
     [("none", "No master is running", "Start a master here"), ("connected", "No nodes yet", None)],
 )
-def test_empty_panel_explains_what_to_do_next(qtbot, qapp, kind, words, pressed) -> None:
+def test_empty_panel_suggests_next_steps(qtbot, qapp, kind, words, pressed) -> None:
     window = Window(Session())
     window.session.master = MasterState(kind, window.session.master.address)
     panel = window.make(PANEL)

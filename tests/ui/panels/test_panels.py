@@ -55,7 +55,7 @@ def test_each_module_exports_one_panel_of_its_name_with_a_known_icon(name) -> No
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("session", [Session, Session.full], ids=["empty", "full"])
-def test_each_panel_survives_its_whole_life_cycle(qtbot, qapp, name, session) -> None:
+def test_full_life_cycle_of_each_panel_raises_no_error(qtbot, qapp, name, session) -> None:
     window = Window(session())
     panel = window.make(description(name), (500, 400))
     qtbot.addWidget(panel)
@@ -104,7 +104,7 @@ def test_every_control_has_an_accessible_name(qtbot, qapp, name) -> None:
 @pytest.mark.parametrize(
     "name", sorted(set(NAMES) - {"behaviour"})
 )  # its page of the web says it: test_guidance
-def test_empty_panel_explains_what_to_do_next(qtbot, qapp, name) -> None:
+def test_empty_panel_suggests_next_steps(qtbot, qapp, name) -> None:
     from PySide6.QtWidgets import QLabel
 
     window = Window(Session())
@@ -127,7 +127,7 @@ def imported_panels(folder: Path) -> Iterator[tuple[str, str]]:
                 yield from ((own, each or alias.name) for alias in node.names for each in [other])
 
 
-def test_panels_do_not_import_panels() -> None:
+def test_panel_modules_do_not_import_other_panels() -> None:
     found = list(imported_panels(Path(app.ui.panels.__path__[0])))
     assert ("inspector", "inspector") in found, "panels that are folders are read, too"
     assert [(own, other) for own, other in found if other not in {own, *BASES}] == []

@@ -28,7 +28,7 @@ def panel(qtbot, window) -> ProblemsPanel:
     return made
 
 
-def test_each_problem_is_shown_with_its_sentence_and_fix(panel, window) -> None:
+def test_each_problem_is_shown_with_its_message_and_fix(panel, window) -> None:
     assert [row.problem.subject for row in panel.rows] == ["wave", "wait until"]
     assert panel.rows[0].accessibleName() == "warning: NAO isn't connected, so wave will be skipped."
     assert (panel.chip.text, panel.chip.status) == ("2", "warn")
@@ -75,7 +75,7 @@ def test_panel_without_problems_shows_an_empty_state(qtbot, qapp) -> None:
     assert (panel.chip.text, panel.chip.status) == ("No problems", "ok")
 
 
-def test_missing_robot_is_one_row_with_the_robots_that_can_replace_it(panel, window, monkeypatch) -> None:
+def test_missing_robot_is_one_row_that_lists_possible_replacements(panel, window, monkeypatch) -> None:
     document = window.session.document
     absent = [
         Problem("warning", f"b{n}", "robot", "say", "Pepper 2 isn't connected, so say will be skipped.",
@@ -106,7 +106,7 @@ def test_arrow_keys_move_through_the_problems(panel, window) -> None:
     assert has_keys(panel.rows[0])
 
 
-def test_tab_moves_through_the_problems_including_later_ones(qtbot, panel, window) -> None:
+def test_tab_moves_through_the_problems_including_later_problems(qtbot, panel, window) -> None:
     document = window.session.document
     document.found = (Problem("error", None, None, "x", "x is not known."), *document.found)
     document.edits += 1

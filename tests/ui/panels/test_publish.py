@@ -88,7 +88,7 @@ def test_auto_indent_keeps_the_indentation_of_the_line(panel) -> None:
     assert edit.toPlainText() == '{\n  "x": 1,\n  "y": 2\n}'
 
 
-def test_sending_arms_only_this_topic_and_the_switch_disarms_it(window, panel) -> None:
+def test_sending_arms_only_the_topic_of_the_message_and_the_switch_disarms(window, panel) -> None:
     session, acting = window.session, acting_of(window)
     heard = session.source.listen("/cmd_vel", "json")
     panel.list.select_key("b")
@@ -115,7 +115,7 @@ def test_sending_arms_only_this_topic_and_the_switch_disarms_it(window, panel) -
     assert panel.strip.words.text() == "Sending is off"
 
 
-def test_stop_source_change_and_closing_disarm(window, panel) -> None:
+def test_stop_change_of_source_and_closing_disarm(window, panel) -> None:
     acting = acting_of(window)
     for end in (window.session.runs.stop, panel.dispose):
         assert acting.arm() == ""
@@ -138,7 +138,7 @@ def test_arming_expires_after_its_time_limit(window, panel) -> None:
     assert not panel.strip.switch.isChecked()
 
 
-def test_robot_command_topic_asks_for_confirmation_again(window, panel) -> None:
+def test_robot_command_topic_requires_another_confirmation(window, panel) -> None:
     session, acting = window.session, acting_of(window)
     topic = session.fleet.connected[0].robot.topics.command
     heard = session.source.listen(topic, "json")
@@ -257,7 +257,7 @@ def test_publish_is_in_the_menu_of_every_topic(qtbot, window) -> None:
     assert "Publish to this topic" not in [each.text for each in table.row_actions("/robot/camera")]
 
 
-def test_nothing_can_be_armed_while_a_recording_is_shown(window, panel, monkeypatch) -> None:
+def test_sending_cannot_be_armed_while_a_recording_is_shown(window, panel, monkeypatch) -> None:
     monkeypatch.setattr(type(window.session), "is_replaying", True)
     assert acting_of(window).send(STILL) == "A recording is open. Return to live to send."
     ticks(window, panel, 7)

@@ -10,7 +10,7 @@ def let_through(pace: UpdateLimiter, begin_s: float, seconds: float, hz: float =
     return sum(pace.try_acquire(begin_s + turn / hz) for turn in range(round(seconds * hz)))
 
 
-def test_first_updates_pass_in_a_burst_and_later_ones_are_throttled() -> None:
+def test_first_updates_pass_in_a_burst_and_later_updates_are_throttled() -> None:
     pace = UpdateLimiter()
     assert [pace.try_acquire(100.0) for _turn in range(BURST + 1)] == [True] * BURST + [False]
     assert MAX_UPDATE_HZ * 10 - 2 <= let_through(pace, 100.0, 10.0) <= MAX_UPDATE_HZ * 10 + 2
@@ -30,7 +30,7 @@ def test_throttle_can_be_reset_and_external_updates_count() -> None:
     assert pace.try_acquire(9.21)
 
 
-def test_clock_set_back_does_not_bypass_the_throttle() -> None:
+def test_backward_clock_step_does_not_bypass_the_throttle() -> None:
     pace = UpdateLimiter(burst=1)
     assert pace.try_acquire(50.0)
     assert not pace.try_acquire(10.0)

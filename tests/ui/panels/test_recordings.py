@@ -80,7 +80,7 @@ def choose(panel: RecordingsPanel, folder: Path, name: str) -> RecordingTable:
     return table
 
 
-def test_each_recording_is_listed_with_its_facts_and_badges(qtbot, panel, window, folder):
+def test_each_recording_is_listed_with_its_details_and_badges(qtbot, panel, window, folder):
     assert panel.empty.isVisible() or panel._has_looked, "until the folder was looked at, it says so"
     seen(qtbot, panel, "arm", "camera", "cut")
     facts = {each.path.stem: each for each in panel._look.files}
@@ -167,7 +167,7 @@ def test_delete_moves_to_the_trash_and_undo_restores(qtbot, panel, window, folde
     seen(qtbot, panel, "arm", "camera", "cut")
 
 
-def test_active_recording_shows_its_figures_and_cannot_be_renamed(qtbot, panel, window, folder):
+def test_active_recording_shows_its_stats_and_cannot_be_renamed(qtbot, panel, window, folder):
     client = window.session.recordings.client
     client.state = RecorderState(
         "recording", folder / "arm.mcap", message_count=77, size_bytes=10**9, duration_s=61.0, lost=3
@@ -206,7 +206,9 @@ def test_export_runs_in_the_background_and_reports_its_result(qtbot, panel, wind
     assert panel.details.export.text() == "Export"
 
 
-def test_time_range_and_topics_to_export_are_chosen_by_mouse_and_keys(qtbot, panel, window, folder, tmp_path):
+def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
+    qtbot, panel, window, folder, tmp_path
+):
     messages = [json_message(seq, f"/{'ab'[seq % 2]}") for seq in range(1000)]  # 10 s
     record(folder / "long.mcap", [[*messages[:500], picture(1)], messages[500:]])
     seen(qtbot, panel, "arm", "camera", "cut", "long")
@@ -310,7 +312,7 @@ def test_filter_finds_names_notes_and_topics(qtbot, panel):
     assert panel.empty.isVisible()
 
 
-def test_empty_folder_and_missing_folder_explain_what_to_do(qtbot, panel, window, folder, tmp_path):
+def test_empty_folder_and_missing_folder_suggest_next_steps(qtbot, panel, window, folder, tmp_path):
     seen(qtbot, panel, "arm", "camera", "cut")
     window.session.recordings.set_folder(tmp_path / "stick")
 

@@ -51,7 +51,7 @@ def test_each_part_of_the_state_is_drawn(qapp, change) -> None:
     assert differing(painted(plain), painted(replace(plain, **change))) > 0
 
 
-def test_each_emotion_has_its_own_face(qapp) -> None:
+def test_each_emotion_has_a_different_face(qapp) -> None:
     faces = {}
     for emotion in ("neutral", "happy", "sad", "surprised", "angry", "thinking", "sleepy"):
         assert emotion in EMOTIONS
@@ -77,7 +77,7 @@ def test_drawing_is_dimmed_in_the_dark_theme(qapp) -> None:
     assert dark.pixelColor(5, 5).lightness() < light.pixelColor(5, 5).lightness()
 
 
-def test_robot_turns_to_its_left_which_is_right_for_the_viewer(qapp) -> None:
+def test_left_turn_of_the_robot_is_drawn_to_the_right_of_the_viewer(qapp) -> None:
     """The eyes' colour wanders with the heading, and is hidden from behind."""
 
     def eyes(theta_deg: float) -> list[int]:
@@ -96,7 +96,7 @@ def test_robot_turns_to_its_left_which_is_right_for_the_viewer(qapp) -> None:
 
 @pytest.mark.parametrize("part", ["head", "left_hand", "right_hand", "ball"])
 @pytest.mark.parametrize("size", [(382, 286), (700, 300)])
-def test_hit_test_finds_parts_where_they_are_drawn(qapp, part, size) -> None:
+def test_hit_test_finds_parts_at_their_drawn_position(qapp, part, size) -> None:
     area, pen = QRectF(0, 0, *size), RobotDrawing()
     state = replace(PREVIEW, arm_left_deg=100.0)
     place = pen.point_of(part, area, state)

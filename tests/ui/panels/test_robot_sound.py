@@ -36,7 +36,7 @@ def test_mute_setting_is_saved(panel, window) -> None:
     assert window.session.settings.get(SOUND_SETTING, False)
 
 
-def test_mute_button_shows_why_robots_are_silent(panel, window) -> None:
+def test_mute_button_shows_the_reason_for_a_missing_voice(panel, window) -> None:
     speaker = window.session.voices.speaker = FakeSpeaker()
     panel.refresh()
     assert "no voice" not in panel.sound.toolTip()
@@ -48,7 +48,7 @@ def test_mute_button_shows_why_robots_are_silent(panel, window) -> None:
     assert "no voice" not in panel.sound.toolTip()
 
 
-def test_sound_is_shown_in_a_bubble_beside_its_name() -> None:
+def test_sound_is_shown_in_a_bubble_next_to_its_name() -> None:
     played = {"title": "bell", "number": 1, "notes": [[880, 0.3]], "played": 0.1}
     assert RobotState.parse({"sound": played}).caption == "♪\N{NO-BREAK SPACE}bell"
     assert RobotState.parse({"speech": "Hi", "sound": played}).caption == "Hi ♪\N{NO-BREAK SPACE}bell"
@@ -68,7 +68,7 @@ def test_sound_bubble_is_painted(panel, window) -> None:
     assert panel.view.accessibleDescription() == "♪\N{NO-BREAK SPACE}bell"
 
 
-def test_speaker_is_named_below_after_its_bubble_disappeared(panel, window) -> None:
+def test_speaker_is_named_in_the_caption_while_speaking(panel, window) -> None:
     panel.refresh()
     before = panel.view.grab().toImage()
     window.session.voices._current = Utterance("Ginger", "And I say", "en", 0.5)

@@ -63,7 +63,7 @@ def test_unchanged_state_is_not_repainted(panel, window, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize("how", ["away", "mute", "old"])
-def test_silent_robot_is_grey_and_its_speech_bubble_disappears(panel, window, monkeypatch, how) -> None:
+def test_robot_without_recent_state_is_grey_and_has_no_speech_bubble(panel, window, monkeypatch, how) -> None:
     link = window.session.fleet.links[0]
     link.drawing = drawing(speech="Hello!")
     panel.refresh()
@@ -91,20 +91,20 @@ def test_silent_robot_is_grey_and_its_speech_bubble_disappears(panel, window, mo
 
 
 @pytest.mark.parametrize("part", ["head", "left_hand", "right_hand"])
-def test_pressing_a_part_touches_it_and_releasing_ends_the_touch(panel, window, part) -> None:
+def test_pressing_a_body_part_touches_the_part_until_released(panel, window, part) -> None:
     QTest.mousePress(panel.view, Qt.MouseButton.LeftButton, pos=point(panel, part))
     assert window.session.changes("Pepper") == [{"touch": part, "down": True}]
     QTest.mouseRelease(panel.view, Qt.MouseButton.LeftButton, pos=point(panel, part))
     assert window.session.changes("Pepper") == [{"touch": part, "down": False}]
 
 
-def test_robot_is_touched_by_keyboard_too(panel, window) -> None:
+def test_robot_is_touched_with_the_keyboard(panel, window) -> None:
     QTest.keyPress(panel.view, Qt.Key.Key_H)
     QTest.keyRelease(panel.view, Qt.Key.Key_H)
     assert [change["down"] for change in window.session.changes("Pepper")] == [True, False]
 
 
-def test_space_touches_the_head_while_it_is_held(panel, window) -> None:
+def test_space_touches_the_head_while_pressed(panel, window) -> None:
     QTest.keyPress(panel.view, Qt.Key.Key_Space)
     assert window.session.changes("Pepper") == [{"touch": "head", "down": True}]
     QTest.keyRelease(panel.view, Qt.Key.Key_Space)
@@ -130,7 +130,7 @@ def test_ball_is_dragged_over_the_floor(panel, window) -> None:
     assert -3 <= moves[-1]["x"] <= 3
 
 
-def test_press_outside_all_objects_does_nothing(panel, window) -> None:
+def test_press_outside_all_objects_has_no_effect(panel, window) -> None:
     QTest.mouseClick(panel.view, Qt.MouseButton.LeftButton, pos=panel.view.rect().topLeft())
     assert window.session.changes("Pepper") == []
 
@@ -141,7 +141,7 @@ def test_reset_restores_the_initial_positions(panel, window) -> None:
     assert window.session.changes("Pepper") == [{"reset": True}]
 
 
-def test_without_a_robot_the_virtual_one_is_offered(qtbot, qapp) -> None:
+def test_panel_without_a_robot_offers_the_virtual_robot(qtbot, qapp) -> None:
     window = Window(Session())
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
@@ -174,7 +174,7 @@ def test_real_robot_has_a_link_to_its_actions_instead_of_a_drawing(qtbot, qapp) 
         (lambda sensor: False, "This robot reports no state, but you can try its actions."),
     ],
 )
-def test_robot_without_a_drawing_lists_only_its_capabilities(qtbot, kept, words) -> None:
+def test_hint_for_a_robot_without_a_drawing_mentions_only_available_sensors(qtbot, kept, words) -> None:
     window = Window(Session())
     whole = pepper("Table")
     robot = replace(whole, virtual=False, sensors=tuple(sensor for sensor in whole.sensors if kept(sensor)))
@@ -185,7 +185,7 @@ def test_robot_without_a_drawing_lists_only_its_capabilities(qtbot, kept, words)
 
 
 @pytest.mark.parametrize("is_tried", [False, True])
-def test_run_resets_to_the_start_position_and_a_tried_block_does_not(qapp, is_tried: bool) -> None:
+def test_run_resets_robots_to_the_start_position_and_a_tried_block_does_not(qapp, is_tried: bool) -> None:
     session = Session.full()
     turn = block("robot_virtual_pepper_do_turn", "t", ROBOT="Pepper", DIRECTION="left", ANGLE=number(90))
     session.document.apply_edit(workspace(started(turn)))

@@ -42,7 +42,7 @@ def test_every_action_except_stop_is_a_card(panel) -> None:
     assert panel.cards["walk"].risk.text == "moves the robot"
 
 
-def test_try_sends_the_input_of_the_form(panel, window) -> None:
+def test_try_button_sends_the_input_of_the_form(panel, window) -> None:
     panel.cards["turn"].form.set_input({"angle": -45.0})
     press(panel.cards["turn"].try_button)
     assert window.session.asked("Pepper") == [("invoke", "turn", {"angle": -45.0, "speed": 40.0})]
@@ -93,7 +93,7 @@ def test_running_action_shows_progress_and_can_be_cancelled(panel, window) -> No
     assert card.words.text() == ""
 
 
-def test_action_that_cannot_be_cancelled_disables_its_button_while_running(panel, window) -> None:
+def test_non_cancellable_action_disables_its_button_while_running(panel, window) -> None:
     window.session.fleet.links[0].invocations["light"] = Invocation("1", "light", "running")
     panel.refresh()
     assert not panel.cards["light"].try_button.isEnabled()
@@ -141,7 +141,7 @@ def test_stop_stops_the_selected_robot(panel, window) -> None:
     assert window.session.fleet.stopping_robots == ("Pepper",)
 
 
-def test_another_robot_can_be_selected_and_only_that_one_is_watched(panel, window) -> None:
+def test_only_the_selected_robot_is_watched(panel, window) -> None:
     link = window.session.join(pepper("Turtle"), virtual=False)
     link.invocations["walk"] = Invocation("1", "walk")
     panel.refresh()
@@ -161,7 +161,7 @@ def test_forms_keep_typed_input_when_other_robots_connect(panel, window) -> None
     assert panel.cards["say"].form.input()["text"] == "half a sentence"
 
 
-def test_without_a_robot_the_virtual_one_is_offered(qtbot, qapp) -> None:
+def test_panel_without_a_robot_offers_the_virtual_robot(qtbot, qapp) -> None:
     window = Window(Session())
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
@@ -175,7 +175,7 @@ def remember(window, name: str, seen_s: float) -> None:
     window.session.fleet.known._settings.set(KEY, [*told, {"name": name, "seen_s": seen_s}])
 
 
-def test_robot_of_an_earlier_session_is_listed_as_disconnected_and_can_be_forgotten(qtbot, window) -> None:
+def test_robot_of_an_earlier_session_is_listed_as_disconnected_and_can_be_removed(qtbot, window) -> None:
     remember(window, "NAO", time.time() - 86_400 * 400)
     panel = window.make(PANEL, (1032, 800))
     qtbot.addWidget(panel)
@@ -189,7 +189,7 @@ def test_robot_of_an_earlier_session_is_listed_as_disconnected_and_can_be_forgot
     assert list(panel.items) == ["Pepper"]
 
 
-def test_without_connected_robots_known_ones_are_listed_in_the_empty_state(qtbot) -> None:
+def test_known_robots_are_listed_in_the_empty_state_if_none_is_connected(qtbot) -> None:
     window = Window(Session())
     remember(window, "NAO", 0.0)
     panel = window.make(PANEL, (1032, 800))
@@ -198,7 +198,7 @@ def test_without_connected_robots_known_ones_are_listed_in_the_empty_state(qtbot
     assert panel.list.away["NAO"].isVisible()
 
 
-def test_disconnected_robot_shows_when_it_was_seen_and_is_removed_when_forgotten(panel, window) -> None:
+def test_disconnected_robot_shows_its_last_seen_time_and_can_be_removed(panel, window) -> None:
     fleet = window.session.fleet
     link = window.session.join(pepper("Rover"), virtual=False)
     fleet.known.record([link.robot])
@@ -224,6 +224,6 @@ def test_connected_robot_has_no_menu(panel) -> None:
         ((2026, 12, 1, 9, 0), "seen 20 November, 16:20"),
     ],
 )
-def test_last_seen_time_is_formatted_in_plain_words(now, words) -> None:
+def test_last_seen_time_is_formatted_relative_to_today(now, words) -> None:
     seen = dt.datetime(2026, 11, 20, 16, 20, tzinfo=dt.timezone.utc)
     assert seen_text(seen.timestamp(), dt.datetime(*now, tzinfo=dt.timezone.utc)) == words

@@ -72,7 +72,7 @@ def thing(window: Window, name: str) -> tuple[float, float]:
     return found.x, found.y
 
 
-def test_both_robots_are_in_one_drawing(panel, window) -> None:
+def test_both_robots_are_shown_in_one_drawing(panel, window) -> None:
     both = panel.view.grab().toImage()
     assert panel.view.position_of("Turtle/body") is not None
     window.session.fleet.links[1].drawing = of_turtle(x=0.2, y=1.5)
@@ -117,7 +117,7 @@ def test_robot_is_picked_up_moved_and_put_down(panel, window) -> None:
     assert window.session.changes("Pepper")[0] == {"hold": True}
 
 
-def test_press_without_a_move_moves_nothing(panel, window) -> None:
+def test_click_without_a_drag_moves_no_object(panel, window) -> None:
     QTest.mouseClick(panel.view, LEFT, pos=point(panel, "body"))
     QTest.mouseClick(panel.view, LEFT, pos=point(panel, "ball"))
     assert window.session.changes("Pepper") == []
@@ -127,7 +127,7 @@ def test_press_without_a_move_moves_nothing(panel, window) -> None:
 @pytest.mark.parametrize(
     ("at", "side"), [(0, "front"), (35, "front"), (90, "right"), (-90, "left"), (180, "back")]
 )
-def test_click_on_the_small_robot_presses_the_bumper_on_that_side(panel, window, at, side) -> None:
+def test_click_on_the_turtle_robot_presses_the_bumper_on_that_side(panel, window, at, side) -> None:
     window.session.fleet.links[1].drawing = of_turtle(theta_deg=at)
     panel.refresh()
     toes = point(panel, "Turtle/body") + QPoint(0, round(panel.view.height() / 286 * 31 * 1.1))
@@ -181,7 +181,7 @@ def test_object_selected_with_tab_is_moved_and_removed_by_keyboard(panel, window
     assert window.session.changes("Turtle") == []
 
 
-def test_tab_leaves_the_room_after_the_last_object(panel, window) -> None:
+def test_tab_moves_focus_out_of_the_room_after_the_last_object(panel, window) -> None:
     panel.view.setFocus()
     for _turn in range(8):
         QTest.keyClick(panel.view, Qt.Key.Key_Tab)
@@ -245,7 +245,7 @@ def large(qtbot, panel) -> LargeRoom:
     return found
 
 
-def test_double_click_enlarges_the_room_and_another_one_restores_it(panel, large) -> None:
+def test_double_click_enlarges_the_room_and_another_double_click_restores_its_size(panel, large) -> None:
     assert panel.view.width() == 900
     assert large.isAncestorOf(panel.view)
     large.parentWidget().resize(1000, 720)
@@ -272,7 +272,7 @@ def test_room_fills_the_screen_and_esc_leaves_full_screen(panel, large) -> None:
     assert panel.isAncestorOf(panel.view)
 
 
-def test_large_room_is_furnished_and_reset_by_its_own_buttons(panel, large, window) -> None:
+def test_room_is_furnished_and_reset_by_buttons_of_the_enlarged_view(panel, large, window) -> None:
     buttons = {each.accessibleName(): each for each in large.findChildren(IconButton)}
     press(buttons["Add something to the room"])
     choose(panel, "Add a ball")
@@ -281,7 +281,7 @@ def test_large_room_is_furnished_and_reset_by_its_own_buttons(panel, large, wind
     assert window.session.room.room.thing("ball 2") is None
 
 
-def test_large_room_keeps_updating(panel, large, window) -> None:
+def test_enlarged_room_keeps_updating(panel, large, window) -> None:
     before = panel.view.grab().toImage()
     window.session.fleet.links[1].drawing = of_turtle(x=0.2, y=1.5)
     panel.refresh()

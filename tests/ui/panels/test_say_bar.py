@@ -47,7 +47,7 @@ def choose(panel: RobotPanel, words: str) -> None:
     QTest.mouseClick(opened, Qt.MouseButton.LeftButton, pos=place)
 
 
-def test_typed_words_are_said_to_the_robot_with_return(panel, window) -> None:
+def test_typed_words_are_sent_to_the_robot_with_return(panel, window) -> None:
     assert panel.say.field.placeholderText() == "Say something to Pepper"
     QTest.keyClicks(panel.say.field, " good morning ")
     assert window.session.changes("Pepper") == []
@@ -60,7 +60,7 @@ def test_typed_words_are_said_to_the_robot_with_return(panel, window) -> None:
     assert panel.say.field.text() == "good morning"
 
 
-def test_room_shows_what_the_robot_heard(panel, window) -> None:
+def test_room_shows_the_words_heard_by_the_robot(panel, window) -> None:
     link = window.session.fleet.links[0]
     link.drawing = {**drawing(), "speech": "", "heard": "good morning"}
     panel.refresh()

@@ -87,7 +87,7 @@ def test_common_sensors_come_first_and_no_row_is_clipped(qtbot, window) -> None:
     qtbot.waitUntil(lambda: panel.rows[-1].visibleRegion().boundingRect().height() == 28)
 
 
-def test_values_are_updated_and_the_last_true_is_remembered(qtbot, window, monkeypatch) -> None:
+def test_values_are_updated_and_the_time_of_the_last_true_value_is_shown(qtbot, window, monkeypatch) -> None:
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
     assert isinstance(panel, SensorsPanel)

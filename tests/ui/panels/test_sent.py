@@ -115,7 +115,7 @@ def put_all(session: Session) -> None:
     session.acting.arm()
 
 
-def test_calls_and_messages_sent_from_a_recording_have_their_own_menus(qtbot, window) -> None:
+def test_menus_of_sent_calls_and_replayed_messages_differ_from_published_messages(qtbot, window) -> None:
     panel, acting = made(qtbot, window), window.session.acting
     put_all(window.session)
     acting.allow(Target("service", "remember_face"))

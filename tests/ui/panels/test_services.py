@@ -184,7 +184,7 @@ def test_rejected_timed_out_and_cancelled_calls_are_reported(window, panel, qtbo
     go_on.set()
 
 
-def test_closing_disarms_and_empty_panel_explains_what_to_do(window, panel) -> None:
+def test_closing_disarms_and_empty_panel_suggests_next_steps(window, panel) -> None:
     window.session.acting.arm()
     panel.dispose()
     assert not window.session.acting.arming.is_on

@@ -50,7 +50,7 @@ def row(panel: TopicsPanel, name: str, columns: tuple[str, ...] = FIGURES) -> li
     return [panel.model.data(panel.model.index(place, place_of(panel, column))) for column in columns]  # type: ignore[misc]
 
 
-def test_every_topic_is_listed_with_its_figures(panel) -> None:
+def test_every_topic_is_listed_with_its_stats(panel) -> None:
     assert panel.model.rowCount() == 13
     assert row(panel, "/robot/depth") == ["/robot/depth", "image", "1", "60.0", "5.1 MB/s", "21 ms", "0.4 %"]
     assert row(panel, "/speech/words")[:5] == ["/speech/words", "string", "2", "0.2", "14 B/s"]
@@ -58,12 +58,12 @@ def test_every_topic_is_listed_with_its_figures(panel) -> None:
     assert panel.count.text() == "13 topics, 7 nodes"
 
 
-def test_topics_panel_subscribes_to_nothing(panel, window) -> None:
+def test_topics_panel_subscribes_to_no_topics(panel, window) -> None:
     ticks(window, panel, 10)
     assert window.session.watched == []
 
 
-def test_unknown_figures_are_blank(panel, window) -> None:
+def test_unknown_stats_are_blank(panel, window) -> None:
     window.session.put(Topic("/x", rate_hz=None, lost=None))
     panel.refresh()
     assert row(panel, "/x") == ["/x", "json", "1", "", "", "", ""]
@@ -103,7 +103,7 @@ def test_type_is_shortened_to_its_last_part_and_has_an_icon_without_a_publisher(
     assert type_cell(Topic("/a", "own/kind", "")).icon == "box"
 
 
-def test_vanished_topics_are_struck_through_and_show_since_when() -> None:
+def test_removed_topics_are_struck_through_and_show_the_time_since_removal() -> None:
     gone = Topic("/x", gone_s=4.7, is_new=True)
     assert name_cell(gone).struck
     assert name_cell(gone).chip is None
@@ -126,7 +126,7 @@ def test_slash_focuses_the_filter_which_finds_names_types_and_nodes(qtbot, panel
     assert panel.model.rowCount() == 13
 
 
-def test_sorting_keeps_the_selection_and_changing_figures_are_sorted_once_per_second(panel, window) -> None:
+def test_sorting_keeps_the_selection_and_changing_values_are_sorted_once_per_second(panel, window) -> None:
     panel.show_topic("/odom")
     panel.table.horizontalHeader().sectionClicked.emit(place_of(panel, "rate"))  #: the largest first
     assert panel.model.data(panel.model.index(0, 0)) == "/robot/depth"
@@ -174,7 +174,7 @@ def test_enter_opens_a_topic_and_arrow_keys_move(panel, window) -> None:
         ("searching", "Searching for a master", None, 0, []),
     ],
 )
-def test_empty_panel_explains_what_to_do_next(qtbot, qapp, kind, words, pressed, masters, commands) -> None:
+def test_empty_panel_suggests_next_steps(qtbot, qapp, kind, words, pressed, masters, commands) -> None:
     window = Window(Session())
     window.session.master = MasterState(kind, window.session.master.address)
     panel = window.make(PANEL)
@@ -212,7 +212,7 @@ def test_sparkline_of_recent_rates_is_shown_before_the_rate(panel, window) -> No
     assert curve_cell(Topic("/silent")).curve == ()
 
 
-def test_columns_are_chosen_in_a_menu_and_restored_with_the_layout(qtbot, panel, window) -> None:
+def test_columns_are_selected_in_a_menu_and_restored_with_the_layout(qtbot, panel, window) -> None:
     assert panel.table.isColumnHidden(place_of(panel, "subscribers"))
     columns, _others = panel.more_actions()
     menu = columns.menu()
@@ -242,7 +242,7 @@ def test_publishers_are_an_optional_column() -> None:
     assert nodes_cell(topic).text == "camera, lidar"
 
 
-def test_tooltips_report_how_many_messages_were_not_shown(panel, window) -> None:
+def test_tooltips_report_the_number_of_messages_not_shown(panel, window) -> None:
     rate, loss = (panel.table.columns[place_of(panel, name)] for name in ("rate", "loss"))
     topic = window.session.topics["/odom"]
     assert rate.tip(topic) == "Messages per second, as reported by the publishers"
@@ -264,7 +264,7 @@ def test_empty_panel_links_to_the_connection_doctor(qtbot, panel, window) -> Non
     assert empty.asked_why == [(bare, "")]
 
 
-def test_filter_for_a_missing_topic_links_to_the_connection_doctor_too(panel, window) -> None:
+def test_filter_for_a_missing_topic_links_to_the_connection_doctor(panel, window) -> None:
     panel.filter.setText("no topic")
     assert [each.accessibleName() for each in panel.empty.findChildren(Button)] == ["Clear the filter"]
     panel.filter.setText("/robot/deph")
@@ -276,7 +276,7 @@ def test_filter_for_a_missing_topic_links_to_the_connection_doctor_too(panel, wi
     assert (panel.filter.text(), list(panel.blockers())) == ("", [])
 
 
-def test_requested_topic_is_selected_as_soon_as_it_is_listed(panel, window) -> None:
+def test_requested_topic_is_selected_when_listed(panel, window) -> None:
     panel.show_topic("/odom")
     assert panel.table.currentIndex() == panel.model.index_of("/odom")
     panel.show_topic("/later")
@@ -337,7 +337,7 @@ def test_tree_view_groups_topics_in_folders_with_summed_rates(panel, window) -> 
     assert shown(panel) == ["/arm/left/speed", "/arm/right/speed"]
 
 
-def test_folders_are_expanded_and_collapsed_by_keyboard_and_left_goes_to_the_parent(panel, window) -> None:
+def test_folders_are_expanded_and_collapsed_by_keyboard_and_left_selects_the_parent(panel, window) -> None:
     as_tree(panel, window)
     whole = panel.model.rowCount()
     panel.table.setFocus(Qt.FocusReason.TabFocusReason)
@@ -369,7 +369,7 @@ def test_filter_expands_folders_and_matches_types_and_patterns(panel, window) ->
     assert "depth" not in shown(panel)
 
 
-def test_collapsed_folder_is_marked_when_it_contains_new_topics(panel, window) -> None:
+def test_collapsed_folder_with_new_topics_is_marked(panel, window) -> None:
     as_tree(panel, window)
     assert panel.model.data(panel.model.index_of("/speech/*"), CELL_ROLE).chip is None
     panel.table.opened.emit("/speech/*")

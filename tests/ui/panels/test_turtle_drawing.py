@@ -28,7 +28,7 @@ def count(picture: np.ndarray, colour: str, within: int = 12) -> int:
     return int((away.max(axis=2) <= within).sum())
 
 
-def test_drawing_differs_for_every_heading(qapp) -> None:
+def test_robot_drawing_differs_for_every_heading(qapp) -> None:
     pictures = [drawn(theta_deg=angle) for angle in range(0, 360, 45)]
     for number, one in enumerate(pictures):
         for other in pictures[:number]:
@@ -45,7 +45,7 @@ def test_obstacle_hit_by_the_bumper_is_amber(qapp, side) -> None:
     assert count(drawn(theta_deg=0, bumped=side), "#FFB300") > count(drawn(theta_deg=0), "#FFB300") + 20
 
 
-def test_body_and_ball_are_hit_testable_and_there_are_no_hands(qapp) -> None:
+def test_body_and_ball_are_hit_testable_and_hands_are_not(qapp) -> None:
     ball = {"kind": "ball", "name": "ball", "x": 1.5, "y": -1.0}
     state = RobotState.parse({"figure": "turtle", "objects": [ball]})
     drawing = RobotDrawing()

@@ -56,12 +56,12 @@ def tells(window: Window, panel: VariablesPanel, **values: object) -> None:
     ticks(window, panel, 1)
 
 
-def test_every_variable_of_the_behaviour_is_listed_before_it_runs(panel, window) -> None:
+def test_every_variable_of_the_behaviour_is_listed_before_the_run(panel, window) -> None:
     assert shown(panel) == [("score", ""), ("names", ""), ("later", "")]
     assert panel.when.text() == ""
 
 
-def test_values_are_updated_and_marked_during_a_run_and_kept_after_it(panel, window) -> None:
+def test_values_are_updated_and_marked_during_a_run_and_kept_afterwards(panel, window) -> None:
     now = [100.0]
     panel.clock = lambda: now[0]
     window.session.runs.run()
@@ -116,7 +116,7 @@ def test_keys_and_menu_trigger_variable_commands(panel, window) -> None:
     assert window.commands[-3:] == ["variable.rename:score", "variable.delete:score", "variable.watch:score"]
 
 
-def test_panel_without_variables_explains_them_and_creates_one(panel, window) -> None:
+def test_panel_without_variables_explains_variables_and_offers_to_create_a_variable(panel, window) -> None:
     window.session.document.apply_edit(workspace(started()))
     ticks(window, panel, 1)
     assert panel.pages.currentWidget() is panel.empty
@@ -124,7 +124,7 @@ def test_panel_without_variables_explains_them_and_creates_one(panel, window) ->
     assert window.commands[-1] == "variable.new"
 
 
-def test_another_behaviour_shows_no_values_of_the_run(panel, window) -> None:
+def test_variables_of_another_behaviour_show_no_values_of_the_run(panel, window) -> None:
     window.session.runs.run()
     tells(window, panel, score=3)
     window.session.documents.new()

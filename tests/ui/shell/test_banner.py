@@ -110,7 +110,7 @@ def test_banner_covers_no_text_on_the_start_page(window: MainWindow, mouse: Mous
     assert place(window, window.banner).bottom() <= place(window, window.start._question).top()
 
 
-def test_adjacent_text_is_shortened_except_text_that_requires_action(
+def test_text_next_to_the_banner_is_shortened_except_text_that_requires_action(
     window: MainWindow, mouse: Mouse
 ) -> None:
     show(window, "behaviour")
@@ -127,7 +127,7 @@ def test_adjacent_text_is_shortened_except_text_that_requires_action(
     assert bar.banner_area().x() >= bar.sentence.x() + bar.sentence.full_width()
 
 
-def test_press_right_after_the_banner_appeared_is_ignored(window: MainWindow, mouse: Mouse) -> None:
+def test_click_right_after_the_banner_appears_is_ignored(window: MainWindow, mouse: Mouse) -> None:
     mouse.at = window.middle.mapToGlobal(window.tool_bar.banner_area().center())
     say(window)
     assert not window.banner.isAncestorOf(mouse.under_it())  # type: ignore[arg-type]
@@ -136,7 +136,7 @@ def test_press_right_after_the_banner_appeared_is_ignored(window: MainWindow, mo
     assert window.banner.isAncestorOf(mouse.under_it())  # type: ignore[arg-type]
 
 
-def test_banner_button_is_not_replaced_under_the_mouse(window: MainWindow, mouse: Mouse) -> None:
+def test_banner_is_not_replaced_while_under_the_mouse(window: MainWindow, mouse: Mouse) -> None:
     say(window, "mild", "warn")
     mouse.over(window.banner.banner)
     at = QPointF(20, 20)
@@ -156,7 +156,7 @@ def test_banner_moves_to_the_bar_of_the_new_layout(window: MainWindow, mouse: Mo
     assert window.run_bar.geometry().contains(window.banner.geometry())
 
 
-def test_button_in_a_narrow_banner_keeps_its_name(window: MainWindow, mouse: Mouse) -> None:
+def test_button_in_a_narrow_banner_keeps_its_accessible_name(window: MainWindow, mouse: Mouse) -> None:
     step = {"button": "Open the connection doctor", "action": "help.doctor"}
     window.session.alerts.raise_alert("one", "warn", "It is one.", **step)
     settle(window)
@@ -185,7 +185,7 @@ def test_unchanged_banner_is_not_repainted(window: MainWindow, mouse: Mouse) -> 
     assert not {QEvent.Type.Paint, QEvent.Type.ZOrderChange, QEvent.Type.Resize} & set(changed)
 
 
-def test_alert_for_developers_is_shown_in_their_layout_only(window: MainWindow, mouse: Mouse) -> None:
+def test_alert_for_developers_is_shown_in_the_developer_layout_only(window: MainWindow, mouse: Mouse) -> None:
     window.session.alerts.raise_alert("ports", "warn", "Port 7000 is taken.", for_developers=True)
     settle(window)
     assert window.banner.identity == "ports"
@@ -210,7 +210,7 @@ def test_alert_count_opens_the_alerts_by_mouse_and_keyboard(window: MainWindow, 
     assert window.current_layout == "behaviour"
 
 
-def test_shift_tab_moves_from_the_banner_through_the_whole_window(
+def test_shift_tab_from_the_banner_reaches_every_control_of_the_window(
     qtbot, window: MainWindow, mouse: Mouse
 ) -> None:
     window.activateWindow()

@@ -101,7 +101,7 @@ def found() -> list[tuple[Path, str, int]]:
     return [(path, words, line) for path in modules() for words, line in named(path)]
 
 
-def test_every_reference_to_a_command_is_found() -> None:
+def test_command_references_in_all_sources_are_collected() -> None:
     words = {words for _, words, _ in found()}
     assert {
         "network.others",  # an alert of the core
@@ -119,7 +119,7 @@ def test_every_reference_to_a_command_is_found() -> None:
     assert len(words) > 30
 
 
-def test_every_referenced_command_exists() -> None:
+def test_every_referenced_command_is_registered() -> None:
     unknown = [f"{path}:{line}: {words!r}" for path, words, line in found() if not is_known(words)]
     assert not unknown, "these name no command"
 
@@ -170,7 +170,7 @@ def test_command_ids_are_unique_and_each_menu_is_in_the_menu_bar() -> None:
     assert {command.menu for command in COMMANDS} <= {*MENUS, ""}
 
 
-def test_longest_menu_fits_a_low_screen(window: MainWindow, commands: Commands) -> None:
+def test_every_menu_has_at_most_18_entries(window: MainWindow, commands: Commands) -> None:
     for menu in window.bar.menus.findChildren(QMenu):
         rows = [each for each in menu.actions() if each.isVisible() and not each.isSeparator()]
         assert len(rows) <= 18, f"{menu.title()} has {len(rows)} entries"

@@ -35,7 +35,7 @@ def click(button) -> None:
     QTest.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
-def test_freeze_pauses_and_resumes_all_live_panels(tools, window, commands) -> None:
+def test_freeze_button_pauses_and_resumes_all_live_panels(tools, window, commands) -> None:
     one, other = live(window, "inspector"), live(window, "image")
     one.setChecked(True)
     tools.refresh()
@@ -47,7 +47,7 @@ def test_freeze_pauses_and_resumes_all_live_panels(tools, window, commands) -> N
     assert (one.isChecked(), other.isChecked(), tools.freeze.isChecked()) == (False, False, False)
 
 
-def test_freeze_is_disabled_without_live_panels(tools, window) -> None:
+def test_freeze_button_is_disabled_without_live_panels(tools, window) -> None:
     live(window, "inspector").hide()
     tools.refresh()
     assert not tools.freeze.isEnabled()
@@ -66,7 +66,7 @@ def dropped(monkeypatch: pytest.MonkeyPatch) -> list[tuple[QMenu, QWidget]]:
     return seen
 
 
-def test_layout_button_shows_the_name_and_offers_the_others(tools, window, dropped) -> None:
+def test_layout_button_shows_the_current_name_and_offers_the_other_layouts(tools, window, dropped) -> None:
     window.saved_layouts.save_as(window.bench, "developer", "Two cameras")
     tools.refresh()
     assert tools.layout.text() == "Two cameras"

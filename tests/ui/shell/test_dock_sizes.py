@@ -23,7 +23,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
         ([120, 384], 300, [False, True], [120, 229]),
     ],
 )
-def test_extra_space_goes_to_panels_without_fixed_size(
+def test_extra_space_is_distributed_to_panels_without_fixed_size(
     wanted: list[int], room: int, keep: list[bool], sizes: list[int]
 ) -> None:
     assert shares(wanted, room, keep=keep) == sizes

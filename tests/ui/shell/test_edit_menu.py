@@ -37,7 +37,7 @@ def test_edit_commands_apply_to_the_focused_text_field(
     assert field.text() == "hello"
 
 
-def test_text_field_stays_the_target_while_the_menu_bar_has_focus(
+def test_edit_commands_apply_to_the_text_field_while_the_menu_bar_has_focus(
     window: MainWindow, commands: Commands, field: QLineEdit
 ) -> None:
     window.bar.menus.setFocus()
@@ -55,7 +55,7 @@ def test_unavailable_edit_commands_are_disabled_with_a_reason(commands: Commands
     assert commands.actions.disabled_reason("edit.copy") == "Only for blocks and text fields"
 
 
-def test_edit_shortcuts_are_left_to_the_focused_widget(commands: Commands) -> None:
+def test_edit_commands_show_shortcuts_but_leave_the_keys_to_the_focused_widget(commands: Commands) -> None:
     for what in ("cut", "copy", "paste", "selectAll"):
         action = commands.actions[f"edit.{what}"]
         assert action.shortcuts() == []

@@ -57,7 +57,9 @@ def typed(sheet: FileSheet, name: str) -> None:
     QTest.keyClicks(sheet.name, name)
 
 
-def test_folders_are_listed_first_and_only_behaviour_files_after_them(sheet: FileSheet, folder: Path) -> None:
+def test_folders_are_listed_before_behaviour_files_and_other_files_are_hidden(
+    sheet: FileSheet, folder: Path
+) -> None:
     sheet.ask_open(folder, print)
     assert rows(sheet) == ["class 3", "a quiz", "Greeting"]
     assert [entry.path.name for entry in entries_of(folder) if entry.is_folder] == ["class 3"]
@@ -91,7 +93,7 @@ def test_file_extension_or_full_path_can_be_typed(sheet: FileSheet, folder: Path
     assert not sheet.done.isEnabled()
 
 
-def test_existing_file_is_replaced_or_both_are_kept(
+def test_saving_over_an_existing_file_offers_replace_and_keep_both(
     sheet: FileSheet, folder: Path, taken: list[Path]
 ) -> None:
     sheet.ask_save(folder / "Greeting.nepb", taken.append)
@@ -141,7 +143,7 @@ def test_file_with_an_invalid_name_cannot_be_saved(sheet: FileSheet, folder: Pat
     assert sheet.isVisible()
 
 
-def test_folder_is_opened_created_and_left(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+def test_folders_can_be_created_opened_and_left(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     sheet.ask_save(folder / "Dance.nepb", taken.append)
     QTest.mouseClick(sheet.new_folder, LEFT)
     QTest.keyClicks(sheet.folder_name, "Class 4")
@@ -175,7 +177,7 @@ def test_file_in_a_folder_is_opened_by_keyboard(sheet: FileSheet, folder: Path, 
     assert taken == [folder / "class 3" / "Dance.nepb"]
 
 
-def test_return_on_a_file_takes_its_name_without_replacing_it(
+def test_return_on_a_file_enters_its_name_without_replacing_the_file(
     sheet: FileSheet, folder: Path, taken: list[Path]
 ) -> None:
     sheet.ask_save(folder / "Dance.nepb", taken.append)
@@ -186,14 +188,16 @@ def test_return_on_a_file_takes_its_name_without_replacing_it(
     assert sheet.name.hasFocus()
 
 
-def test_missing_folder_is_reported_and_the_previous_one_stays_open(sheet: FileSheet, folder: Path) -> None:
+def test_missing_folder_is_reported_and_the_previous_folder_stays_open(
+    sheet: FileSheet, folder: Path
+) -> None:
     sheet.ask_open(folder, print)
     sheet.go_to(folder / "gone")
     assert sheet.folder == folder
     assert sheet.said.text() == "Can't open “gone”: no such file or directory."
 
 
-def test_places_are_existing_folders_without_duplicates(folder: Path, tmp_path: Path) -> None:
+def test_suggested_locations_are_existing_folders_without_duplicates(folder: Path, tmp_path: Path) -> None:
     found = known_locations(
         tmp_path, [folder / "Greeting.nepb", folder / "b.nepb", tmp_path / "x" / "gone.nepb"]
     )
@@ -203,7 +207,7 @@ def test_places_are_existing_folders_without_duplicates(folder: Path, tmp_path: 
     assert len({place.folder for place in found}) == len(found)
 
 
-def test_stop_works_and_the_sheet_stays_open(
+def test_stop_works_while_the_file_sheet_stays_open(
     qtbot: QtBot, window: MainWindow, commands: Commands, sheet: FileSheet, folder: Path
 ) -> None:
     stops: list[str] = []
@@ -241,7 +245,9 @@ def test_columns_are_readable_at_every_text_size(
     QApplication.processEvents()
 
 
-def test_window_opens_its_own_file_sheet(qtbot: QtBot, theme: Theme, session: Session, folder: Path) -> None:
+def test_window_opens_the_custom_file_sheet(
+    qtbot: QtBot, theme: Theme, session: Session, folder: Path
+) -> None:
     session.settings.add_recent(folder / "Greeting.nepb", "Greeting")
     window = MainWindow(session, theme, PANELS, [])
     qtbot.addWidget(window)
@@ -267,7 +273,7 @@ def test_image_chooser_lists_only_images(sheet: FileSheet, folder: Path, taken: 
     assert rows(sheet) == ["class 3", "a quiz", "Greeting"], "the next question is for behaviours again"
 
 
-def test_folder_is_chosen_or_created(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
+def test_folder_is_selected_or_created(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     sheet.ask_folder(folder, taken.append)
     assert rows(sheet) == ["class 3"]
     assert sheet.said.text() == "Images will be saved in “work”.", "no row is chosen by itself"
@@ -284,7 +290,7 @@ def test_folder_is_chosen_or_created(sheet: FileSheet, folder: Path, taken: list
     assert taken == [folder / "class 3", folder / "album"]
 
 
-def test_settings_stay_open_below_the_sheet_and_regain_focus(
+def test_settings_stay_open_below_the_file_sheet_and_regain_focus(
     sheet: FileSheet, window: MainWindow, commands: Commands, folder: Path, taken: list[Path]
 ) -> None:
     commands.run("settings.open")

@@ -65,7 +65,7 @@ def names(window: MainWindow) -> list[str]:
     return [document.name for document in window.session.documents]
 
 
-def test_another_file_opens_in_a_new_tab_beside_unsaved_work(commands, window, tmp_path: Path) -> None:
+def test_another_file_opens_in_a_new_tab_next_to_unsaved_work(commands, window, tmp_path: Path) -> None:
     path = saved(tmp_path / "Other.nepb")
     window.session.document.apply_edit(BLOCKS)
     commands.files.open(path)
@@ -121,9 +121,7 @@ def test_saving_on_tab_close_can_be_undone(commands, window, tmp_path: Path) -> 
     assert window.session.document.workspace == changed("z")
 
 
-def test_previous_content_of_an_overwritten_file_is_kept_as_a_copy(
-    commands, window, home: Path, tmp_path
-) -> None:
+def test_previous_content_of_an_overwritten_file_is_backed_up(commands, window, home: Path, tmp_path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     before = path.read_bytes()
     commands.files.open(path)
@@ -189,7 +187,9 @@ def test_tab_stays_open_when_the_overwritten_content_cannot_be_backed_up(
     assert window.session.alerts.active[0].title.startswith("Mine.nepb was not saved")
 
 
-def test_saving_over_changes_of_another_program_backs_them_up(commands, window, home: Path, tmp_path) -> None:
+def test_saving_over_changes_of_another_program_backs_up_the_changes(
+    commands, window, home: Path, tmp_path
+) -> None:
     path = saved(tmp_path / "Mine.nepb")
     commands.files.open(path)
     window.session.document.apply_edit(changed("z"))
@@ -207,7 +207,7 @@ def test_saving_over_changes_of_another_program_backs_them_up(commands, window, 
     assert (document.name, document.path) == ("Mine (previous version)", None)
 
 
-def test_saving_twice_is_not_detected_as_an_external_change(commands, window, home: Path, tmp_path) -> None:
+def test_second_save_is_not_detected_as_an_external_change(commands, window, home: Path, tmp_path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     said = [path.read_bytes()]
     commands.files.open(path)
@@ -220,7 +220,7 @@ def test_saving_twice_is_not_detected_as_an_external_change(commands, window, ho
     assert sorted(copy.read_bytes() for copy in (home / "earlier").iterdir()) == sorted(said[:-1])
 
 
-def test_saving_succeeds_when_the_earlier_versions_cannot_be_kept(
+def test_saving_succeeds_when_earlier_versions_cannot_be_stored(
     commands, window, home: Path, tmp_path
 ) -> None:
     path = saved(tmp_path / "Mine.nepb")
@@ -233,7 +233,7 @@ def test_saving_succeeds_when_the_earlier_versions_cannot_be_kept(
     assert any("can't be kept" in record.text for record in window.session.console.records)
 
 
-def test_save_as_backs_up_the_file_it_overwrites(commands, window, answers, home: Path, tmp_path) -> None:
+def test_save_as_backs_up_the_overwritten_file(commands, window, answers, home: Path, tmp_path) -> None:
     answers.path = saved(tmp_path / "Theirs.nepb")
     before = answers.path.read_bytes()
     window.session.document.apply_edit(changed("z"))
@@ -283,7 +283,7 @@ def test_tab_that_cannot_be_saved_stays_open(commands, window, tmp_path: Path) -
     assert alert.button == "Save somewhere else"
 
 
-def test_closing_the_tab_of_a_running_program_stops_it(commands, window, monkeypatch) -> None:
+def test_closing_the_tab_of_a_running_program_stops_the_program(commands, window, monkeypatch) -> None:
     runs, stopped = window.session.runs, []
     window.session.document.apply_edit(BLOCKS)
     runs.document, runs._run = window.session.document, RunState("running")
@@ -330,7 +330,9 @@ def test_save_as_renames_the_tab_and_keeps_the_old_file(
     assert answers.asked[-1] == f"save {tmp_path / 'Old.nepb'}"
 
 
-def test_external_files_open_and_unsupported_ones_raise_one_alert(commands, window, tmp_path: Path) -> None:
+def test_external_files_are_opened_and_unsupported_files_raise_a_single_alert(
+    commands, window, tmp_path: Path
+) -> None:
     picture = tmp_path / "photo.png"
     picture.write_bytes(b"x")
     paths = [saved(tmp_path / "A.nepb"), picture, saved(tmp_path / "B.nepb"), tmp_path]
@@ -341,7 +343,7 @@ def test_external_files_open_and_unsupported_ones_raise_one_alert(commands, wind
     assert ".nepb" in alert.detail
 
 
-def test_file_that_is_no_behaviour_raises_an_alert(commands, window, document, tmp_path: Path) -> None:
+def test_file_that_is_not_a_behaviour_raises_an_alert(commands, window, document, tmp_path: Path) -> None:
     path = tmp_path / "bad.nepb"
     path.write_text("not json", "utf-8")
     document.apply_edit(BLOCKS)
@@ -375,7 +377,7 @@ def test_fix_changes_the_blocks_and_updates_the_editor(commands: Commands, docum
     assert document.dirty
 
 
-def test_backup_files_never_replace_each_other(tmp_path: Path) -> None:
+def test_backup_files_do_not_overwrite_each_other(tmp_path: Path) -> None:
     first = free_path(tmp_path, "a/b: c", 0)
     first.touch()
     second = free_path(tmp_path, "a/b: c", 0)

@@ -52,7 +52,7 @@ def test_toast_is_placed_in_the_corner_and_follows_window_resizes(place: QWidget
     assert place.width() - toast.geometry().right() == right
 
 
-def test_toast_undoes_the_reported_action(place: QWidget, theme: Theme) -> None:
+def test_undo_button_of_a_toast_runs_the_undo_function(place: QWidget, theme: Theme) -> None:
     done: list[str] = []
     toast = Toast(theme, place)
     toast.show_toast("Deleted 4 blocks", "Undo", lambda: done.append("undone"))
@@ -61,7 +61,7 @@ def test_toast_undoes_the_reported_action(place: QWidget, theme: Theme) -> None:
     assert not toast.isVisible()
 
 
-def test_toast_stays_while_it_has_focus(qtbot, place: QWidget, theme: Theme) -> None:
+def test_toast_does_not_time_out_while_focused(qtbot, place: QWidget, theme: Theme) -> None:
     toast = Toast(theme, place)
     toast.show_toast("Deleted 4 blocks", "Undo", lambda: None)
     toast.button.setFocus()
@@ -74,7 +74,7 @@ def test_toast_stays_while_it_has_focus(qtbot, place: QWidget, theme: Theme) -> 
     assert not toast.isVisible()
 
 
-def test_offer_waits_for_its_answer_and_alerts_queue_behind_it(place: QWidget, theme: Theme) -> None:
+def test_offer_stays_until_answered_and_later_alerts_are_queued(place: QWidget, theme: Theme) -> None:
     banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     done: list[str] = []
@@ -93,7 +93,7 @@ def test_offer_waits_for_its_answer_and_alerts_queue_behind_it(place: QWidget, t
     assert not banner.banner.second.isVisible()
 
 
-def test_closing_an_offer_or_alert_shows_the_next_one(place: QWidget, theme: Theme) -> None:
+def test_closing_an_offer_or_alert_shows_the_next_alert(place: QWidget, theme: Theme) -> None:
     banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     dismissed: list[str] = []
@@ -130,7 +130,9 @@ def test_long_text_uses_a_smaller_font_and_wraps_to_the_available_lines(place: Q
     assert words.lines("bodyLarge")[1]
 
 
-def test_focus_ring_surrounds_the_widget_and_follows_it(qtbot, place: QWidget, theme: Theme) -> None:
+def test_focus_ring_surrounds_the_focused_widget_and_follows_its_geometry(
+    qtbot, place: QWidget, theme: Theme
+) -> None:
     ring = FocusRing(theme, place)
     first, second = Button(theme, "One"), Button(theme, "Two")
     place.layout().addWidget(first)
@@ -150,7 +152,7 @@ def test_focus_ring_surrounds_the_widget_and_follows_it(qtbot, place: QWidget, t
     assert not ring.isVisible()
 
 
-def test_mouse_click_shows_no_focus_ring(qtbot, place: QWidget, theme: Theme) -> None:
+def test_mouse_click_hides_the_focus_ring(qtbot, place: QWidget, theme: Theme) -> None:
     ring = FocusRing(theme, place)
     field, other = QLineEdit(), QLineEdit()
     place.layout().addWidget(other)
@@ -185,7 +187,9 @@ def test_first_key_that_moves_the_focus_shows_the_ring(qtbot, place: QWidget, th
     assert not ring.isVisible()
 
 
-def test_hiding_a_clicked_widget_shows_no_ring_on_the_next_one(qtbot, place: QWidget, theme: Theme) -> None:
+def test_hiding_a_clicked_widget_shows_no_focus_ring_on_the_next_widget(
+    qtbot, place: QWidget, theme: Theme
+) -> None:
     ring = FocusRing(theme, place)
     first, second = Button(theme, "One"), Button(theme, "Two")
     place.layout().addWidget(first)
@@ -202,7 +206,7 @@ def test_hiding_a_clicked_widget_shows_no_ring_on_the_next_one(qtbot, place: QWi
     assert ring.target is first
 
 
-def test_first_mouse_press_in_a_window_is_detected_too(qtbot, theme: Theme) -> None:
+def test_first_mouse_press_in_a_window_shows_no_focus_ring(qtbot, theme: Theme) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     column = QVBoxLayout(window)
@@ -219,7 +223,7 @@ def test_first_mouse_press_in_a_window_is_detected_too(qtbot, theme: Theme) -> N
     assert ring.target is None
 
 
-def test_ring_is_clipped_at_the_edge_of_a_scroll_area(qtbot, place: QWidget, theme: Theme) -> None:
+def test_focus_ring_is_clipped_at_the_edge_of_a_scroll_area(qtbot, place: QWidget, theme: Theme) -> None:
     ring = FocusRing(theme, place)
     inside = QWidget()
     inside.setFixedSize(300, 2000)
@@ -239,7 +243,7 @@ def test_ring_is_clipped_at_the_edge_of_a_scroll_area(qtbot, place: QWidget, the
     assert not ring.isVisible()
 
 
-def test_ring_survives_deletion_of_its_widget(qtbot, place: QWidget, theme: Theme) -> None:
+def test_focus_ring_survives_deletion_of_its_widget(qtbot, place: QWidget, theme: Theme) -> None:
     ring = FocusRing(theme, place)
     button = Button(theme, "Brief")
     place.layout().addWidget(button)
@@ -255,11 +259,11 @@ def test_ring_survives_deletion_of_its_widget(qtbot, place: QWidget, theme: Them
 @pytest.mark.parametrize(
     ("keys", "said"), [("Ctrl+Shift+S", "Ctrl+Shift+S"), ("Ctrl++", "Ctrl++"), ("F12", "F12")]
 )
-def test_keys_are_named_as_on_the_keyboard(keys: str, said: str) -> None:
+def test_shortcuts_are_formatted_with_key_names(keys: str, said: str) -> None:
     assert shortcut_text(keys) == said
 
 
-def test_sheet_closes_with_esc_and_when_focus_moves_elsewhere(qtbot, place: QWidget, theme: Theme) -> None:
+def test_sheet_closes_on_esc_and_on_focus_loss(qtbot, place: QWidget, theme: Theme) -> None:
     field = QLineEdit()
     place.layout().addWidget(field)
     for leave in (lambda: QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Escape), field.setFocus):

@@ -26,13 +26,13 @@ class Late:
         self.done.append(done)
 
 
-def test_window_closes_at_once_without_an_editor(qapp) -> None:
+def test_window_closes_immediately_without_an_editor(qapp) -> None:
     closed: list[bool] = []
     assert FlushBeforeClose(QObject(), lambda: None, lambda: closed.append(True)).ready()
     assert closed == []
 
 
-def test_slow_editor_is_waited_for_and_flushed_once(qtbot, qapp, monkeypatch) -> None:
+def test_close_waits_for_a_slow_editor_and_flushes_once(qtbot, qapp, monkeypatch) -> None:
     monkeypatch.setattr(documents, "MAX_FLUSH_MS", 2000)
     editor, closed, parent = Late(), [], QObject()
     waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(waits.ready()))
@@ -93,7 +93,9 @@ def test_work_that_cannot_be_saved_is_reported_before_closing(
     assert left["workspace"] == BLOCKS
 
 
-def test_closing_again_after_the_warning_discards_the_work(window: MainWindow, commands, home: Path) -> None:
+def test_second_close_after_the_warning_discards_unsaved_work(
+    window: MainWindow, commands, home: Path
+) -> None:
     (home / "journal").parent.mkdir(parents=True, exist_ok=True)
     (home / "journal").write_text("no folder")
     window.show()

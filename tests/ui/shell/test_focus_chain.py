@@ -32,7 +32,7 @@ def window(qtbot) -> QWidget:
     return window
 
 
-def test_focus_chain_widgets_survive_deletion_of_the_queried_widget(window: QWidget) -> None:
+def test_deleting_a_queried_widget_keeps_other_widgets_of_the_focus_chain_valid(window: QWidget) -> None:
     first, second = window.findChildren(QLineEdit)
     area = window.findChildren(QScrollArea)[0]
     header = area.viewport()  # made by Qt, not by Python: what PySide would call deleted
@@ -56,7 +56,7 @@ def test_focus_proxy_keeps_its_parent_when_queried(window: QWidget) -> None:
     assert second.parentWidget() is window
 
 
-def test_window_has_no_parent_after_a_focus_chain_query(window: QWidget) -> None:
+def test_window_stays_top_level_after_a_focus_chain_query(window: QWidget) -> None:
     last = window.findChildren(QLineEdit)[-1]
     assert any(next_in_focus_chain(each) is window for each in window.findChildren(QWidget))
     delete(last)

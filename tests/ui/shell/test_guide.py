@@ -231,7 +231,7 @@ def test_pages_have_no_italics_and_no_unresolved_shortcut_placeholders(guide: Gu
         assert "{key" not in guide.page.toPlainText()
 
 
-def test_about_lists_versions_and_copies_them(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_about_lists_and_copies_versions(qtbot, window: MainWindow, commands: Commands) -> None:
     window.show()
     commands.run("help.about")
     (sheet,) = [each for each in window.findChildren(AboutSheet) if each.isVisible()]

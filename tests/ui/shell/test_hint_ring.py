@@ -33,7 +33,9 @@ def ring(place: QWidget, theme: Theme) -> HintRing:
     return HintRing(theme, place)
 
 
-def test_ring_surrounds_the_button_and_follows_it(qtbot: QtBot, place: QWidget, ring: HintRing) -> None:
+def test_hint_ring_surrounds_the_button_and_follows_its_geometry(
+    qtbot: QtBot, place: QWidget, ring: HintRing
+) -> None:
     assert ring.point_at("run.run")
     (button,) = place.findChildren(Button)
     assert ring.geometry().contains(QRect(button.pos(), button.size()))
@@ -41,7 +43,7 @@ def test_ring_surrounds_the_button_and_follows_it(qtbot: QtBot, place: QWidget, 
     qtbot.waitUntil(lambda: ring.geometry().contains(QRect(QPoint(200, 120), button.size())))
 
 
-def test_click_passes_through_the_ring_and_hides_it(place: QWidget, ring: HintRing) -> None:
+def test_click_passes_through_the_hint_ring_and_hides_the_ring(place: QWidget, ring: HintRing) -> None:
     ring.point_at("run.run")
     (button,) = place.findChildren(Button)
     pressed: list[bool] = []
@@ -53,7 +55,7 @@ def test_click_passes_through_the_ring_and_hides_it(place: QWidget, ring: HintRi
     assert ring.target is None
 
 
-def test_ring_is_hidden_by_escape_and_when_its_button_is_hidden(
+def test_hint_ring_is_hidden_by_escape_and_when_its_button_is_hidden(
     qtbot: QtBot, place: QWidget, ring: HintRing
 ) -> None:
     ring.point_at("run.run")
@@ -65,6 +67,6 @@ def test_ring_is_hidden_by_escape_and_when_its_button_is_hidden(
     qtbot.waitUntil(ring.isHidden)
 
 
-def test_no_ring_is_shown_when_the_button_is_not_visible(place: QWidget, ring: HintRing) -> None:
+def test_hint_ring_is_not_shown_for_a_hidden_button(place: QWidget, ring: HintRing) -> None:
     assert not ring.point_at("run.stop")
     assert ring.isHidden()

@@ -29,7 +29,7 @@ def test_written_layout_is_read_back(encoding: str):
     assert (found.name, found.base, found.saved, found.unknown) == ("Mine", "developer", SAVED, ())
 
 
-def test_unknown_panels_are_reported_once_and_skipped():
+def test_unknown_panels_of_a_layout_are_reported_once_and_skipped():
     found = read_layout(layout_bytes("Mine", "developer", SAVED), "file", ("topics",))
     assert (found.saved["open"], found.unknown) == (["topics"], ("plot",))
     found = read_layout(layout_bytes("Mine", "developer", SAVED), "file", ("plot",))
@@ -45,7 +45,7 @@ def test_unknown_panels_are_reported_once_and_skipped():
     [("  two\n words\u202e ", "two words"), ("x" * 50, "x" * 40), ("", "the file"), (7, "the file"),
      ("\x00", "the file")],
 )  # fmt: skip
-def test_layout_name_is_reduced_to_one_short_line(name, shown):
+def test_layout_name_is_reduced_to_a_short_single_line(name, shown):
     assert read_layout(changed(name=name), "the file", PANELS).name == shown
 
 

@@ -72,7 +72,7 @@ def rest_of(bench: Workbench) -> list[str]:
 
 
 @pytest.mark.parametrize("order", [*permutations(layout.name for layout in LAYOUTS)])
-def test_every_panel_opened_in_one_layout_survives_switching_to_the_other(
+def test_every_panel_of_one_layout_survives_switching_to_the_other_layout(
     layouts: Layouts, order: tuple[str, ...]
 ) -> None:
     first, second = order

@@ -38,7 +38,7 @@ def all_entries(window: MainWindow) -> list[QAction]:
     return found
 
 
-def test_settings_quit_and_about_are_in_the_macos_application_menu(window: MainWindow) -> None:
+def test_settings_quit_and_about_have_their_macos_application_menu_roles(window: MainWindow) -> None:
     places = {action.objectName(): action.menuRole() for action in all_entries(window)}
     moved = {name: role for name, role in places.items() if role != Role.NoRole}
     assert moved == {
@@ -48,7 +48,7 @@ def test_settings_quit_and_about_are_in_the_macos_application_menu(window: MainW
     }
 
 
-def test_no_action_uses_the_text_heuristic_menu_role_on_macos(window: MainWindow) -> None:
+def test_no_action_uses_the_text_heuristic_menu_role(window: MainWindow) -> None:
     found = all_entries(window)
     assert len(found) > 40
     assert [action.text() for action in found if action.menuRole() == Role.TextHeuristicRole] == []

@@ -77,7 +77,9 @@ def test_home_button_opens_the_start_page_and_back_button_returns(
     assert window.current_layout == "developer"
 
 
-def test_open_work_on_the_start_page_opens_its_tab(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_click_on_open_work_on_the_start_page_opens_its_tab(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
     show(qtbot, window)
     documents = window.session.documents
     first = documents.current
@@ -91,7 +93,7 @@ def test_open_work_on_the_start_page_opens_its_tab(qtbot, window: MainWindow, co
     assert window.current_layout == "behaviour"
 
 
-def test_stop_is_filled_on_the_start_page_while_a_robot_has_not_stopped(
+def test_stop_button_is_filled_on_the_start_page_while_a_robot_has_not_stopped(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -173,7 +175,7 @@ def test_only_visible_panels_are_refreshed(qtbot, window: MainWindow, commands: 
     assert panel(window, "developer", "alerts").refreshed == behind + 1
 
 
-def test_failed_panel_is_shown_as_failed_and_the_window_keeps_running(
+def test_failed_panel_shows_an_error_and_the_window_keeps_running(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -196,7 +198,9 @@ def test_failed_panel_is_shown_as_failed_and_the_window_keeps_running(
     assert topics.refreshed > 0
 
 
-def test_f12_stops_from_everywhere(qtbot, window: MainWindow, commands: Commands, monkeypatch) -> None:
+def test_f12_triggers_stop_from_every_focused_widget(
+    qtbot, window: MainWindow, commands: Commands, monkeypatch
+) -> None:
     stops: list[str] = []
     commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
     show(qtbot, window)
@@ -212,7 +216,9 @@ def test_f12_stops_from_everywhere(qtbot, window: MainWindow, commands: Commands
     assert len(stops) == 4
 
 
-def test_esc_leaves_a_text_field_and_stops_nothing(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_esc_in_a_text_field_clears_focus_and_does_not_trigger_stop(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
     stops: list[str] = []
     commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
     show(qtbot, window)
@@ -225,7 +231,7 @@ def test_esc_leaves_a_text_field_and_stops_nothing(qtbot, window: MainWindow, co
 
 
 @pytest.mark.parametrize("held", [Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier])
-def test_tab_never_focuses_a_panel_hidden_behind_another(
+def test_tab_key_never_focuses_a_panel_behind_another_panel(
     qtbot, window: MainWindow, commands: Commands, held
 ) -> None:
     show(qtbot, window)
@@ -314,7 +320,7 @@ def test_floating_panels_are_hidden_with_their_layout(qtbot, window: MainWindow,
     assert bench.docks["inspector"].isVisible()
 
 
-def test_panels_in_the_same_dock_area_are_tabs_in_the_title(
+def test_panels_in_the_same_dock_area_are_tabs_in_the_title_bar(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -327,7 +333,7 @@ def test_panels_in_the_same_dock_area_are_tabs_in_the_title(
     assert not bench.docks["console"].is_displayed()
 
 
-def test_dock_tabs_and_the_tabs_of_a_panel_have_separate_rows(qtbot, window: MainWindow) -> None:
+def test_dock_tabs_and_tabs_of_a_panel_are_in_separate_rows(qtbot, window: MainWindow) -> None:
     """Nobody takes the tab of a panel for one of a file, however narrow the window is."""
 
     class Own(PlainPanel):
@@ -361,7 +367,7 @@ def test_panel_opens_as_a_tab_in_its_default_dock_area(qtbot, window: MainWindow
     assert bench.docks["console"] in bench.tabifiedDockWidgets(bench.docks["problems"])
 
 
-def test_narrow_window_tabifies_panels_and_wide_window_separates_them(
+def test_narrow_window_tabifies_panels_and_wide_window_separates_panels(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -376,7 +382,7 @@ def test_narrow_window_tabifies_panels_and_wide_window_separates_them(
     assert docks["sensors"].y() > docks["camera"].y()
 
 
-def test_panel_closed_in_a_narrow_window_stays_closed_in_a_wide_one(
+def test_panel_closed_in_a_narrow_window_stays_closed_in_a_wide_window(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
@@ -440,7 +446,7 @@ def test_topic_opens_in_the_matching_panel(qtbot, window: MainWindow, commands: 
     assert panel(window, "developer", "image").topics == []
 
 
-def test_commands_run_by_name(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_commands_are_run_by_id_and_unknown_ids_fail(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     assert commands.run("inspect:/faces")
     assert panel(window, "developer", "inspector").topics == ["/faces"]
@@ -453,7 +459,7 @@ def test_commands_run_by_name(qtbot, window: MainWindow, commands: Commands) -> 
     assert not commands.run("tab:nobody")
 
 
-def test_alert_is_a_banner_until_it_is_resolved(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_alert_is_shown_in_the_banner_until_resolved(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     window.show_layout("developer")
     alerts = window.session.alerts
@@ -519,7 +525,7 @@ def test_tabs_are_restored_without_asking_after_a_clean_exit(
     again.close()
 
 
-def test_theme_changes_at_once(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_theme_change_applies_immediately(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     window.show_layout("behaviour")
     commands.run("theme.dark")
@@ -556,7 +562,7 @@ def test_window_closes_cleanly(qtbot, window: MainWindow, commands: Commands) ->
     assert not window.timer.isActive()
 
 
-def test_every_command_has_a_text_and_no_two_share_a_shortcut() -> None:
+def test_every_command_has_a_text_and_shortcuts_are_unique() -> None:
     assert len({row.id for row in COMMANDS}) == len(COMMANDS)
     keys = [key for row in COMMANDS for key in row.keys]
     assert len(set(keys)) == len(keys)
@@ -601,7 +607,7 @@ def test_panel_titles_grow_with_the_text_size(
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_results_are_never_clipped_in_the_smallest_window(
+def test_stop_results_are_never_clipped_in_the_smallest_window(
     qtbot, window: MainWindow, commands, percent: int
 ) -> None:
     show(qtbot, window)
@@ -644,7 +650,7 @@ def test_session_error_is_logged_once_and_the_window_keeps_running(
     assert sum(once.filter(record) is not None for record in caplog.records) == 1
 
 
-def test_closing_the_window_during_a_run_stops_the_robots_at_once(
+def test_closing_the_window_during_a_run_stops_the_robots_immediately(
     qtbot, window: MainWindow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done: list[str] = []
@@ -744,7 +750,7 @@ def test_start_with_a_file_argument_shows_that_file(
     assert len(list(window.session.alerts.active)) == (1 if kind == "bad" else 0)
 
 
-def test_start_shows_what_was_open_last(
+def test_startup_shows_the_last_open_layout(
     window: MainWindow, commands: Commands, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(window, "start_session", lambda: None)
@@ -757,7 +763,7 @@ def test_start_shows_what_was_open_last(
     assert [step.__name__ for step in show_first_page(window, Options(new_window=True))] == ["<lambda>"]
 
 
-def test_very_first_start_offers_the_first_steps_and_the_second_does_not(
+def test_first_start_offers_the_first_steps_and_the_second_start_does_not(
     window: MainWindow, commands: Commands, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(window, "start_session", lambda: None)
@@ -772,7 +778,7 @@ def test_very_first_start_offers_the_first_steps_and_the_second_does_not(
 
 
 @pytest.mark.parametrize("instead", ["work of last time", "open work", "a file", "an earlier version"])
-def test_first_steps_are_not_offered_when_there_is_other_work(
+def test_first_steps_are_not_offered_when_work_is_open_or_recovered(
     window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, instead: str
 ) -> None:
     monkeypatch.setattr(window, "start_session", lambda: None)
@@ -800,7 +806,7 @@ def test_demo_option_starts_the_demo_except_in_self_drive_mode(
     assert begun == ["demo"]
 
 
-def test_only_panels_of_a_visible_layout_are_created_ahead(theme: Theme, session: Session) -> None:
+def test_only_panels_of_a_visible_layout_are_preloaded(theme: Theme, session: Session) -> None:
     made: list[str] = []
     seen: dict[str, PlainPanel] = {}
 
@@ -827,7 +833,7 @@ def test_only_panels_of_a_visible_layout_are_created_ahead(theme: Theme, session
     window.close()
 
 
-def test_panels_created_ahead_and_never_shown_are_closed_with_the_window(
+def test_preloaded_panels_that_were_never_shown_are_closed_with_the_window(
     theme: Theme, session: Session
 ) -> None:
     panels: list[PlainPanel] = []

@@ -60,7 +60,7 @@ def test_text_check_marks_and_shortcuts_are_painted(qtbot, theme: Theme) -> None
     menu.close()
 
 
-def test_every_menu_entry_can_be_chosen_by_a_letter(qtbot, theme: Theme) -> None:
+def test_every_menu_entry_has_a_mnemonic(qtbot, theme: Theme) -> None:
     place, done = QWidget(), []
     made = [QAction(words, place) for words in ("Cortar", "Copiar", "Última", "No")]
     for action in made:
@@ -73,7 +73,7 @@ def test_every_menu_entry_can_be_chosen_by_a_letter(qtbot, theme: Theme) -> None
     assert done == ["Cortar", "Copiar", "Última"]  # what is off is not chosen
 
 
-def test_letter_opens_a_submenu(qtbot, theme: Theme) -> None:
+def test_mnemonic_opens_a_submenu(qtbot, theme: Theme) -> None:
     place = QWidget()
     menu = Menu(theme, place)
     inner = Menu(theme, menu, "Look")
@@ -98,7 +98,7 @@ def test_mnemonics_are_underlined_during_keyboard_navigation(qtbot, theme: Theme
     menu.close()
 
 
-def test_text_field_uses_our_context_menu(qtbot, theme: Theme) -> None:
+def test_text_field_uses_the_themed_context_menu(qtbot, theme: Theme) -> None:
     field = QLineEdit("hello")
     EditMenu(theme, field)
     theme.apply()

@@ -49,12 +49,12 @@ def window(qtbot, tmp_path) -> Window:
     return made
 
 
-def test_no_question_is_shown_without_a_request(window) -> None:
+def test_permission_question_is_hidden_without_a_request(window) -> None:
     window.question.refresh()
     assert not window.question.isVisible()
 
 
-def test_question_names_what_moves_and_how_to_stop_it(window) -> None:
+def test_permission_question_names_the_moving_actions_and_the_stop_key(window) -> None:
     window.ask("move", "turn")
     question = window.question
     assert question.isVisible()
@@ -67,7 +67,7 @@ def test_question_names_what_moves_and_how_to_stop_it(window) -> None:
     assert question.accessibleName() == "Allow Rover to move?"
 
 
-def test_allowing_motion_continues_the_action(window) -> None:
+def test_allowing_motion_runs_the_requested_action(window) -> None:
     window.ask("move")
     QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
     assert window.done == ["moved"]
@@ -77,7 +77,7 @@ def test_allowing_motion_continues_the_action(window) -> None:
 
 
 @pytest.mark.parametrize("how", ["button", "escape", "enter"])
-def test_not_now_moves_nothing(window, how) -> None:
+def test_not_now_denies_the_requested_motion(window, how) -> None:
     window.ask("move")
     if how == "button":
         QTest.mouseClick(window.question.not_now, Qt.MouseButton.LeftButton)
@@ -90,7 +90,7 @@ def test_not_now_moves_nothing(window, how) -> None:
     assert not window.permission.is_allowed(ROVER)
 
 
-def test_always_allow_is_saved(window, tmp_path) -> None:
+def test_always_allow_choice_is_saved(window, tmp_path) -> None:
     window.ask("move")
     QTest.mouseClick(
         window.question.always, Qt.MouseButton.LeftButton, pos=window.question.always.rect().center()
@@ -109,7 +109,7 @@ def test_always_allow_that_cannot_be_saved_is_reported_and_motion_is_allowed(win
     assert window.done == ["moved"]
 
 
-def test_stop_closes_the_question(window) -> None:
+def test_stop_closes_the_permission_question(window) -> None:
     window.ask("move")
     window.permission.withdraw()
     window.question.refresh()
@@ -117,7 +117,7 @@ def test_stop_closes_the_question(window) -> None:
     assert window.done == []
 
 
-def test_question_stays_inside_a_small_window_and_follows_resizing(window, qtbot) -> None:
+def test_permission_question_stays_inside_a_small_window(window, qtbot) -> None:
     window.ask("move")
     window.resize(420, 380)
     qtbot.waitUntil(lambda: window.question.width() <= 400)
@@ -125,7 +125,7 @@ def test_question_stays_inside_a_small_window_and_follows_resizing(window, qtbot
     assert inside.contains(window.question.geometry())
 
 
-def test_answer_works_when_the_previously_focused_widget_was_deleted(window) -> None:
+def test_permission_answer_works_after_the_previously_focused_widget_was_deleted(window) -> None:
     window.ask("move")
     window.field.deleteLater()
     QCoreApplication.sendPostedEvents(window.field, QEvent.Type.DeferredDelete.value)
@@ -166,7 +166,7 @@ def test_long_robot_name_is_shown_in_full(qtbot, tmp_path, name, size, percent) 
     assert name in window.question.accessibleName()
 
 
-def test_question_has_its_final_size_when_first_shown(qtbot, tmp_path) -> None:
+def test_permission_question_has_its_final_size_when_first_shown(qtbot, tmp_path) -> None:
     window = Window(tmp_path)
     qtbot.addWidget(window)
     window.question._theme.apply()  # the words grow when the question is polished

@@ -60,7 +60,7 @@ def test_sheet_warns_shows_the_address_and_allows_connections(make):
     assert not sheet.isVisible()
 
 
-def test_not_now_changes_nothing(make):
+def test_not_now_closes_the_sheet_without_allowing_access(make):
     sheet, _reach, asked = make()
     sheet.open()
     sheet.no.click()
@@ -80,7 +80,7 @@ def test_access_is_revoked_in_the_same_sheet(make):
     assert asked == [()]
 
 
-def test_without_a_network_the_sheet_explains_what_to_do_first(make):
+def test_network_access_sheet_reports_a_missing_network_connection(make):
     sheet, reach, _asked = make(here=())
     sheet.open()
     assert sheet.heading.text() == "This computer isn't connected to a network"
@@ -88,7 +88,7 @@ def test_without_a_network_the_sheet_explains_what_to_do_first(make):
     assert access_status(reach)[1] == "This computer only"
 
 
-def test_access_to_a_remote_master_is_decided_on_its_computer(make):
+def test_access_to_a_remote_master_cannot_be_changed_on_this_computer(make):
     sheet, reach, _asked = make(address="192.168.1.9:7780")
     sheet.open()
     assert "192.168.1.9" in sheet.heading.text()

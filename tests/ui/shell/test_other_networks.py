@@ -57,7 +57,7 @@ def test_all_networks_are_disabled_by_default_and_explain_their_address(
     assert world.made == []
 
 
-def test_switch_applies_at_once_and_shows_the_connection_state(
+def test_network_switch_applies_immediately_and_shows_the_connection_state(
     sheet: OtherNetworksSheet, world: World
 ) -> None:
     ros = sheet.rows[0]

@@ -28,7 +28,7 @@ def test_run_bar_offers_the_same_speeds_as_the_menu(window: MainWindow, commands
     assert window.run_bar.pace.accessibleName() == "Speed"
 
 
-def test_speed_applies_to_the_running_program_and_the_next_one(
+def test_speed_applies_to_the_running_program_and_to_later_programs(
     window: MainWindow, commands: Commands
 ) -> None:
     runs, runner = window.session.runs, Runner()
@@ -46,7 +46,9 @@ def test_speed_applies_to_the_running_program_and_the_next_one(
     runs._runner = None
 
 
-def test_start_position_of_virtual_robots_can_be_disabled(window: MainWindow, commands: Commands) -> None:
+def test_reset_of_virtual_robots_to_their_start_position_can_be_disabled(
+    window: MainWindow, commands: Commands
+) -> None:
     fleet, action = window.session.fleet, commands.actions["run.from_start"]
     assert (fleet.resets_at_start, action.isChecked()) == (True, True)
     commands.run("run.from_start")

@@ -43,7 +43,7 @@ def test_match_at_word_start_scores_higher_than_inside_a_word() -> None:
     assert found("Unsaved", "Save", "Auto save", query="save") == ["Save", "Auto save", "Unsaved"]
 
 
-def test_matched_letters_are_reported() -> None:
+def test_positions_of_matched_letters_are_reported() -> None:
     assert bold("reco", "Save last 60 s of the recording") == "reco"
     assert bold("rp", "Reset panels") == "R|p"
     assert bold("text larger", "Larger text") == "Larger|text"
@@ -55,7 +55,7 @@ def test_non_matching_entries_are_not_found(query: str) -> None:
     assert found("Save", "Keyboard shortcuts", "Stop the program", query=query) == []
 
 
-def test_available_commands_rank_above_unavailable_ones() -> None:
+def test_available_commands_rank_above_unavailable_commands() -> None:
     entries = [Entry("command:a", "Let go", reason="Nothing is held"), Entry("command:b", "Go up")]
     assert [each.entry.text for each in Finder(entries).find("go", 20)[0]] == ["Go up", "Let go"]
 
@@ -69,7 +69,7 @@ def test_scattered_letters_do_not_match() -> None:
     ("query", "words"),
     [("rp", "Reset panels"), ("ob", "Open another behaviour"), ("vl", "Volver a poner los paneles")],
 )
-def test_initials_match_a_command(query: str, words: str) -> None:
+def test_query_of_initials_matches_a_command(query: str, words: str) -> None:
     topics = [Entry(f"topic:/{query}", f"/{query}"), Entry(f"topic:/a{query}", f"/a{query}")]
     other = Entry("command:x", f"Take the {query}x away")
     rows, _count = Finder([*topics, Entry("command:layout.reset", words)]).find(query, 20)
@@ -79,11 +79,11 @@ def test_initials_match_a_command(query: str, words: str) -> None:
 
 
 @pytest.mark.parametrize("query", ["p", "pt b", "bp", "pbx", "tb"])
-def test_non_initials_are_not_treated_as_initials(query: str) -> None:
+def test_query_that_is_not_initials_is_not_matched_as_initials(query: str) -> None:
     assert not fuzzy.is_initials(query, "Reset panels")
 
 
-def test_among_ten_thousand_entries_whole_words_are_found_and_all_matches_counted() -> None:
+def test_whole_words_rank_first_and_all_matches_of_ten_thousand_entries_are_counted() -> None:
     many = [Entry(f"topic:/robot{n}/joint/{n % 97}", f"/robot{n}/joint/{n % 97}") for n in range(10_000)]
     finder = Finder([*many, Entry("command:x", "Joists and beams")])
     rows, count = finder.find("joint", 40)
@@ -153,7 +153,7 @@ def test_palette_is_640_px_wide_128_px_from_the_top_and_focused(palette: Palette
     assert palette.rows.entry is not None
 
 
-def test_palette_opens_in_120_ms_and_at_once_with_reduced_motion(
+def test_palette_opens_in_120_ms_and_immediately_with_reduced_motion(
     qtbot, palette: Palette, window: MainWindow
 ) -> None:
     assert palette.graphicsEffect() is None
@@ -164,7 +164,9 @@ def test_palette_opens_in_120_ms_and_at_once_with_reduced_motion(
     qtbot.waitUntil(lambda: palette.graphicsEffect() is None)
 
 
-def test_stop_stays_bright_and_clickable(palette: Palette, window: MainWindow) -> None:
+def test_stop_button_stays_undimmed_and_clickable_above_the_palette(
+    palette: Palette, window: MainWindow
+) -> None:
     stop = window.tool_bar.stop
     middle = stop.mapTo(window, stop.rect().center())
     assert window.childAt(middle) is stop
@@ -333,7 +335,7 @@ def test_empty_result_is_reported(palette: Palette) -> None:
     assert palette.isVisible()
 
 
-def test_list_stays_short_with_very_many_topics(palette: Palette, window: MainWindow) -> None:
+def test_result_list_is_bounded_with_ten_thousand_topics(palette: Palette, window: MainWindow) -> None:
     palette.dismiss()
     for number in range(10_000):
         window.session.topics._topics[f"/t{number}"] = Topic(f"/t{number}", "json", "json")

@@ -62,7 +62,7 @@ def test_unwritable_folder_is_reported(tmp_path: Path) -> None:
     assert sentence.startswith("Can't save the image")
 
 
-def test_nothing_is_written_without_blocks(tmp_path: Path) -> None:
+def test_image_export_without_blocks_writes_no_file(tmp_path: Path) -> None:
     said: list[str] = []
     made(Editor(b""), said).save(tmp_path / "a.png", "png", True)
     assert said == ["This page has no blocks"]

@@ -53,7 +53,7 @@ def test_question_gets_focus_and_enter_answers(card, said, window) -> None:
     assert not card.isVisible()
 
 
-def test_escape_does_not_answer(card, said) -> None:
+def test_escape_answers_with_an_empty_text(card, said) -> None:
     card.show_question(NAME, held=False)
     QTest.keyClicks(card.field, "Ada")
     QTest.keyClick(card.field, Qt.Key.Key_Escape)
@@ -69,7 +69,7 @@ def test_button_answers_and_the_next_question_starts_empty(card, said) -> None:
     assert QApplication.focusWidget() is card.field
 
 
-def test_refresh_keeps_the_text_being_typed(card, said) -> None:
+def test_refresh_keeps_the_typed_text(card, said) -> None:
     card.show_question(NAME, held=False)
     QTest.keyClicks(card.field, "Ad")
     card.show_question(NAME, held=False)
@@ -112,7 +112,7 @@ class Answered:
         self.got.append((question, words))
 
 
-def test_only_the_current_question_is_answered_and_only_once() -> None:
+def test_only_the_current_question_can_be_answered_and_only_once() -> None:
     asking, runner = OpenQuestion(), Answered(4)
     asking.apply(RunnerEvent("ask", 4, text="Nobody runs yet", question=9))
     assert asking.question is None
@@ -169,14 +169,14 @@ def test_choices_are_selected_by_keyboard(card, said, keys, answer) -> None:
     assert said == [(3, answer)]
 
 
-def test_number_key_without_a_choice_does_nothing(card, said) -> None:
+def test_number_key_without_a_matching_choice_has_no_effect(card, said) -> None:
     card.show_question(PET, held=False)
     QTest.keyClick(card.choices.buttons[0], Qt.Key.Key_4)
     QTest.keyClick(card.choices.buttons[0], Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
     assert said == []
 
 
-def test_choices_are_disabled_while_paused_and_keys_are_swallowed(card, said) -> None:
+def test_choices_are_disabled_while_paused_and_keys_are_ignored(card, said) -> None:
     card.show_question(PET, held=False)
     card.show_question(PET, held=True)
     assert QApplication.focusWidget() is card
@@ -191,7 +191,7 @@ def test_choices_are_disabled_while_paused_and_keys_are_swallowed(card, said) ->
 
 
 @pytest.mark.parametrize("size", [(1024, 600), (1440, 900)])
-def test_long_choices_wrap_and_many_choices_scroll_to_the_focused_one(card, window, size, qtbot) -> None:
+def test_long_choices_wrap_and_many_choices_scroll_to_the_focused_choice(card, window, size, qtbot) -> None:
     window.resize(*size)
     many = tuple(f"{number} " + "a choice of some length " * 8 for number in range(12))
     card.show_question(AskedQuestion(1, 4, "Which one? " * 20, many), held=False)
@@ -211,7 +211,9 @@ def test_long_choices_wrap_and_many_choices_scroll_to_the_focused_one(card, wind
 
 
 @pytest.mark.parametrize("away_between", [True, False])
-def test_question_with_more_choices_than_the_previous_one_shows_all(card, qtbot, away_between: bool) -> None:
+def test_question_with_more_choices_than_the_previous_question_shows_all_choices(
+    card, qtbot, away_between: bool
+) -> None:
     card.show_question(AskedQuestion(1, 7, "Play?", ("yes", "no")), held=False)
     QTest.qWait(1)
     if away_between:

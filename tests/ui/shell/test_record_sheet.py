@@ -77,7 +77,7 @@ def shown(window: MainWindow) -> str:
     return window.tools.record.text()
 
 
-def test_shortcut_starts_and_stops_recording_and_the_bars_show_it(window, recorder):
+def test_shortcut_starts_and_stops_recording_and_the_bars_show_the_recording(window, recorder):
     assert window.commands.shortcuts.first("recording.toggle") == "Ctrl+R"
     assert window.commands.shortcuts.first("recording.keep") == "F9"
     assert shown(window) == "Record"
@@ -102,7 +102,7 @@ def test_shortcut_starts_and_stops_recording_and_the_bars_show_it(window, record
     assert ": 0:42, 168 MB" in window.toast.accessibleName()
 
 
-def test_button_starts_recording_and_opens_the_sheet_that_stops_it(window, recorder):
+def test_button_starts_recording_and_opens_the_recording_sheet(window, recorder):
     window.tools.record.click()
     sheet = sheet_of(window)
     assert sheet.isVisible()
@@ -181,7 +181,7 @@ def test_topic_patterns_are_tokens_added_and_removed_by_keyboard(window, recorde
     assert not list(unsaid(field))
 
 
-def test_recording_stops_after_the_chosen_limit_and_its_size_is_estimated(window, recorder):
+def test_recording_stops_at_the_selected_limit_and_its_size_is_estimated(window, recorder):
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
     assert sheet.ends_words.text() == "no limit"
@@ -248,14 +248,14 @@ def test_saving_the_last_seconds_offers_to_enable_the_flight_recorder(window, re
     assert recorder.ops()[-1] == "end_ring"
 
 
-def test_single_topic_is_recorded_but_none_of_another_network(window, recorder):
+def test_single_native_topic_is_recorded_and_topics_of_other_networks_are_rejected(window, recorder):
     assert window.commands.run("record.topic:/odom")
     assert recorder.line.orders[0]["topics"] == ["/odom"]
     assert recorder.session.recordings.choice == RecordingChoice()
     assert not window.commands.run("record.topic:ros2 /odom")
 
 
-def test_missing_recording_file_is_reported_and_the_shown_one_stays(window, recorder, tmp_path, monkeypatch):
+def test_missing_recording_file_is_reported_and_not_opened(window, recorder, tmp_path, monkeypatch):
     path = tmp_path / "a.mcap"
     opened: list[Path] = []
     monkeypatch.setattr(recorder.session, "open_recording", opened.append)

@@ -12,7 +12,7 @@ from tests.ui.fakes.processes import Runner
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
 
-def test_starting_a_second_behaviour_reports_which_one_was_stopped(
+def test_starting_a_second_behaviour_reports_the_stopped_behaviour(
     window: MainWindow, commands: Commands
 ) -> None:
     session = window.session
@@ -28,7 +28,9 @@ def test_starting_a_second_behaviour_reports_which_one_was_stopped(
     assert "Quiz" in window.toast.text
 
 
-def test_restarting_the_same_behaviour_reports_no_stop(window: MainWindow, commands: Commands) -> None:
+def test_restarting_the_same_behaviour_reports_no_stopped_behaviour(
+    window: MainWindow, commands: Commands
+) -> None:
     session = window.session
     runs, seconds = session.runs, itertools.count(0.0, 10.0)
     runs._make_runner, runs._clock = Runner, lambda: next(seconds)

@@ -124,7 +124,7 @@ def test_inspector_shows_the_message_at_the_playhead_and_then_live_messages(
     assert "timeline" not in window.bench.open_names()
 
 
-def test_image_of_a_paused_recording_is_not_silent_and_keeps_its_recorded_age(
+def test_image_of_a_paused_recording_is_not_stale_and_keeps_its_recorded_age(
     qtbot, window, session, path, whole
 ):
     window.show_layout("developer")
@@ -142,7 +142,7 @@ def test_image_of_a_paused_recording_is_not_silent_and_keeps_its_recorded_age(
     assert "Last image" not in image.view.label_text
 
 
-def test_robots_and_alarms_use_the_live_network_during_a_replay(qtbot, window, session, path):
+def test_robots_and_alarms_use_live_messages_during_a_replay(qtbot, window, session, path):
     watch = session.watch("/a")
     opened(qtbot, window, path)
     said = live(session, 2000)
@@ -152,7 +152,7 @@ def test_robots_and_alarms_use_the_live_network_during_a_replay(qtbot, window, s
     watch.close()
 
 
-def test_replay_publishes_and_subscribes_nothing(qtbot, window, session, path, monkeypatch):
+def test_replay_publishes_and_subscribes_to_no_topic(qtbot, window, session, path, monkeypatch):
     asked = []
     monkeypatch.setattr(session.source, "submit", lambda what, job: asked.append(what))
     monkeypatch.setattr(session.source, "watch", asked.append)
@@ -164,7 +164,7 @@ def test_replay_publishes_and_subscribes_nothing(qtbot, window, session, path, m
     assert asked == []
 
 
-def test_recording_is_opened_by_menu_and_drop_and_replaces_the_open_one(
+def test_recording_is_opened_by_menu_and_drop_and_replaces_the_open_recording(
     qtbot, window, session, answers, path, tmp_path
 ):
     answers.path = path
@@ -195,7 +195,7 @@ def test_invalid_recording_raises_an_alert_and_can_be_closed(qtbot, window, sess
     assert session.replay is None
 
 
-def test_tool_bar_and_status_bar_show_the_current_source(qtbot, window, session, path):
+def test_tool_bar_and_status_bar_show_whether_live_or_recorded_data_are_shown(qtbot, window, session, path):
     window.show_layout("developer")
     source = window.tools.source
     window.tools.refresh()
@@ -211,7 +211,7 @@ def test_tool_bar_and_status_bar_show_the_current_source(qtbot, window, session,
     assert (source.text(), source.back.isVisible()) == ("Live network", False)
 
 
-def test_keys_play_step_bookmark_and_zoom(qtbot, window, session, path, whole):
+def test_timeline_shortcuts_play_step_bookmark_and_zoom(qtbot, window, session, path, whole):
     replay = opened(qtbot, window, path)
     panel = window.bench.docks["timeline"].panel
     window.tick()
@@ -244,7 +244,7 @@ def test_keys_play_step_bookmark_and_zoom(qtbot, window, session, path, whole):
     replay.remove_bookmark(replay.bookmarks[0])
 
 
-def test_mouse_seeks_selects_and_zooms(qtbot, window, session, path, whole):
+def test_mouse_seeks_selects_lanes_and_zooms_in_the_timeline(qtbot, window, session, path, whole):
     replay = opened(qtbot, window, path)
     canvas = window.bench.docks["timeline"].panel.canvas
     until(qtbot, window, lambda: replay.densities.newest is not None)
@@ -276,7 +276,9 @@ def test_timeline_lanes_are_darker_where_the_message_density_is_higher():
     assert alphas[1] < alphas[2] < alphas[3] == pytest.approx(0.76, abs=0.01)
 
 
-def test_plot_shows_data_before_the_playhead_and_restarts_when_live(qtbot, window, session, path, whole):
+def test_plot_shows_data_before_the_playhead_and_restarts_on_return_to_live(
+    qtbot, window, session, path, whole
+):
     opened(qtbot, window, path)
     window.plot("/a", "x")
     plot = window.bench.docks["plot"].panel
@@ -291,7 +293,7 @@ def test_plot_shows_data_before_the_playhead_and_restarts_when_live(qtbot, windo
     assert len(plot.shown[0].curve.samples) == 0
 
 
-def test_images_are_those_at_the_playhead(qtbot, window, session, path, whole):
+def test_image_panels_show_images_at_the_playhead(qtbot, window, session, path, whole):
     opened(qtbot, window, path)
     image = window.bench.docks["image"].panel
     go_to(qtbot, window, whole[40][0])
@@ -324,7 +326,9 @@ def test_timeline_keeps_its_height_when_recordings_are_reopened(qtbot, window, s
     assert heights == pytest.approx([364 if moved else 324] * 3, abs=2)
 
 
-def test_plotted_topic_missing_in_the_recording_is_not_listed_in_it(qtbot, window, session, path):
+def test_plotted_topic_missing_in_the_recording_is_not_listed_as_a_recorded_topic(
+    qtbot, window, session, path
+):
     window.show_layout("developer")
     window.plot("/ghost", "x")
     replay = opened(qtbot, window, path)

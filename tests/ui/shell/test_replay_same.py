@@ -212,7 +212,7 @@ def studio(qtbot, theme: Theme, home: Path) -> Iterator[Studio]:
     made.window.close()
 
 
-def test_panels_show_the_same_bytes_in_replay_as_live(studio: Studio, tmp_path: Path) -> None:
+def test_panels_show_identical_bytes_live_and_in_replay(studio: Studio, tmp_path: Path) -> None:
     path, sent = tmp_path / "Tour.mcap", messages()
     last = len(sent) - 1
     places = [*random.Random(4).sample(range(last), 5), last]

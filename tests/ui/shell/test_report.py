@@ -80,7 +80,7 @@ def lines(sheet: ReportSheet) -> str:
     return " ".join(text for _where, text in said_by(sheet))
 
 
-def test_sheet_focuses_the_text_field_and_lists_what_is_included(sheet: ReportSheet) -> None:
+def test_report_sheet_focuses_the_text_field_and_lists_the_report_contents(sheet: ReportSheet) -> None:
     assert sheet.isVisible()
     assert sheet.happened.edit.hasFocus()
     for words in ("Nothing is sent", "Included", "connection doctor", "Not included", "Keys, passwords"):
@@ -125,7 +125,7 @@ def test_folder_path_is_shown_when_the_file_manager_cannot_be_opened(
     assert window.toast._words.text() == f"The file is in {tmp_path}"
 
 
-def test_behaviours_are_included_only_when_enabled_each_time(
+def test_behaviours_are_included_in_a_report_only_if_enabled_each_time(
     qtbot, window: MainWindow, sheet: ReportSheet, session: Session, answers: Answers, tmp_path: Path
 ) -> None:
     sheet.dismiss()
@@ -206,7 +206,9 @@ def test_dismissed_crash_is_not_offered_again(window: MainWindow, session: Sessi
     assert not session.alerts.has(ALERT)
 
 
-def test_sheet_works_by_keyboard(qtbot, sheet: ReportSheet, answers: Answers, tmp_path: Path) -> None:
+def test_report_sheet_is_operated_by_keyboard(
+    qtbot, sheet: ReportSheet, answers: Answers, tmp_path: Path
+) -> None:
     answers.path = tmp_path / "report.zip"
     QTest.keyClicks(sheet.happened.edit, "By keys")
     reached = []

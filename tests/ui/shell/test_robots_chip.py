@@ -34,7 +34,7 @@ def test_several_robots_are_counted() -> None:
     assert chip("ready", "busy", run="running") == ("2 robots", "ok")
 
 
-def test_silent_robot_is_named() -> None:
+def test_unresponsive_robot_is_reported() -> None:
     assert chip("silent") == ("Not responding", "error")
     assert chip("silent", silent="camera silent") == ("Camera silent", "error")
     assert chip("silent", "ready") == ("Robot 1: not responding", "error")

@@ -105,7 +105,7 @@ def test_buttons_keep_their_position_in_all_states(bar: RunBar) -> None:
     assert len(places) == 1
 
 
-def test_run_button_shows_resume_when_paused(bar: RunBar) -> None:
+def test_run_button_text_is_resume_while_paused(bar: RunBar) -> None:
     bar.show_view(VIEWS["paused"])
     assert bar.run.text() == "Resume"
     bar.show_view(VIEWS["ready"])
@@ -186,7 +186,7 @@ def test_stop_button_fits_all_its_texts_and_its_shortcut(qtbot, theme: Theme, pl
     assert needed + 12 <= size.width() - 2 * 4, "within its frame, with some air"
 
 
-def test_detail_that_is_too_long_for_one_line_uses_two(bar: RunBar) -> None:
+def test_detail_that_is_too_long_for_one_line_uses_two_lines(bar: RunBar) -> None:
     fault = "“walk” stopped: Pepper did not say within 20 s that it had arrived, and it may have met a wall"
     bar.show_view(replace(VIEWS["proven"], detail=fault, result=None))
     sentence = bar.sentence
@@ -200,7 +200,7 @@ def test_detail_that_is_too_long_for_one_line_uses_two(bar: RunBar) -> None:
     assert fault in sentence.toolTip()
 
 
-def test_state_text_keeps_its_width_beside_a_stop_result_in_a_narrow_window(qtbot, bar: RunBar) -> None:
+def test_state_text_keeps_its_width_next_to_a_stop_result_in_a_narrow_window(qtbot, bar: RunBar) -> None:
     bar.show_view(replace(VIEWS["proven"], result="Pepper stopped (41 ms)"))
     assert bar.pause.sizeHint().width() == bar.pause.full_width()
     bar.resize(1024, 60)
@@ -208,7 +208,7 @@ def test_state_text_keeps_its_width_beside_a_stop_result_in_a_narrow_window(qtbo
     assert bar.pause.sizeHint().width() < bar.pause.full_width()
 
 
-def test_long_successful_result_is_shortened_to_leave_room_for_an_error(qtbot, bar: RunBar) -> None:
+def test_long_success_result_is_shortened_to_make_room_for_an_error(qtbot, bar: RunBar) -> None:
     good = "the robot of the second group and all others have stopped (41 ms), as far as anybody can tell"
     fault = replace(VIEWS["proven"], title="Stopped after 14 s because of an error", result=good)
     bar.resize(1093, 60)

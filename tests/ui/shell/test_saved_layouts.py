@@ -53,7 +53,7 @@ def use(window: MainWindow, commands: Commands, name: str) -> None:
     next(e for e in commands.menus._layouts.actions() if e.text() == name).trigger()
 
 
-def test_layout_is_saved_under_a_name_and_the_built_in_one_stays(
+def test_layout_is_saved_under_a_name_and_the_built_in_layout_is_unchanged(
     shown: MainWindow, commands: Commands
 ) -> None:
     before = opened(shown)

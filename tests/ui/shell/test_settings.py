@@ -38,7 +38,7 @@ def press(segments, value: str) -> None:
     QTest.mouseClick(segments._segments[value], Qt.MouseButton.LeftButton)
 
 
-def test_every_choice_applies_at_once_and_is_saved(
+def test_every_settings_choice_applies_immediately_and_is_saved(
     sheet: SettingsSheet, window: MainWindow, home: Path
 ) -> None:
     press(sheet.mode, "dark")
@@ -55,7 +55,9 @@ def test_every_choice_applies_at_once_and_is_saved(
     again.deleteLater()
 
 
-def test_changes_made_in_menus_are_shown_in_the_settings(sheet: SettingsSheet, commands: Commands) -> None:
+def test_changes_made_in_menus_are_shown_in_the_settings_sheet(
+    sheet: SettingsSheet, commands: Commands
+) -> None:
     commands.run("theme.dark")
     commands.run("text.larger")
     commands.run("theme.contrast")

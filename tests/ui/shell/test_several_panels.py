@@ -98,7 +98,7 @@ def test_panel_key_encodes_kind_and_number(key, kind) -> None:
     assert key_of(*kind) == key
 
 
-def test_additional_panel_opens_beside_the_first_with_a_number_and_its_own_topic(
+def test_additional_panel_opens_next_to_the_first_with_a_number_and_its_own_topic(
     qtbot, bench, window
 ) -> None:
     first = bench.docks["inspector"]
@@ -116,7 +116,7 @@ def test_additional_panel_opens_beside_the_first_with_a_number_and_its_own_topic
     assert first.x() == second.x()
 
 
-def test_additional_panel_beside_a_tabbed_dock_keeps_the_tabs(qtbot, bench, window) -> None:
+def test_additional_panel_next_to_a_tabbed_dock_keeps_the_tabs(qtbot, bench, window) -> None:
     first = bench.docks["image"]
     bench.tabifyDockWidget(first, bench.docks["console"])
     first.raise_()
@@ -128,7 +128,7 @@ def test_additional_panel_beside_a_tabbed_dock_keeps_the_tabs(qtbot, bench, wind
     assert second.title.tabs == ()
 
 
-def test_single_instance_panel_does_not_offer_another(bench) -> None:
+def test_single_instance_panel_offers_no_additional_panel(bench) -> None:
     assert MORE not in [action.text() for action in bench.docks["topics"].menu().actions()]
     assert bench.open("topics#2") is None
     assert bench.open("inspector#9") is None
@@ -192,7 +192,7 @@ def test_closed_additional_panel_is_destroyed_and_can_be_restored(qtbot, bench, 
     assert bench.docks["inspector#2"] is not second
 
 
-def test_first_panel_is_kept_when_it_is_closed(bench) -> None:
+def test_first_panel_of_a_kind_is_hidden_and_reused_when_closed_and_reopened(bench) -> None:
     first, second = bench.docks["inspector"], bench.open_another("inspector")
     assert second is not None
     first.close()
@@ -201,7 +201,7 @@ def test_first_panel_is_kept_when_it_is_closed(bench) -> None:
     assert again is first, "the free number is the first"
 
 
-def test_topic_opens_in_the_last_used_panel_or_in_an_additional_one(qtbot, bench, window) -> None:
+def test_topic_opens_in_the_last_used_panel_or_in_an_additional_panel(qtbot, bench, window) -> None:
     window.open_topic("/a")
     assert topic_of(bench, "inspector") == "/a"
     window.context.open_to_side("/b")
@@ -244,7 +244,7 @@ def test_command_for_an_additional_panel_is_found_in_the_palette(bench, window, 
     assert bench.docks["inspector#2"].isVisible()
 
 
-def test_every_kind_listed_in_the_palette_has_a_heading(bench, window) -> None:
+def test_every_entry_kind_in_the_palette_has_a_heading(bench, window) -> None:
     kinds = {entry.kind for entry in window.commands.view._entries.all()}
     assert kinds <= TITLES.keys()
     assert "another" in kinds

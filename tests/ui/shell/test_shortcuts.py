@@ -43,7 +43,7 @@ def test_default_shortcuts_are_unique(keys: Shortcuts) -> None:
     assert all(key == QKeySequence(key).toString() for key in given)
 
 
-def test_ctrl_y_is_redo(window: MainWindow, commands: Commands, keys: Shortcuts) -> None:
+def test_ctrl_y_triggers_redo(window: MainWindow, commands: Commands, keys: Shortcuts) -> None:
     assert keys.keys_of("edit.redo") == ("Ctrl+Shift+Z", "Ctrl+Y")
     assert [key.toString() for key in commands.actions["edit.redo"].shortcuts()] == ["Ctrl+Shift+Z", "Ctrl+Y"]
     assert keys.command_for("Ctrl+Y") == "edit.redo"
@@ -87,7 +87,7 @@ def test_macos_menu_bar_is_native(qtbot, theme: Theme, window: MainWindow, comma
 
 
 @pytest.mark.parametrize("held", [CTRL, Qt.KeyboardModifier.ShiftModifier])
-def test_text_navigation_keys_are_left_to_the_text_field(
+def test_text_navigation_keys_are_handled_by_the_text_field(
     qtbot, theme: Theme, held: Qt.KeyboardModifier
 ) -> None:
     left: list[str] = []
@@ -127,7 +127,7 @@ def test_two_commands_swap_their_shortcuts(keys: Shortcuts) -> None:
     assert (keys.keys_of("file.open"), keys.keys_of("file.save")) == (("Ctrl+S",), ("Ctrl+O",))
 
 
-def test_one_or_all_shortcuts_are_reset(keys: Shortcuts, tmp_path: Path) -> None:
+def test_a_single_shortcut_or_all_shortcuts_can_be_reset(keys: Shortcuts, tmp_path: Path) -> None:
     keys.swap("file.open", "Ctrl+S")
     keys.reset("file.open")
     assert (keys.keys_of("file.open"), keys.keys_of("file.save")) == (("Ctrl+O",), ("Ctrl+S",))
@@ -233,7 +233,7 @@ def test_sheet_lists_every_command_and_every_fixed_shortcut(sheet: ShortcutSheet
     assert {"File", "View", "Run", "Blocks"} <= set(headings)
 
 
-def test_changed_shortcut_works_at_once_everywhere(
+def test_changed_shortcut_applies_immediately_to_action_tooltip_and_palette(
     sheet: ShortcutSheet, window: MainWindow, commands: Commands
 ) -> None:
     choose(sheet, "Pause")

@@ -119,7 +119,7 @@ def _pairs(widgets: list[QWidget]) -> Iterator[str]:
 
 @pytest.mark.parametrize("mode", ["light", "dark"])
 @pytest.mark.parametrize("percent", TEXT)
-def test_nothing_is_clipped_or_overlaps_at_any_window_and_text_size(
+def test_no_text_is_clipped_and_no_widgets_overlap_at_any_window_and_text_size(
     qtbot, window: MainWindow, mode: Mode, percent: int
 ) -> None:
     window.theme.set_mode(mode)
@@ -157,7 +157,9 @@ def tabs_of(bench: Workbench, name: str) -> set[str]:
     return there & FOLDING
 
 
-def test_panels_collapse_into_tabs_gradually_and_are_restored(qtbot, window: MainWindow) -> None:
+def test_panels_are_tabified_stepwise_in_small_windows_and_separated_in_large_windows(
+    qtbot, window: MainWindow
+) -> None:
     window.resize(1440, 900)
     bench = window.show_layout("behaviour")
     docks = bench.docks
@@ -190,7 +192,7 @@ def test_panels_collapse_into_tabs_gradually_and_are_restored(qtbot, window: Mai
     assert docks["problems"].x() == docks["behaviour"].x()
 
 
-def test_collapsed_panels_stay_collapsed_after_restart(qtbot, window: MainWindow) -> None:
+def test_tabified_panels_stay_tabified_after_restart(qtbot, window: MainWindow) -> None:
     window.resize(1024, 600)
     bench = window.show_layout("behaviour")
     settle(qtbot, window)
@@ -205,7 +207,7 @@ def test_collapsed_panels_stay_collapsed_after_restart(qtbot, window: MainWindow
     again.dispose()
 
 
-def test_tab_of_a_collapsed_panel_shows_a_count_badge(qtbot, window: MainWindow) -> None:
+def test_tab_of_a_tabified_panel_shows_a_count_badge(qtbot, window: MainWindow) -> None:
     window.resize(1024, 600)
     bench = window.show_layout("behaviour")
     settle(qtbot, window)
@@ -239,7 +241,9 @@ def test_narrow_title_shows_other_tabs_as_icons_with_accessible_names(qtbot, win
     assert tabs["Problems"].toolTip() == ""
 
 
-def test_app_bar_shortens_its_texts_before_its_menus(qtbot, window: MainWindow, tmp_path: Path) -> None:
+def test_app_bar_shortens_its_texts_before_collapsing_its_menus(
+    qtbot, window: MainWindow, tmp_path: Path
+) -> None:
     window.resize(1024, 600)
     window.show_layout("behaviour")
     settle(qtbot, window)
@@ -281,7 +285,9 @@ def test_question_of_the_start_page_is_placed_higher_in_a_low_window(qtbot, wind
     assert tops[0] == tops[2] < tops[1]
 
 
-def test_chip_beside_tabs_loses_its_text_before_the_tabs_do(qtbot, theme: Theme, window: MainWindow) -> None:
+def test_status_chip_in_a_narrow_title_loses_its_text_before_the_tabs_do(
+    qtbot, theme: Theme, window: MainWindow
+) -> None:
     chip = Chip(theme, "ready")
 
     class WithChip(PanelWidget):
@@ -323,12 +329,12 @@ STOP = QRect(780, 50, 230, 52)
         (QRect(60, 60, 900, 300), (60, 102)),  # too wide for that: below it
     ],
 )
-def test_menu_that_would_cover_stop_is_moved_aside(menu: QRect, goes_to: tuple[int, int]) -> None:
+def test_menu_that_would_cover_stop_is_moved(menu: QRect, goes_to: tuple[int, int]) -> None:
     assert avoid_stop(menu, STOP, SCREEN).topLeft().toTuple() == goes_to
     assert avoid_stop(menu, STOP, SCREEN).size() == menu.size()
 
 
-def test_menu_that_is_too_wide_to_move_aside_is_narrowed() -> None:
+def test_menu_that_is_too_wide_to_avoid_stop_is_narrowed() -> None:
     assert avoid_stop(QRect(0, 0, 1000, 590), STOP, SCREEN) == QRect(0, 0, 780, 590)
     early = QRect(100, 50, 230, 52)  # left of this there is no room for words
     assert avoid_stop(QRect(0, 0, 1000, 590), early, SCREEN) == QRect(0, 0, 1000, 590)

@@ -57,7 +57,7 @@ def test_start_page_offers_a_robot_a_behaviour_and_examples(page: StartPage) -> 
     assert [card.text() for card in page.example_cards] == ["Greeting", "Quiz"]
 
 
-def test_only_one_button_is_filled(page: StartPage) -> None:
+def test_start_page_has_exactly_one_primary_button(page: StartPage) -> None:
     assert [b.text() for b in page.findChildren(Button) if b.kind == "primary"] == ["Use the virtual robot"]
 
 
@@ -70,7 +70,7 @@ def filled(page: StartPage) -> list[str]:
     return [b.text() for b in page.findChildren(Button) if b.kind == "primary"]
 
 
-def test_first_steps_are_offered_first_to_a_new_user(qtbot, page: StartPage) -> None:
+def test_new_user_is_offered_the_first_steps_before_other_cards(qtbot, page: StartPage) -> None:
     page.offer_first_steps()
     page.focus_first()
     qtbot.waitUntil(lambda: cards(page)[0] is page.learn_card)
@@ -87,7 +87,7 @@ def test_first_steps_are_offered_first_to_a_new_user(qtbot, page: StartPage) -> 
     assert order == ["First steps", "Cancel", "Use the virtual robot", "New behaviour"]
 
 
-def test_not_now_turns_the_first_steps_offer_into_one_of_three_cards(qtbot, page: StartPage) -> None:
+def test_declining_the_first_steps_offer_restores_the_three_cards(qtbot, page: StartPage) -> None:
     before = cards(page)
     page.offer_first_steps()
     (no,) = [each for each in page.findChildren(Button) if each.text() == "Cancel"]
@@ -107,7 +107,7 @@ def test_first_steps_are_not_offered_when_work_is_open(page: StartPage) -> None:
     assert not page.offers_first_steps
 
 
-def test_pressed_buttons_emit_their_signals(qtbot, page: StartPage, tmp_path: Path) -> None:
+def test_start_page_buttons_emit_their_signals(qtbot, page: StartPage, tmp_path: Path) -> None:
     told: list[object] = []
     page.virtual_robot_pressed.connect(lambda: told.append("robot"))
     page.new_behaviour_pressed.connect(lambda: told.append("new"))
@@ -142,13 +142,13 @@ def test_open_work_is_listed_first_and_opens_its_tab(page: StartPage) -> None:
     assert "Open now" not in words(page)
 
 
-def test_help_shows_all_examples_and_focuses_the_first(page: StartPage) -> None:
+def test_examples_command_shows_all_examples_and_focuses_the_first(page: StartPage) -> None:
     page.focus_examples()
     assert page.focusWidget() is page.example_cards[0]
     assert all(card.isVisible() for card in page.example_cards)
 
 
-def test_help_scrolls_the_examples_into_view(qtbot, page: StartPage) -> None:
+def test_examples_command_scrolls_the_examples_into_view(qtbot, page: StartPage) -> None:
     page.resize(1280, 700)
     page.show_open([OpenWork("a", "Greeting")])
     page.hide()
@@ -167,7 +167,7 @@ def test_returning_to_the_start_page_scrolls_to_the_top(qtbot, page: StartPage) 
     assert bar.value() == 0
 
 
-def test_open_work_rows_are_reused_when_unchanged(page: StartPage) -> None:
+def test_rows_of_unchanged_open_work_are_reused(page: StartPage) -> None:
     work = [OpenWork("a", "Greeting")]
     page.show_open(work)
     row = page.open_work.rows[0]
@@ -194,7 +194,7 @@ def test_recent_files_are_listed_with_their_date(page: StartPage, tmp_path: Path
     ("days", "said"),
     [(0, "Today, 9:00"), (1, "Yesterday"), (3, "17 November"), (400, "16 October 2025")],
 )
-def test_dates_are_formatted_in_words(days: int, said: str) -> None:
+def test_recent_dates_are_formatted_relative_to_today(days: int, said: str) -> None:
     assert relative_day_text(NOW - dt.timedelta(days=days), NOW) == said
 
 
@@ -211,7 +211,9 @@ def test_robots_chip_is_shown_only_with_a_robot(qtbot, page: StartPage) -> None:
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_large_text_scrolls_and_clips_nothing(qtbot, page: StartPage, theme: Theme, percent: int) -> None:
+def test_start_page_with_large_text_scrolls_and_clips_no_text(
+    qtbot, page: StartPage, theme: Theme, percent: int
+) -> None:
     page.resize(1100, 660)
     theme.set_text_percent(percent)
     QTest.qWait(1)
@@ -268,11 +270,11 @@ def test_damaged_example_is_skipped(tmp_path: Path) -> None:
         ("robot_pepper_when_touched", "events"),
     ],
 )
-def test_block_category_is_derived_from_its_type(kind: str, category: str) -> None:
+def test_block_category_is_derived_from_the_block_type(kind: str, category: str) -> None:
     assert category_of(kind) == category
 
 
-def test_preview_rows_follow_the_blocks_and_indent_nested_ones() -> None:
+def test_preview_rows_follow_the_block_order_and_indent_nested_blocks() -> None:
     inner = {"type": "robot_pepper_do_say", "inputs": {"TEXT": {"shadow": {"type": "values_text"}}}}
     repeat = {
         "type": "control_repeat",
@@ -294,7 +296,7 @@ def test_workspace_without_blocks_has_no_preview_rows(workspace: dict[str, objec
     assert rows(workspace) == ()
 
 
-def test_one_row_of_examples_is_shown_and_all_on_request(qtbot, theme: Theme) -> None:
+def test_first_row_of_examples_is_shown_and_all_examples_on_request(qtbot, theme: Theme) -> None:
     shipped = read_examples(resources.path("examples"))
     page = StartPage(theme, shipped)
     qtbot.addWidget(page)
@@ -312,5 +314,5 @@ def test_one_row_of_examples_is_shown_and_all_on_request(qtbot, theme: Theme) ->
     assert len(shown()) == 4
 
 
-def test_few_examples_need_no_show_all_link(page: StartPage) -> None:
+def test_show_all_link_is_hidden_with_few_examples(page: StartPage) -> None:
     assert not [each for each in page.findChildren(LinkButton) if each.isVisible() and "All" in each.text()]

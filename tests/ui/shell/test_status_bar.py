@@ -52,7 +52,7 @@ def test_robot_that_has_not_reported_is_connected_and_not_healthy(session: fakes
     assert facts(session).health() == ("circle-dashed", "Pepper is connected", "off")
 
 
-def test_disconnected_robot_counts_as_to_check(session: fakes.Session) -> None:
+def test_disconnected_robot_is_counted_as_needing_attention(session: fakes.Session) -> None:
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.is_connected = False
@@ -81,7 +81,7 @@ def test_unsaved_work_that_cannot_be_backed_up_is_reported(session: fakes.Sessio
     assert facts(session).save_state()[1] == "Not saved · backed up"
 
 
-def test_traffic_item_counts_live_topics_only(session: fakes.Session) -> None:
+def test_traffic_item_counts_nodes_topics_and_messages_of_the_live_network(session: fakes.Session) -> None:
     session.traffic.messages_per_s = 268.6
     assert facts(session).traffic()[1] == "7 nodes, 12 topics, 269 messages/s"
     session.traffic.messages_per_s = None
@@ -90,13 +90,13 @@ def test_traffic_item_counts_live_topics_only(session: fakes.Session) -> None:
     assert facts(session).traffic()[1] == ""
 
 
-def test_lost_messages_are_shown_only_when_there_are_any(session: fakes.Session) -> None:
+def test_lost_messages_item_is_hidden_without_losses(session: fakes.Session) -> None:
     assert facts(session).lost()[1] == ""
     session.traffic.lost_30s = 12
     assert facts(session).lost() == ("triangle-alert", "12 lost in 30 s", "warn")
 
 
-def test_number_of_messages_not_shown_is_reported(session: fakes.Session) -> None:
+def test_status_bar_reports_the_number_of_messages_not_shown(session: fakes.Session) -> None:
     session.traffic.shown_30s = session.traffic.sent_30s = 900
     assert facts(session).displayed_messages()[1] == ""
     session.traffic.sent_30s = 4900

@@ -146,7 +146,7 @@ def presses(window: MainWindow, stops: list[str]) -> list[str]:
 
 
 @pytest.mark.parametrize("opened", OPENED[:4], ids=lambda each: each.__name__)
-def test_first_press_on_stop_stops_and_closes_popups(
+def test_first_click_on_stop_triggers_stop_and_closes_popups(
     window: MainWindow, presses: list[str], opened: Callable[[MainWindow], None]
 ) -> None:
     opened(window)
@@ -161,7 +161,7 @@ def test_first_press_on_stop_stops_and_closes_popups(
     assert QApplication.activePopupWidget() is None
 
 
-def test_press_outside_a_popup_and_outside_stop_only_closes_the_popup(
+def test_click_outside_a_popup_closes_the_popup_without_triggering_stop(
     window: MainWindow, presses: list[str]
 ) -> None:
     a_menu(window)
@@ -218,7 +218,7 @@ def test_stop_works_during_drag_and_drop_of_a_field(
 
 
 @pytest.mark.parametrize("key", [Qt.Key.Key_Escape, Qt.Key.Key_Shift, Qt.Key.Key_Control])
-def test_keys_that_control_a_drag_are_not_intercepted(window: MainWindow, monkeypatch, key: Qt.Key) -> None:
+def test_keys_that_control_a_drag_do_not_trigger_stop(window: MainWindow, monkeypatch, key: Qt.Key) -> None:
     ended: list[str] = []
     monkeypatch.setattr(QDrag, "cancel", staticmethod(lambda: ended.append("cancelled")))
     keys = DragKeys(ended.append)

@@ -74,7 +74,7 @@ def test_new_variable_is_named_in_a_sheet_and_created(shown: MainWindow, command
     assert editor(shown).edited[1] == {"do": "new", "name": "names", "list": True}
 
 
-def test_existing_name_is_not_suggested(shown: MainWindow, commands: Commands) -> None:
+def test_suggested_variable_name_is_unused(shown: MainWindow, commands: Commands) -> None:
     used = [{"id": str(number), "name": name} for number, name in enumerate(["count", "Count 2"])]
     shown.session.document.apply_edit({**SAVED, "variables": used})
     commands.run("variable.new")
@@ -82,7 +82,9 @@ def test_existing_name_is_not_suggested(shown: MainWindow, commands: Commands) -
 
 
 @pytest.mark.parametrize("name", ["score", "SCORE", "名前"])
-def test_existing_name_is_reported_while_typing(shown: MainWindow, commands: Commands, name: str) -> None:
+def test_existing_variable_name_is_reported_while_typing(
+    shown: MainWindow, commands: Commands, name: str
+) -> None:
     commands.run("variable.new")
     sheet = sheet_of(shown)
     typed(sheet, name)
@@ -97,7 +99,9 @@ def test_existing_name_is_reported_while_typing(shown: MainWindow, commands: Com
     assert editor(shown).edited == []
 
 
-def test_renamed_variable_may_differ_only_in_letter_case(shown: MainWindow, commands: Commands) -> None:
+def test_variable_can_be_renamed_to_a_name_that_differs_only_in_letter_case(
+    shown: MainWindow, commands: Commands
+) -> None:
     commands.run("variable.rename:s")
     sheet = sheet_of(shown)
     assert (sheet.heading.text(), sheet.field.text()) == ("New name for “Score”", "Score")
@@ -119,7 +123,7 @@ def test_deleting_a_variable_reports_removed_blocks_and_can_be_undone(
     assert shown.toast.text == "Deleted “名前”"
 
 
-def test_uses_of_a_variable_are_shown_in_turn(shown: MainWindow, commands: Commands) -> None:
+def test_find_command_steps_through_the_uses_of_a_variable(shown: MainWindow, commands: Commands) -> None:
     for _ in range(3):
         commands.run("variable.find:s")
     assert [edit["id"] for edit in editor(shown).edited] == ["set", "get", "set"]

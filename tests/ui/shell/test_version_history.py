@@ -87,7 +87,7 @@ def test_enter_opens_the_selected_version_as_a_copy(qtbot, commands, shown, tmp_
     assert (path.read_bytes(), oldest.is_file()) == (before, True)
 
 
-def test_button_and_double_click_open_a_version_too(qtbot, commands, shown, tmp_path: Path) -> None:
+def test_button_and_double_click_open_a_version(qtbot, commands, shown, tmp_path: Path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     save_version(path)
     commands.files.open(path)
@@ -126,7 +126,7 @@ def test_versions_of_other_files_with_the_same_name_are_listed_below(
     assert rows(sheet) == [same, ("Versions of other files named Mine", ""), same]
 
 
-def test_empty_list_explains_what_creates_a_version(qtbot, commands, shown, tmp_path: Path) -> None:
+def test_empty_version_list_explains_how_versions_are_created(qtbot, commands, shown, tmp_path: Path) -> None:
     commands.files.open(saved(tmp_path / "Mine.nepb"))
     sheet = opened(qtbot, commands, shown)
     assert not sheet.rows.isVisible()

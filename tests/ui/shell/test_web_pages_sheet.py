@@ -126,7 +126,7 @@ def test_client_of_a_real_server_is_listed_and_disconnected(
     web.close()
 
 
-def test_topic_figures_are_updated_in_place_and_keep_selection_and_expansion(desk: Desk) -> None:
+def test_topic_stats_are_updated_in_place_and_keep_selection_and_expansion(desk: Desk) -> None:
     server, model, table = with_pages(desk), desk.sheet.model, desk.sheet.table
     table.setExpanded(model.index(0, 0), False)
     table.setCurrentIndex(model.index(0, 0, model.index(1, 0)))
@@ -176,7 +176,7 @@ def test_refreshing_many_pages_takes_less_than_a_frame(desk: Desk) -> None:
     assert len(told) == 2  # the page and its topic; nothing else is repainted
 
 
-def test_new_token_disconnects_pages_and_undo_restores_the_old_one(desk: Desk) -> None:
+def test_new_token_disconnects_pages_and_undo_restores_the_previous_token(desk: Desk) -> None:
     desk.web.listen_on(WIFI.host)
     with_pages(desk)
     before = desk.web.token
@@ -201,7 +201,9 @@ def test_token_is_hidden_and_copied_in_full(desk: Desk) -> None:
     assert access.token.text() == desk.web.token
 
 
-def test_qr_code_opens_the_test_page_and_stays_light_in_the_dark_theme(desk: Desk, theme: Theme) -> None:
+def test_qr_code_encodes_the_test_page_url_and_stays_light_in_the_dark_theme(
+    desk: Desk, theme: Theme
+) -> None:
     desk.web.listen_on(WIFI.host)
     desk.switch_on()
     code = desk.sheet.access.qr
@@ -225,7 +227,7 @@ def test_qr_code_is_empty_while_only_this_computer_can_connect(desk: Desk) -> No
     assert desk.sheet.access.qr.accessibleName() != ""
 
 
-def test_allowed_origins_are_tokens_and_an_invalid_one_is_kept_as_typed(desk: Desk) -> None:
+def test_allowed_origins_are_tokens_and_invalid_text_is_kept_as_typed(desk: Desk) -> None:
     field = desk.sheet.permissions.origins
     field.edit.setFocus()
     QTest.keyClicks(field.edit, "http://lab.example 192.168.1.20")
@@ -237,7 +239,7 @@ def test_allowed_origins_are_tokens_and_an_invalid_one_is_kept_as_typed(desk: De
     assert (desk.web.origins, list(field.tokens)) == ((), [])
 
 
-def test_allowed_robots_are_selected_by_check_boxes_and_apply_at_once(desk: Desk) -> None:
+def test_allowed_robots_are_selected_by_check_boxes_and_applied_immediately(desk: Desk) -> None:
     server, choice = desk.switch_on(), desk.sheet.permissions.robots
     desk.web.set_robots(["Rover"])  # allowed before, not connected now
     choice.choose.click()
@@ -274,7 +276,7 @@ def test_rejected_robot_links_to_the_selection_of_robots(desk: Desk) -> None:
     assert not sheet.notice.isVisible()
 
 
-def test_each_tab_has_its_own_switch(desk: Desk) -> None:
+def test_rosbridge_and_foxglove_tabs_have_separate_switches(desk: Desk) -> None:
     server, sheet = desk.switch_on(), desk.sheet
     sheet.tabs.set_value("foxglove")
     sheet.refresh()
@@ -289,7 +291,7 @@ def test_each_tab_has_its_own_switch(desk: Desk) -> None:
     assert desk.web.full_url in QGuiApplication.clipboard().text()
 
 
-def test_port_in_use_offers_a_free_one(qtbot, theme: Theme, master: Master, events: queue.Queue) -> None:
+def test_port_in_use_offers_a_free_port(qtbot, theme: Theme, master: Master, events: queue.Queue) -> None:
     web = WebPages(master.address, events.put, addresses=tuple)
     desk = Desk(qtbot, theme, web, events)
     web.sentence, web.free_port, web._failed = "Port 9090 is in use.", 9091, frozenset({"rosbridge"})
@@ -334,7 +336,7 @@ def test_texts_are_translated_and_fit(
     qtbot.waitUntil(lambda: clipped(desk.sheet) == [])  # Qt lays out later
 
 
-def test_sheet_is_placed_at_the_right_edge_below_stop(qtbot, theme: Theme, window) -> None:
+def test_sheet_is_placed_at_the_right_edge_below_the_stop_button(qtbot, theme: Theme, window) -> None:
     window.show()
     window.commands.run("layout.developer")
     window.commands.run("network.web")
@@ -349,7 +351,7 @@ def test_sheet_is_placed_at_the_right_edge_below_stop(qtbot, theme: Theme, windo
     assert not sheet.isVisible()
 
 
-def test_status_bar_shows_who_can_connect_and_opens_the_sheet(window) -> None:
+def test_status_bar_shows_access_and_connected_pages_and_opens_the_sheet(window) -> None:
     window.show()
     window.commands.run("layout.developer")
     web = window.session.web_pages

@@ -38,7 +38,7 @@ class Run:
         self.is_asked = True
 
 
-def test_crashes_of_several_windows_are_combined_into_one_offer(session: Session, home: Path) -> None:
+def test_crashes_of_several_windows_are_combined_into_one_alert(session: Session, home: Path) -> None:
     report_crashes(session, Run(Crash("studio", "without a word"), Crash("studio", "without a word")))
     assert [each.id for each in session.alerts.active] == [ALERT]
     assert len(CrashReports().all()) == 2
@@ -68,12 +68,12 @@ def test_work_and_settings_of_a_newer_studio_are_reported(pseudo: None, home: Pa
     assert [words for words in told.values() if untranslated(words, "Mine", "settings", "json")] == []
 
 
-def test_nothing_is_reported_without_data_of_a_newer_studio(session: Session) -> None:
+def test_no_alert_is_raised_without_data_of_a_newer_studio(session: Session) -> None:
     raise_startup_alerts(session)
     assert not session.alerts.active
 
 
-def test_first_start_of_another_version_is_recorded(window: MainWindow, home: Path) -> None:
+def test_versions_are_recorded_with_the_time_of_their_first_start(window: MainWindow, home: Path) -> None:
     window.state.save(studio_versions.KEY, [{"version": "0.0.9", "since_s": 1000.0}])
     save_version(window, 2000.0)
     save_version(window, 3000.0)
@@ -99,7 +99,7 @@ def test_termination_signal_closes_the_window_cleanly(qtbot, window: MainWindow,
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_ignored_sighup_stays_ignored(window: MainWindow) -> None:
+def test_ignored_sighup_is_not_overridden(window: MainWindow) -> None:
     before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
     try:

@@ -68,7 +68,7 @@ def test_click_is_handled_between_two_deferred_steps(qtbot: QtBot) -> None:
     assert seen == ["one", "click", "two"]
 
 
-def test_window_that_is_not_painted_runs_the_steps_a_little_later(qtbot: QtBot) -> None:
+def test_deferred_steps_run_after_a_timeout_if_the_window_is_not_painted(qtbot: QtBot) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     done: list[int] = []
@@ -77,7 +77,9 @@ def test_window_that_is_not_painted_runs_the_steps_a_little_later(qtbot: QtBot) 
     assert done == [1]
 
 
-def test_failing_step_does_not_prevent_the_others(qtbot: QtBot, caplog: pytest.LogCaptureFixture) -> None:
+def test_failing_deferred_step_does_not_prevent_later_steps(
+    qtbot: QtBot, caplog: pytest.LogCaptureFixture
+) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     done: list[int] = []
@@ -131,7 +133,7 @@ def test_window_is_built_without_importing_panels_editor_and_heavy_packages(tmp_
 
 
 @pytest.mark.parametrize("mode", ["light", "dark"])
-def test_widgets_of_the_first_paint_use_our_fonts(
+def test_widgets_of_the_first_paint_use_the_bundled_fonts(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str
 ) -> None:
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))

@@ -27,7 +27,7 @@ def python(*arguments: str, words: str = "") -> subprocess.CompletedProcess[str]
     )
 
 
-def test_window_parser_accepts_files_and_theme() -> None:
+def test_window_parser_accepts_files_theme_and_demo() -> None:
     options = window_parser().parse_intermixed_args(["story.nepb", "--theme", "dark", "--demo", "tour.nepb"])
     assert options.files == [Path("story.nepb"), Path("tour.nepb")]
     assert (options.theme, options.demo, options.self_drive, options.new_window) == (
@@ -61,13 +61,13 @@ def test_only_known_child_processes_are_started(capsys: pytest.CaptureFixture[st
     assert "no process 'os'" in capsys.readouterr().err
 
 
-def test_recorder_of_a_frozen_build_runs_in_its_own_process() -> None:
+def test_frozen_build_starts_the_recorder_as_a_module_process() -> None:
     done = python("-m", "app", "--module", "nep.recordings.child", "--help")
     assert done.returncode == 0, done.stderr
     assert "--master" in done.stdout
 
 
-def test_module_entry_passes_its_options() -> None:
+def test_module_entry_passes_options_to_the_module() -> None:
     done = python("-m", "app", "--module", "nep", "--help")
     assert done.returncode == 0
     assert "topic" in done.stdout

@@ -40,7 +40,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return found
 
 
-def test_widget_whose_overrides_raise_is_still_shown(qtbot, fail, told: list[str]) -> None:
+def test_widget_with_raising_overrides_is_still_shown(qtbot, fail, told: list[str]) -> None:
     class Bad(QWidget):
         def paintEvent(self, _event: QPaintEvent) -> None:
             painter = QPainter(self)  # still active when it fails
@@ -107,7 +107,7 @@ def test_errors_in_layout_and_model_overrides_are_logged(qtbot, fail, told: list
     assert view.model().index(0).data() is None
 
 
-def test_method_that_is_no_override_still_raises(qapp) -> None:
+def test_exception_in_a_method_that_is_no_qt_override_propagates(qapp) -> None:
     class Own(QWidget):
         def count(self) -> int:
             return int("x")

@@ -19,7 +19,7 @@ from app.ui.startup import graphics
         ({graphics.CHOICE: "software"}, True, {graphics.CHOICE: "software"}, True),
     ],
 )
-def test_software_rendering_is_chosen_without_a_gpu_unless_the_user_set_it(
+def test_software_rendering_is_selected_without_a_gpu_unless_set_by_the_user(
     given, has_one, wanted, is_so
 ) -> None:
     environ = dict(given)

@@ -86,7 +86,7 @@ sys.exit(0)
 """
 
 
-def test_file_open_events_are_handled_while_the_editor_browser_is_loaded() -> None:
+def test_file_open_events_are_received_before_and_after_the_web_engine_is_loaded() -> None:
     """What macOS does, which tells the application; a filter of all events ended Studio (SIGSEGV) there."""
     environ = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
     if hasattr(os, "geteuid") and os.geteuid() == 0:

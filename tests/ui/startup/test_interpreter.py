@@ -110,7 +110,7 @@ def test_older_gc_generations_are_collected_less_often(monkeypatch: pytest.Monke
     assert asked == [0, 1, 2]
 
 
-def test_gc_freeze_runs_a_while_after_the_last_restart_of_its_timer(qtbot: object, qapp: object) -> None:
+def test_gc_freeze_timer_runs_one_interval_after_its_last_restart(qtbot: object, qapp: object) -> None:
     owner = QObject()
     timer = interpreter.GcFreezeTimer(owner)
     timer.setInterval(20)

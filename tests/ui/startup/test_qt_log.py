@@ -31,7 +31,9 @@ from app.ui.startup.qt_log import FLAGS, ConsoleHandler, TerminalHandler, on_qt_
         ("The page says: Failed to load vulkan:", True),
     ],
 )
-def test_only_known_noise_is_dropped(caplog: pytest.LogCaptureFixture, words: str, heard: bool) -> None:
+def test_only_known_irrelevant_qt_messages_are_dropped(
+    caplog: pytest.LogCaptureFixture, words: str, heard: bool
+) -> None:
     on_qt_message(QtMsgType.QtWarningMsg, QMessageLogContext(), words)
     assert [record.getMessage() for record in caplog.records] == ([words] if heard else [])
 
@@ -57,7 +59,7 @@ def test_chromium_flags_of_the_user_are_kept(before: str | None, after: str) -> 
     assert "sandbox" not in environ[FLAGS]
 
 
-def test_log_records_are_buffered_until_the_console_takes_them() -> None:
+def test_log_records_are_buffered_until_drained_by_the_console() -> None:
     log = ConsoleHandler()
     logger = logging.getLogger("qt.test_messages")
     logger.addHandler(log)

@@ -70,13 +70,13 @@ def test_each_namespace_restriction_is_detected() -> None:
     assert guarded == ["False"] * 3
 
 
-def test_without_namespaces_seccomp_and_user_flags_are_kept() -> None:
+def test_namespace_sandbox_is_disabled_without_namespaces_and_user_flags_are_kept() -> None:
     environ = {FLAGS: "--log-level=3"}
     configure_sandbox(environ, Told(False))
     assert environ == {FLAGS: f"--log-level=3 {NO_NAMESPACES_FLAG}"}
 
 
-def test_nothing_is_changed_with_namespaces_or_without_a_trial() -> None:
+def test_sandbox_flags_are_unchanged_with_namespaces_or_without_a_test_process() -> None:
     environ: dict[str, str] = {}
     configure_sandbox(environ, Told(True))
     configure_sandbox(environ, None)
@@ -87,7 +87,7 @@ def test_nothing_is_changed_with_namespaces_or_without_a_trial() -> None:
     ("environ", "platform"),
     [({}, "win32"), ({}, "darwin"), ({DISABLE_VARIABLE: "1"}, "linux"), ({FLAGS: "--no-sandbox"}, "linux")],
 )
-def test_no_trial_is_made_when_the_user_set_the_sandbox_option(
+def test_no_sandbox_test_runs_on_other_systems_or_if_the_user_set_the_option(
     environ: dict[str, str], platform: str
 ) -> None:
     assert start_trial(environ, platform) is None

@@ -53,11 +53,13 @@ def second(name: str, *files: str, cwd: Path) -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-c", SECOND, name, *files], cwd=cwd, env=environ)
 
 
-def test_start_without_a_running_instance_opens_its_own_window(name: str) -> None:
+def test_start_without_a_running_instance_opens_a_window(name: str) -> None:
     assert send_request(name, StartRequest()) is False
 
 
-def test_second_process_hands_over_absolute_paths(qtbot, name: str, tmp_path: Path) -> None:
+def test_second_process_passes_absolute_paths_to_the_running_instance(
+    qtbot, name: str, tmp_path: Path
+) -> None:
     asked: list[StartRequest] = []
     meeting = meet(name, asked.append)
     assert meeting.open
@@ -108,7 +110,7 @@ def test_second_of_two_simultaneous_starts_waits_for_the_window_of_the_first(
     turn.release()
 
 
-def test_start_that_dies_before_its_window_opens_is_not_waited_for(name: str, tmp_path: Path) -> None:
+def test_start_does_not_wait_for_an_earlier_start_that_was_killed(name: str, tmp_path: Path) -> None:
     turn = FileLock(tmp_path / "starting")
     process = starting(name, tmp_path / "starting")
     assert process.stdout is not None
@@ -121,7 +123,7 @@ def test_start_that_dies_before_its_window_opens_is_not_waited_for(name: str, tm
     turn.release()
 
 
-def test_second_window_does_not_replace_the_first_server(qtbot, name: str, tmp_path: Path) -> None:
+def test_second_window_does_not_replace_the_single_instance_server(qtbot, name: str, tmp_path: Path) -> None:
     asked: list[StartRequest] = []
     first = meet(name, asked.append)
     later = meet(name, asked.append)
@@ -222,7 +224,9 @@ def test_without_a_private_folder_studio_starts_without_a_socket(
 
 
 @needs_modes
-def test_file_that_is_not_our_socket_is_not_connected_to(qtbot, runtime: Path, tmp_path: Path) -> None:
+def test_file_that_is_not_a_socket_of_this_user_is_not_connected_to(
+    qtbot, runtime: Path, tmp_path: Path
+) -> None:
     name = socket_name(tmp_path)
     os.mkfifo(name)
     assert send_request(name, StartRequest()) is False
@@ -273,12 +277,12 @@ def test_unresponsive_instance_does_not_block_a_start(qtbot, name: str, monkeypa
     process.communicate()
 
 
-def test_start_request_is_parsed() -> None:
+def test_start_request_is_parsed_or_rejected() -> None:
     assert parse(b'{"files": ["/a.nepb"], "demo": true}') == StartRequest((Path("/a.nepb"),), True)
     assert parse(b"\xff") is None
 
 
-def test_window_that_closes_during_a_later_start_raises_nothing(
+def test_closing_the_window_during_a_later_start_raises_no_error(
     qtbot, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Qt deletes the connection with the window, and says then that it is disconnected."""

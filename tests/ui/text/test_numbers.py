@@ -32,12 +32,12 @@ from tests.pseudo import untranslated
         (seconds_text(1.42), "1.4 s"), (seconds_text(14.3), "14 s"), (seconds_text(180), "3 min"),
     ],
 )  # fmt: skip
-def test_figures_are_formatted_as_text(made: str, words: str) -> None:
+def test_rates_sizes_and_durations_are_formatted(made: str, words: str) -> None:
     assert made == words
 
 
 @pytest.mark.usefixtures("pseudo")
-def test_key_names_are_translated_and_letters_are_not() -> None:
+def test_key_names_are_translated_and_letter_keys_are_not() -> None:
     said = [shortcut_text("Ctrl+Shift+S"), shortcut_text("Up, PgDown"), shortcut_text("Meta+Tab", "darwin")]
     assert untranslated(" ".join(said).replace("Ctrl", "ctrl")) == []
     assert "Tab" not in said[2]

@@ -38,7 +38,7 @@ def test_unknown_sensor_values_are_blank() -> None:
     assert sensor_texts(Fleet(Pepper=Link()), [("Pepper", "battery")]) == ({"Pepper/battery": ""}, set())
 
 
-def test_values_of_a_silent_robot_are_stale_and_a_disconnected_robot_has_none() -> None:
+def test_values_of_an_unresponsive_robot_are_stale_and_of_a_disconnected_robot_absent() -> None:
     _, old = sensor_texts(Fleet(Pepper=Link(values=TOLD, state="silent")), SENSORS)
     assert old == {"Pepper/battery", "Pepper/pose/x", "Pepper/sees_face"}
     assert sensor_texts(Fleet(Pepper=Link(values=TOLD, is_connected=False)), SENSORS) == ({}, set())

@@ -45,7 +45,7 @@ def test_every_icon_of_the_design_is_shipped() -> None:
     assert wanted <= icons.names()
 
 
-def test_licences_are_shipped_beside_the_icons() -> None:
+def test_licences_of_icons_and_fonts_are_shipped() -> None:
     assert "ISC License" in resources.path("icons", "LICENSE.txt").read_text("utf-8")
     for name in ("Inter", "JetBrainsMono", "MPLUS1p"):
         text = resources.path("fonts", f"LICENSE-{name}.txt").read_text("utf-8")
@@ -89,7 +89,7 @@ def test_every_icon_used_in_the_code_is_shipped() -> None:
     assert named - {"dot", "error", "behaviour"} <= icons.names()  # a disc, a colour, a layout
 
 
-def test_every_shape_is_an_svg_that_paints_something(qapp) -> None:
+def test_every_icon_svg_paints_visible_pixels(qapp) -> None:
     blank = []
     for name in sorted(icons.names()):
         image = QImage(24, 24, QImage.Format.Format_ARGB32_Premultiplied)
@@ -133,7 +133,7 @@ def test_copies_of_an_icon_outlive_the_original(theme: Theme) -> None:
     assert all(not copy.pixmap(QSize(16, 16), 1.0).isNull() for copy in copies)
 
 
-def test_repeatedly_painted_icon_is_rendered_once_and_looks_the_same(qapp) -> None:
+def test_repeatedly_painted_icon_is_rendered_once_with_identical_pixels(qapp) -> None:
     def painted(paint: Callable[[QPainter], None]) -> QImage:
         image = QImage(40, 40, QImage.Format.Format_RGB32)
         image.setDevicePixelRatio(2.0)

@@ -103,7 +103,7 @@ def test_panels_clip_no_text(qtbot, theme: Theme, full: bool, percent: int, long
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
 @pytest.mark.parametrize("width", [384, 640])
-def test_action_is_readable_and_can_be_tried_without_horizontal_scrolling(
+def test_action_card_can_be_used_without_horizontal_scrolling_at_every_text_size(
     qtbot, theme: Theme, percent: int, width: int
 ) -> None:
     theme.set_text_percent(percent)

@@ -36,7 +36,7 @@ class Hints(QObject):
         self.colorSchemeChanged.emit()
 
 
-def test_roles_have_the_colours_of_their_mode(theme: Theme) -> None:
+def test_colour_roles_depend_on_the_theme_mode(theme: Theme) -> None:
     assert theme.colour("accent").name() == "#2f4fd0"
     theme.set_mode("dark")
     assert theme.colour("accent").name() == "#4c66e6"
@@ -48,7 +48,7 @@ def test_unknown_role_raises(theme: Theme) -> None:
         theme.colour("sparkle")
 
 
-def test_alpha_is_the_last_component_of_a_colour_token() -> None:
+def test_last_component_of_a_colour_token_is_alpha() -> None:
     assert qt_colour("#1C1B1966") == QColor(0x1C, 0x1B, 0x19, 0x66)
 
 
@@ -77,7 +77,7 @@ def test_system_colour_scheme_is_followed_only_in_system_mode(qapp: QApplication
     assert not theme.dark
 
 
-def test_mode_change_repaints_a_label_at_once(qtbot, theme: Theme) -> None:
+def test_mode_change_repaints_a_label_immediately(qtbot, theme: Theme) -> None:
     theme.apply()
     shown = label("words", role="accentText")
     qtbot.addWidget(shown)
@@ -141,7 +141,7 @@ def test_high_contrast_has_strong_edges_and_no_tints(theme: Theme) -> None:
     assert theme.colour("okTint") == theme.colour("panel")
 
 
-def test_block_editor_gets_the_colours_of_the_mode(theme: Theme) -> None:
+def test_block_editor_tokens_have_the_colours_of_the_theme_mode(theme: Theme) -> None:
     theme.set_mode("dark")
     tokens = theme.blockly_tokens()
     assert tokens["dark"] is True

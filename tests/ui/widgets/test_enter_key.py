@@ -36,7 +36,7 @@ def test_enter_presses_the_focused_button(qtbot, window, key):
     qtbot.waitUntil(lambda: window.pressed == ["button"])
 
 
-def test_text_fields_and_other_keys_are_not_affected(qtbot, window):
+def test_enter_key_handling_leaves_text_fields_and_other_keys_unchanged(qtbot, window):
     window.button.setFocus()
     QTest.keyClick(window.windowHandle(), Qt.Key_Return, Qt.ControlModifier)
     QTest.keyClick(window.windowHandle(), Qt.Key_A)
@@ -47,7 +47,7 @@ def test_text_fields_and_other_keys_are_not_affected(qtbot, window):
     assert window.pressed == ["field"]
 
 
-def test_holding_enter_down_presses_once(qtbot, window):
+def test_holding_enter_presses_the_button_once(qtbot, window):
     window.button.setFocus()
     held = QKeyEvent(QEvent.Type.KeyPress, Qt.Key_Return, Qt.NoModifier, "\r", True)
     QTest.keyPress(window.windowHandle(), Qt.Key_Return)

@@ -26,7 +26,7 @@ def keys(texts: list[str]) -> list[str]:
     ]
 
 
-def test_initial_letters_come_first_and_no_letter_is_used_twice() -> None:
+def test_mnemonics_prefer_initial_letters_and_are_unique() -> None:
     assert keys(["Cut", "Copy", "Copy as image", "Paste", "Última", "42"]) == ["C", "O", "A", "P", "U"]
     assert mnemonic_positions(["aa", "aA", ""]) == [0, -1, -1]
 
@@ -35,14 +35,14 @@ def test_ampersand_and_shortcut_are_stripped_from_menu_texts() -> None:
     assert strip_mnemonic("C&ut\tCtrl+X") == "Cut"
 
 
-def test_menu_bar_has_a_unique_ascii_letter_for_every_menu(language: str) -> None:
+def test_every_menu_of_the_menu_bar_has_a_unique_ascii_mnemonic(language: str) -> None:
     titles = with_mnemonics([i18n.gettext(name) for name in MENUS])
     chosen = [title[title.index("&") + 1].upper() for title in titles]
     assert len(set(chosen)) == len(MENUS), titles
     assert all(each.isascii() and each.isalpha() for each in chosen), titles
 
 
-def test_no_letter_is_used_twice_within_a_menu(language: str) -> None:
+def test_mnemonics_are_unique_within_a_menu(language: str) -> None:
     for menu in MENUS:
         entries = [command.label for command in COMMANDS if command.menu == menu and not command.submenu]
         entries += {i18n.gettext(each.submenu) for each in COMMANDS if each.menu == menu and each.submenu}

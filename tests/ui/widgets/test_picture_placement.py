@@ -72,7 +72,7 @@ def test_zoom_has_limits() -> None:
 
 
 @pytest.mark.parametrize("turns", range(1, 4))
-def test_rotation_direction_is_the_same_when_flipped(turns: int) -> None:
+def test_flipped_image_rotates_in_the_same_direction(turns: int) -> None:
     upright, flipped = PicturePlacement(), PicturePlacement()
     flipped.flip(across=True)
     corner = QPointF(0, 0)

@@ -47,7 +47,7 @@ def test_model_obeys_qt_rules_while_rows_are_added_removed_and_moved(qtmodeltest
         qtmodeltester.check(model)
 
 
-def test_many_rows_removed_at_once_are_one_model_reset(qtbot, model) -> None:
+def test_removing_many_rows_emits_a_single_model_reset(qtbot, model) -> None:
     model.set_rows([Row(f"{number:05}") for number in range(2000)])
     removed = QSignalSpy(model.rowsRemoved)
     with qtbot.waitSignal(model.modelReset):
@@ -91,7 +91,7 @@ def test_selected_row_is_kept_when_rows_are_added_and_the_order_changes(view, mo
     assert view.selected_key() == "a"
 
 
-def test_click_and_return_open_a_row_and_slash_requests_the_filter(qtbot, view) -> None:
+def test_click_and_return_open_a_row_and_slash_emits_filter_requested(qtbot, view) -> None:
     opened: list[str] = []
     view.opened.connect(opened.append)
     QTest.mouseClick(view.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(40, 26 + 13))
@@ -102,7 +102,7 @@ def test_click_and_return_open_a_row_and_slash_requests_the_filter(qtbot, view) 
         QTest.keyClicks(view, "/")
 
 
-def test_click_on_a_header_sorts_and_another_click_reverses_the_order(qtbot, view) -> None:
+def test_click_on_a_header_sorts_and_a_second_click_reverses_the_order(qtbot, view) -> None:
     with qtbot.waitSignal(view.order_changed):
         view.horizontalHeader().sectionClicked.emit(1)
     assert (view.order.column, view.order.is_descending) == (COLUMNS[1], True)  # figures: the largest first
@@ -110,7 +110,7 @@ def test_click_on_a_header_sorts_and_another_click_reverses_the_order(qtbot, vie
     assert view.order.is_descending is False
 
 
-def test_only_visible_rows_are_updated_with_one_signal(qapp, view, model) -> None:
+def test_visible_rows_are_updated_with_a_single_signal(qapp, view, model) -> None:
     model.set_rows([Row(f"{number:05}", 1.0) for number in range(10_000)])
     qapp.processEvents()  # the view lays out its rows
     told = QSignalSpy(model.dataChanged)
@@ -187,7 +187,7 @@ def test_row_height_follows_the_density(view) -> None:
     assert view.cell_font(Cell("x")).pixelSize() == 14
 
 
-def test_column_chosen_by_the_user_is_not_hidden_when_space_is_short(view) -> None:
+def test_column_shown_by_the_user_is_not_hidden_when_space_is_short(view) -> None:
     columns = (
         COLUMNS[0],
         replace(COLUMNS[1], hide_order=1),
@@ -202,7 +202,7 @@ def test_column_chosen_by_the_user_is_not_hidden_when_space_is_short(view) -> No
     assert choice.fitting_columns([100, 60, 60], 300) == {0, 1, 2}  # the first names the row
 
 
-def test_column_choice_is_saved_and_invalid_state_is_ignored() -> None:
+def test_column_visibility_is_saved_and_invalid_state_is_ignored() -> None:
     choice = ColumnChoice(COLUMNS)
     choice.show("rate", False)
     again = ColumnChoice(COLUMNS)

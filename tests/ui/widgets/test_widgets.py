@@ -90,7 +90,7 @@ def test_double_click_restores_the_default(slider: SliderWithUnit) -> None:
     assert slider.value == 0.25
 
 
-def test_click_on_the_track_moves_the_slider_there(slider: SliderWithUnit) -> None:
+def test_click_on_the_track_moves_the_slider_to_the_click_position(slider: SliderWithUnit) -> None:
     place = QPoint(slider.track.width() - 10, slider.track.height() // 2)
     QTest.mouseClick(slider.track, Qt.MouseButton.LeftButton, pos=place)
     assert slider.value == pytest.approx(1.0)
@@ -105,7 +105,9 @@ def test_click_on_the_track_moves_the_slider_there(slider: SliderWithUnit) -> No
         ("nan", "Enter a number."),
     ],
 )
-def test_invalid_number_is_kept_and_explained(slider: SliderWithUnit, typed: str, sentence: str) -> None:
+def test_invalid_number_is_kept_and_the_reason_is_shown(
+    slider: SliderWithUnit, typed: str, sentence: str
+) -> None:
     slider.field.setText(typed)
     slider.field.editingFinished.emit()
     assert slider.field.text() == typed
@@ -118,13 +120,13 @@ def test_invalid_number_is_kept_and_explained(slider: SliderWithUnit, typed: str
     assert slider.field.sentence == ""
 
 
-def test_empty_range_raises(theme: Theme) -> None:
+def test_slider_with_an_empty_range_raises(theme: Theme) -> None:
     with pytest.raises(ValueError, match="no range from 1 to 1"):
         SliderWithUnit(theme, 1, 1)
 
 
 @pytest.mark.parametrize(("step", "digits"), [(1, 0), (5, 0), (0.5, 1), (0.05, 2), (1e-9, 6)])
-def test_decimals_are_derived_from_the_step(step: float, digits: int) -> None:
+def test_number_of_decimals_is_derived_from_the_step(step: float, digits: int) -> None:
     assert decimals_of(step) == digits
 
 
@@ -147,7 +149,7 @@ def test_segments_are_selected_by_arrow_keys_and_only_user_changes_emit_a_signal
     assert (made.value, told) == ("b", ["a", "b"])
 
 
-def test_chip_without_text_is_hidden_and_opens_no_window(qtbot, theme: Theme) -> None:
+def test_chip_without_text_is_hidden_and_chip_without_parent_opens_no_window(qtbot, theme: Theme) -> None:
     holder = QWidget()
     chip = Chip(theme, "", "ok", parent=holder)
     loose = Chip(theme, "ready", "ok")
@@ -163,7 +165,7 @@ def test_chip_without_text_is_hidden_and_opens_no_window(qtbot, theme: Theme) ->
         chip.set("x", "sparkling")
 
 
-def test_buttons_are_filled_by_their_kind(qtbot, theme: Theme) -> None:
+def test_only_enabled_primary_buttons_are_filled(qtbot, theme: Theme) -> None:
     primary = Button(theme, "Try", "play", kind="primary")
     shown(qtbot, primary)
     assert theme.colour("accent").name() in colours(primary)
@@ -388,7 +390,7 @@ def test_tab_moves_through_rows_and_not_into_a_combo_box_popup(qtbot) -> None:
     assert tab_stops_of(choice) == [choice]
 
 
-def test_steady_label_is_laid_out_again_only_for_wider_text(qtbot) -> None:
+def test_steady_label_changes_its_size_hint_only_for_wider_or_empty_text(qtbot) -> None:
     label = SteadyLabel("body", "text")
     qtbot.addWidget(label)
     label.setText("15 fps (15 shown)")

@@ -84,7 +84,7 @@ def worked_out(name: str, *values: object) -> object:
         ("is_divisible", (1, 0), "“is_divisible” can't divide by 0."),
     ],
 )
-def test_calculation_results(name, values, expected):
+def test_calculations_return_expected_results(name, values, expected):
     assert worked_out(name, *values) == expected
 
 
@@ -115,7 +115,7 @@ def test_non_number_is_rejected_with_explanation(wrong):
         (LARGE, LARGE + 2, 2, [LARGE, LARGE + 2]),
     ],
 )
-def test_counting_range_includes_first_and_last(first, last, step, expected):
+def test_counting_range_includes_both_ends(first, last, step, expected):
     assert list(calculation.counting(first, last, step)) == expected
 
 
@@ -139,7 +139,7 @@ def test_number_blocks_run_and_error_names_its_block():
     )
 
 
-def test_every_option_of_a_block_is_readable_and_runs():
+def test_every_option_of_a_block_has_a_readable_label_and_runs():
     from app.blocks.toolbox.catalogue import Catalogue
 
     known = Catalogue([]).blocks

@@ -17,7 +17,7 @@ from tests.blocks.samples import block, get, list_of, number, started, text, wor
 FRUITS = list_of(text("apple"), text("pear"), text("fig"))
 
 
-def test_list_items_are_counted_from_1_and_described_in_words() -> None:
+def test_list_items_are_indexed_from_1_and_lists_are_formatted_as_text() -> None:
     fruits = lists.new_list("apple", "pear", "fig")
     assert [lists.item(fruits, where) for where in (1, 2.0, "first", "last")] == [
         "apple", "pear", "apple", "fig",
@@ -226,7 +226,7 @@ def test_nested_list_is_deep_copied_when_added() -> None:
         ("is_empty_list", ("",), "This block needs a list, not a text."),
     ],
 )
-def test_list_calculation_results(name, given, expected):
+def test_list_calculations_return_expected_results(name, given, expected):
     try:
         result = getattr(lists, name)(*given)
     except BehaviourError as error:

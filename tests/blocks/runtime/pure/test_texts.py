@@ -104,7 +104,7 @@ def test_letters_are_grapheme_clusters(words, count):
         ("has_number", ("",), False),
     ],
 )  # fmt: skip
-def test_text_operation_results(name, given, expected):
+def test_text_operations_return_expected_results(name, given, expected):
     result = worked_out(name, *given)
     assert (type(result), result) == (type(expected), expected)
 

@@ -101,7 +101,7 @@ def cell(panel: PlotPanel, name: str, column: str) -> str:
 # -- curves ------------------------------------------------------------------------------------------------
 
 
-def test_plot_without_curves_explains_how_to_add_one(panel, window) -> None:
+def test_plot_without_curves_offers_to_add_a_curve(panel, window) -> None:
     assert panel.pages.currentIndex() == 0
     assert window.session.series.topics == ()
     press(button(panel.empty, "Add a curve"))
@@ -173,7 +173,7 @@ def test_curves_differ_in_more_than_their_colour(panel) -> None:
     assert [bool(pen.dashPattern()) for pen in pens] == [bool(dash) for dash in DASHES]
 
 
-def test_invalid_field_suggests_the_intended_one(panel) -> None:
+def test_nonexistent_field_suggests_a_similar_field(panel) -> None:
     show(panel, "/odom.sped")
     send(panel, "/odom", sine(0, 3))
     look(panel)
@@ -211,7 +211,7 @@ def test_single_value_between_two_gaps_is_drawn_as_a_dot(panel) -> None:
     assert len(places) < 20
 
 
-def test_state_changes_within_a_pixel_are_painted_once(panel) -> None:
+def test_state_changes_within_one_pixel_are_painted_once(panel) -> None:
     show(panel, "/odom.mode")
     send(panel, "/odom", [(t / 100, {"mode": f"step {t}"}) for t in range(6000)])
     panel._curves_changed()
@@ -235,7 +235,7 @@ def test_footer_reports_undecodable_and_discarded_messages(panel) -> None:
 # -- time --------------------------------------------------------------------------------------------------
 
 
-def test_plot_follows_new_data_and_pauses_while_data_are_still_recorded(panel) -> None:
+def test_plot_scrolls_with_new_data_and_recording_continues_while_paused(panel) -> None:
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 70))
     look(panel)
@@ -387,7 +387,7 @@ def test_eye_icon_hides_a_curve_and_its_menu_changes_axis_and_colour(panel, wind
     assert [(each.name, each.right, each.look.colour) for each in panel.shown][1] == ("/odom.turn", True, 3)
 
 
-def test_plot_keys_work_in_the_table_too(panel) -> None:
+def test_plot_shortcuts_work_while_the_table_has_focus(panel) -> None:
     show(panel, "/odom.speed")
     look(panel)
     panel.table.setFocus()
@@ -443,7 +443,7 @@ def test_fields_are_suggested_with_values_and_accepted_by_enter(adding, window) 
     assert window.session.watched == ["/odom"], "nothing else is looked at any more"
 
 
-def test_tab_completes_to_the_next_dot(adding) -> None:
+def test_tab_key_completes_a_field_up_to_the_next_dot(adding) -> None:
     panel = adding
     panel.add.setText("/od")
     QTest.keyClick(panel.add, Qt.Key.Key_Tab)
@@ -456,7 +456,7 @@ def test_tab_completes_to_the_next_dot(adding) -> None:
     assert panel.add.text() == "mean(/odom.speed"
 
 
-def test_expression_is_accepted_and_all_array_elements_are_added_at_once(adding, window) -> None:
+def test_expression_is_accepted_and_all_array_elements_can_be_added_together(adding, window) -> None:
     panel = adding
     QTest.keyClicks(panel.add, "/odom.speed * 2")
     QTest.keyClick(panel.add, Qt.Key.Key_Return)
@@ -470,7 +470,7 @@ def test_expression_is_accepted_and_all_array_elements_are_added_at_once(adding,
     assert panel.shown[0].curve.samples.values.tolist() == [6.0]
 
 
-def test_typing_error_stays_in_the_field_with_a_suggestion(adding) -> None:
+def test_nonexistent_topic_stays_in_the_input_with_a_suggestion(adding) -> None:
     panel = adding
     panel.add.setText("/odon.speed + 1")
     QTest.keyClick(panel.add, Qt.Key.Key_Return)
@@ -580,7 +580,7 @@ def test_layout_restores_the_plot_even_if_topics_are_missing(qtbot, panel, windo
      {"curves": [{"topic": "/a", "path": "b", "colour": "x", "pattern": -3, "right": 7}]},
      {"span": "x"}, {"span": float("inf")}, {"span": -1}, {"curves": None, "across": 3}],
 )  # fmt: skip
-def test_damaged_layout_leaves_a_working_plot(panel, state) -> None:
+def test_damaged_layout_restores_a_usable_plot(panel, state) -> None:
     panel.restore_state(state)
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 5))
