@@ -390,7 +390,7 @@ class RejectedPayloads:
         now = self._clock()
         if self._located[0] != reason and (now >= self._locate_at or not self._located[0]):
             self._locate_at = now + _VALIDATE_INTERVAL_S  # finding the path may take long
-            place = "" if getattr(error, "path", "") else _escaped_unencodable_path(payload, self._encode)
+            place = "" if getattr(error, "place", "") else _escaped_unencodable_path(payload, self._encode)
             self._located = (reason, f"{reason}; it is at '{place}'" if place else reason)
         sentence = self._located[1] if self._located[0] == reason else reason
         if is_logged(self.count):
