@@ -130,7 +130,7 @@ class AccessForm(QWidget):
         grid.setVerticalSpacing(8)
         grid.setColumnStretch(1, 1)
         for place, words in enumerate((_("Address"), _("Token"), _("Available on"))):
-            grid.addWidget(label(words, "body", role="textSecondary"), place, 0)
+            grid.addWidget(label(words, "body", role="textSecondary", wrap=True), place, 0)
         grid.addWidget(self.address, 0, 1)
         grid.addLayout(token, 1, 1)
         grid.addWidget(self.open_to, 2, 1)
