@@ -135,7 +135,7 @@ def test_alerts_cover_no_panel_and_panels_keep_their_size(
         studio.says("replied in ")
         panel, answer = (
             studio.find(kind="ServicesPanel")["rect"],
-            studio.find("Answer", kind="TableView")["rect"],
+            studio.find("Reply", kind="TableView")["rect"],
         )
         assert answer[3] > 60
         assert panel[0] <= answer[0] < answer[0] + answer[2] <= panel[0] + panel[2]
