@@ -58,7 +58,7 @@ import app.core.session
 from app.ui import application as module
 from PySide6.QtCore import QEvent, QObject, QTimer
 at["imports"] = now()
-module.qt_log.listen()
+module.qt_log.install_handlers()
 app = module.make_application()
 at["application"] = now()
 session = module.Session()
@@ -95,7 +95,7 @@ looking.timeout.connect(look)
 looking.start(10)
 window.on_shut = lambda: QTimer.singleShot(0, app.quit)
 soon = module.DeferredSteps(window, module.deferred_steps(window))
-soon.prepend([window.begin])
+soon.prepend([window.start_session])
 window.show()
 app.exec()
 """

@@ -133,7 +133,7 @@ def message(heard: Heard, studio: Studio, address: str) -> list[str]:
 
         until(topic, "the topic")
         studio.window.open_topic("pose")
-        until(lambda: getattr(topic(), "watched", False), "the Inspector looks")
+        until(lambda: getattr(topic(), "is_watched", False), "the Inspector looks")
         for _ in range(3):
             other.tell("again")
             other.answer()
