@@ -184,7 +184,7 @@ def test_tab_stays_open_when_the_overwritten_content_cannot_be_backed_up(
     commands.run("tab.close")
     assert path.read_bytes() == before
     assert (names(window), window.session.document.dirty) == (["Mine"], True)
-    assert window.session.alerts.active[0].title.startswith("Mine.nepb was not saved")
+    assert window.session.alerts.active[0].title.startswith("Mine.nepb wasn't saved")
 
 
 def test_saving_over_changes_of_another_program_backs_up_the_changes(

@@ -180,7 +180,7 @@ def test_f12_cannot_be_assigned_to_another_command_even_in_the_settings_file(
         (Qt.Key.Key_S, NONE, "single letter"),
         (Qt.Key.Key_Return, NONE, "single letter"),
         (Qt.Key.Key_A, Qt.KeyboardModifier.ShiftModifier, "single letter"),
-        (Qt.Key.Key_F12, NONE, "F12 always stops"),
+        (Qt.Key.Key_F12, NONE, "F12 always"),
         (Qt.Key.Key_C, CTRL, "Ctrl+C is reserved"),
         (Qt.Key.Key_F4, NONE, ""),
         (Qt.Key.Key_S, CTRL, ""),
