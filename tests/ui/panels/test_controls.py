@@ -358,7 +358,7 @@ def test_image_button_opens_the_file_dialog_in_the_last_folder(theme, qtbot, tmp
 
 
 def test_folder_and_pipe_are_not_opened_as_an_image(tmp_path) -> None:
-    assert read_picture(tmp_path)[1] == f"“{tmp_path.name}” is not a file."
+    assert read_picture(tmp_path)[1] == f"“{tmp_path.name}” isn't a file."
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe.png")
         assert read_picture(tmp_path / "pipe.png")[1] == "“pipe.png” isn't a file."

@@ -125,7 +125,7 @@ def test_value_is_set_with_return_and_rejected_input_is_kept(qtbot, world: World
     QTest.keyClicks(part.field, "9")
     QTest.keyClick(part.field, Qt.Key.Key_Return)
     world.settle(qtbot)
-    assert part.sentence.text() == "The parameter 'speed' cannot be 9.0; the maximum is 2."
+    assert part.sentence.text() == "The parameter 'speed' can't be 9.0: the maximum is 2."
     assert (part.field.text(), part.field.property("wrong")) == ("9", "true")
     part.field.selectAll()
     QTest.keyClicks(part.field, "fast")
@@ -186,7 +186,7 @@ def test_disabled_field_explains_why_a_parameter_cannot_be_set(world: World) -> 
     world.window.session.source.tell(GraphView(1, 2, {}))
     ticks(world.window, world.panel, 2)
     part.table.select_key("speed")
-    assert (part.field.isEnabled(), part.sentence.text()) == (False, "Its node has disappeared.")
+    assert (part.field.isEnabled(), part.sentence.text()) == (False, "The node has disappeared.")
     assert part.model.cell_at(0, 0).role == "textDisabled"
 
 
