@@ -176,7 +176,7 @@ class _LineWriter:
         # Silent when the reader closed the stream: that is a normal end.
         if self._problem:
             print_error(
-                _("the output cannot be written: {reason}; the behaviour was stopped.").format(
+                _("the output can't be written: {reason}; the behaviour was stopped.").format(
                     reason=self._problem
                 )
             )

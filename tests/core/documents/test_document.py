@@ -192,8 +192,8 @@ def test_failed_save_keeps_document_dirty_and_journalled(
     [
         (b"", "damaged"),
         (b"{", "damaged"),
-        (b"[1, 2]", "not a behaviour"),
-        (b'{"format": "other"}', "not a behaviour"),
+        (b"[1, 2]", "isn't a behaviour"),
+        (b'{"format": "other"}', "isn't a behaviour"),
         (b'{"format": "nep-behaviour", "version": 99, "workspace": {}}', "newer NEP Studio"),
         (b'{"format": "nep-behaviour", "version": 1}', "no blocks"),
         (b'{"format": "nep-behaviour", "version": 1, "workspace": []}', "no blocks"),

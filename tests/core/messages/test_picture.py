@@ -95,10 +95,10 @@ def test_grey_and_depth_images_have_pixel_values() -> None:
     ("sent", "words"),
     [
         (message(b""), "the image is empty"),
-        (message(b"no picture"), "neither a JPEG nor a PNG image"),
+        (message(b"no picture"), "not a JPEG or PNG image"),
         (
             message(b"123", shape=[4, 6], encoding="mono8"),
-            "does not match an image of 6 x 4 pixels with 1 bytes each",
+            "doesn't match an image of 6 x 4 pixels with 1 bytes each",
         ),
         (message(b"123", shape="wide", encoding="bgr8"), "'wide' isn't a valid image shape"),
         (message(b"\x89PNG\r\n\x1a\n" + b"\0" * 40), "the PNG image is damaged"),

@@ -8,7 +8,7 @@ import pytest
 
 from tests.core.network_of_ones_own import alone
 
-FIREWALL = "10.9.9.2 is off, is in another network, or has a firewall that blocks the connection."
+FIREWALL = "10.9.9.2 is off, is on another network, or has a firewall that blocks the connection."
 LOOK = """
 import sys, threading, time
 from pathlib import Path

@@ -81,9 +81,9 @@ def test_invalid_network_settings_are_ignored(kept: object, tmp_path: Path) -> N
     ("kind", "address", "said"),
     [
         ("ros2", "-1", "isn't a ROS 2 domain; use a number from 0 to 232"),
-        ("ros2", "233", "is not a ROS 2 domain"),
-        ("ros2", str(2**64 - 1), "is not a ROS 2 domain"),
-        ("zenoh", "somewhere", "is not a zenoh address; use 'local'"),
+        ("ros2", "233", "isn't a ROS 2 domain"),
+        ("ros2", str(2**64 - 1), "isn't a ROS 2 domain"),
+        ("zenoh", "somewhere", "isn't a zenoh address; use 'local'"),
         ("ros", "::", "isn't a valid address of a ROS master"),
         ("ros", "http://", "isn't a valid address of a ROS master"),
     ],

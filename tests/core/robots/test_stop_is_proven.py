@@ -101,7 +101,7 @@ def test_two_robots_of_the_same_name_must_both_reply(master, stopper, pepper) ->
         report = stopper.stop_all(timeout_s=SHORT_S, on_answer=told.append)
         assert [(each.is_confirmed, each.is_waiting) for each in told] == [(True, True), (False, False)]
         assert (report.is_proven, report.unconfirmed_names) == (False, ("Pepper",))
-        assert report.robots[1].message == "Pepper (“Pepper”) did not reply. Switch it off by hand."
+        assert report.robots[1].message == "Pepper (“Pepper”) didn't reply. Switch it off by hand."
         twin.silent, pepper.silent = set(), {"stop"}
         report = stopper.stop_all(timeout_s=SHORT_S)
         assert [robot.is_confirmed for robot in report.robots] == [False, True]

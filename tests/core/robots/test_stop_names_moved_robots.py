@@ -138,7 +138,7 @@ def test_stop_pressed_before_the_connection_is_delivered_late_and_reported(lab: 
     lab.stop()
     view = runs.view()
     assert view.state == "unanswered"
-    assert "not connected" in view.title
+    assert "isn't connected" in view.title
     assert lab.stops_received(pepper) == 0
     connect(lab, pepper)
     assert lab.stops_received(pepper) == 1

@@ -119,7 +119,7 @@ def test_second_ctrl_c_does_not_interrupt_the_stop(pepper, saved, master, tmp_pa
     until(lambda: bool(pepper.heard("stop")))
     process.send_signal(signal.SIGINT)
     out, _ = process.communicate(timeout=60)
-    assert "Pepper did not reply. Switch it off by hand." in out
+    assert "Pepper didn't reply. Switch it off by hand." in out
     assert "Traceback" not in out
     assert process.returncode == (FAILED if how == "a file of Studio" else 0)
 
@@ -128,7 +128,7 @@ def test_robot_that_does_not_stop_is_named(pepper, saved):
     pepper.silent = {"stop"}
     code, out = run(saved(workspace(started(say("Hi")))))
     assert code == FAILED
-    assert "Pepper did not reply. Switch it off by hand." in out
+    assert "Pepper didn't reply. Switch it off by hand." in out
 
 
 def test_missing_robot_is_reported(master, saved):
@@ -350,7 +350,7 @@ class Lost(io.StringIO):
     ("number", "said"),
     [
         (errno.EPIPE, ""),
-        (errno.ENOSPC, "the output cannot be written: no space left on device; the behaviour was stopped.\n"),
+        (errno.ENOSPC, "the output can't be written: no space left on device; the behaviour was stopped.\n"),
     ],
 )
 def test_closed_output_stops_the_behaviour_and_its_robots(pepper, saved, capsys, number, said):

@@ -54,7 +54,7 @@ def test_silent_robot_is_named(stopper, robots):
     assert (report.is_proven, report.unconfirmed_names) == (False, ("Turtle",))
     by_name = {robot.name: robot for robot in report.robots}
     assert by_name["Pepper"].is_confirmed
-    assert by_name["Turtle"].message == "Turtle did not reply. Switch it off by hand."
+    assert by_name["Turtle"].message == "Turtle didn't reply. Switch it off by hand."
     assert report.elapsed_ms >= SILENT_S * 1000
     assert [robot.name for robot in answered] == [
         "Pepper",

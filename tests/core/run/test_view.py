@@ -97,7 +97,7 @@ def test_unanswered_stop_names_the_robot_and_manual_action() -> None:
     )
     assert (view.result, view.result_status) == ("1 of 2 robots stopped", "error")
     assert (view.stop_label, view.confirm_label) == ("Stop again", "Turtle isn't moving")
-    assert view.compact == "Turtle did not reply; switch it off by hand"
+    assert view.compact == "Turtle didn't reply; switch it off by hand"
     assert (view.can_run, view.can_pause, view.can_step) == (False, False, False)
 
 
@@ -125,7 +125,7 @@ def test_long_list_of_silent_robots_is_shortened() -> None:
 def test_confirm_button_is_shortened_for_long_names() -> None:
     long = RobotStop("The old blue robot in the entrance hall", False, None)
     view = view_of(after(PEPPER, long), [], 0)
-    assert (view.title, view.confirm_label) == (f"{long.name} did not reply", "It isn't moving")
+    assert (view.title, view.confirm_label) == (f"{long.name} didn't reply", "It isn't moving")
     assert view_of(after(long, SILENT), [], 0).confirm_label == "They aren't moving"
 
 

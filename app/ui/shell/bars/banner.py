@@ -23,7 +23,7 @@ from app.ui.widgets.cards import AlertBox
 from nep.i18n import _, ngettext
 
 DIGITS = re.compile(r"\d+")
-MIN_WIDTH = 140  # px at 100 % text; below it only the status bar shows alerts
+MIN_WIDTH = 220  # px at 100 % text; below it only the status bar shows alerts
 MIN_TEXT_WIDTH = 160  # px at 100 % text; below it the next step is only an icon
 TEXT_KINDS = ("bodyLarge", "body", "small")
 MIN_TALL_HEIGHT = 44  # px at 100 % text; lower banners have small buttons

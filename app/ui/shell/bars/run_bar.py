@@ -480,20 +480,14 @@ class ToolBar(Bar):
     def banner_area(self) -> QRect:
         """Return the area for an alert, between the tools and the run state.
 
-        In a narrow bar, the area includes the run state and, if needed, the tools at the right.
+        In a narrow bar, the area includes the run state.
         """
         left = max((each.geometry().right() + 1 for each in self._shown_tools()), default=0) + GAP
         buttons = (self.result, self.restart, self.pause, self.step, self.confirm, self.run, self.stop)
         beside: list[QWidget] = [each for each in buttons if not each.isHidden()]
         states = [each for each in (self.mark, self.words) if not each.isHidden()]
-        least = round(self._theme.scaled(BANNER_PX))
         area = free_area(self, left, [*beside, *states])
-        if area.width() < least:
-            area = free_area(self, left, beside)
-        if area.width() < least:
-            edges = [each.x() for each in self._shown_tools()]
-            area.setLeft(max((x for x in edges if area.right() - x >= least), default=GAP))
-        return area
+        return area if area.width() >= self._theme.scaled(BANNER_PX) else free_area(self, left, beside)
 
     def needed_width(self) -> int:
         """Return the width in px at which no text in the bar is shortened."""
