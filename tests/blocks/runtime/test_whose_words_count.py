@@ -27,7 +27,7 @@ class Program:
 
     told: ClassVar = {
         "another topic": r".*/Evil/description announces Pepper.*",
-        "two programs": "2 programs announce themselves as Pepper\\. “Pepper”.*“evil”.*",
+        "two programs": "2 programs announce themselves as Pepper\\..*“Pepper”.*“evil”.*",
         "foreign topic": ("Evil claims /Pepper/LEAF, which belongs to Pepper; Evil is ignored\\."),
     }
 

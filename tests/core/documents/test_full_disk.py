@@ -95,7 +95,7 @@ def test_full_disk_loses_nothing_and_every_failure_is_reported(told: dict[str, o
         f"DocumentError: can't write Mine.nepb ({full}); free some space or choose another folder"
     )
     assert str(told["setting"]).startswith("SettingsError: ")
-    assert str(told["earlier"]).startswith("DocumentError: Mine.nepb was not saved: its previous version")
+    assert str(told["earlier"]).startswith("DocumentError: Mine.nepb wasn't saved: its previous version")
     assert str(full) in str(told["snapshot"])
     assert told["dirty"] is True
     assert told["old"] is True, "the behaviour's file is what it was"

@@ -58,7 +58,7 @@ def test_save_is_rejected_when_previous_version_cannot_be_kept(tmp_path: Path, f
     path = tmp_path / "Round.nepb"
     path.write_bytes(b"one")
     folder.write_bytes(b"in the way")
-    with pytest.raises(DocumentError, match="was not saved: its previous version can't be kept"):
+    with pytest.raises(DocumentError, match="wasn't saved: its previous version can't be kept"):
         save_version(path, folder)
 
 

@@ -99,7 +99,7 @@ def test_report_is_created_without_a_log(tmp_path: Path) -> None:
     found = opened(make_report(parts, ""))
     assert "README.txt" in found
     assert not [name for name in found if name.startswith(("log/", "crashes/"))]
-    assert "which is empty" in describe_contents(parts)[1]
+    assert "(empty)" in describe_contents(parts)[1]
 
 
 def test_user_is_shown_the_report_contents(pseudo: None, parts: ReportParts) -> None:

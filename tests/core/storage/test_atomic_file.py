@@ -139,7 +139,7 @@ def test_non_regular_file_is_rejected_with_reason(tmp_path: Path, kind: str) -> 
         path.symlink_to("/dev/zero")
     if kind.startswith("link"):
         path.symlink_to(real if "pipe" in kind else "/dev/zero")
-    with pytest.raises(OSError, match=r"a folder, a pipe or a device, not a file"):
+    with pytest.raises(OSError, match=r"not a file, but a folder, a pipe or a device"):
         read_regular_file(path)
     with pytest.raises(DocumentError, match="can't read "):
         read_file(path)

@@ -222,7 +222,7 @@ def test_program_and_rize_driver_exchange_commands_and_results(speaker):
             assert (said.state, said.error) == ("succeeded", "")
             refused = program.invoke(robot.name, "mode", {"mode": "rest"})
             eventually(lambda: refused.done)
-            assert (refused.state, refused.error) == ("failed", f"{robot.name} could not mode")
+            assert (refused.state, refused.error) == ("failed", f"{robot.name} couldn't mode")
         finally:
             program.close()
     assert [answer["state"] for answer in speaker.answered(2)] == ["success", "failure"]

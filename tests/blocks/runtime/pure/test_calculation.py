@@ -95,9 +95,9 @@ def test_non_number_is_rejected_with_explanation(wrong):
     two = ("smaller", "larger", "is_divisible", "rounded_to")
     for name in functions:
         count = wide.get(name, 2 if name in two else 1)
-        with pytest.raises(BehaviourError, match="needs a"):
+        with pytest.raises(BehaviourError, match=r"needs a|isn't known yet"):
             getattr(calculation, name)(*[wrong] * count)
-    with pytest.raises(BehaviourError, match="“count” needs a"):
+    with pytest.raises(BehaviourError, match=r"“count” (needs a|can't run)"):
         calculation.counting(wrong, wrong, wrong)
 
 
