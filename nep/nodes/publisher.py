@@ -395,7 +395,7 @@ class RejectedPayloads:
         sentence = self._located[1] if self._located[0] == reason else reason
         if is_logged(self.count):
             _logger.warning(
-                "a message on '%s' cannot be sent (%d so far): %s", self._topic, self.count, sentence
+                "a message on '%s' can't be sent (%d so far): %s", self._topic, self.count, sentence
             )
         if sentence != self.problem:
             self.problem = sentence

@@ -312,7 +312,7 @@ class Subscriber:
         self._unreadable += 1
         if is_logged(self._unreadable):
             _logger.warning(
-                "a message on '%s' cannot be read (%d so far): %s", self.topic, self._unreadable, error
+                "a message on '%s' can't be read (%d so far): %s", self.topic, self._unreadable, error
             )
         self._problem = str(error)
         self._transport.report(self._problem)

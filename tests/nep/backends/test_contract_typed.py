@@ -164,7 +164,7 @@ def test_payload_of_a_wrong_type_raises_with_and_without_a_subscriber(make: Make
         b.new_sub("t")
     pub = a.new_pub("t", Count)
     for bad in ({"n": 1}, 3, None, Pose(), Count):
-        with pytest.raises(nep.EncodeError, match="as 'Count'; publish a 'Count'"):
+        with pytest.raises(nep.EncodeError, match="as 'Count': publish a 'Count'"):
             pub.publish(bad)
     named = a.new_pub("t", Named)
     for bad in ([], "name", Count(1)):

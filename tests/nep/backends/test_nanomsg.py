@@ -75,7 +75,7 @@ def test_large_message_warning_is_logged_once(
     for _ in range(2):
         pub.publish(bytes(2**20 + 1))
         assert sub.listen(timeout_s=30.0)[0]
-    assert len(re.findall("'t' has 1048577 bytes.*libnanomsg.* 1048576 bytes", caplog.text)) == 1
+    assert len(re.findall("'t' is 1048577 bytes.*libnanomsg.* 1048576 bytes", caplog.text)) == 1
 
 
 def test_invalid_direct_connections_are_rejected(node: nep.Node, port: int) -> None:

@@ -249,7 +249,7 @@ def test_incompatible_endpoints_raise_alerts_with_the_differing_settings() -> No
     }
     (said,) = alerts([party("a"), party("b", is_latched=True)], [party("c", is_latched=True)]).values()
     assert said == (
-        f"{heard}earlier messages (“transient local”), but the publisher does not keep them (“volatile”)"
+        f"{heard}earlier messages (“transient local”), but the publisher doesn't keep them (“volatile”)"
     )
     assert alerts([party("a", typehash="RIHS01_1")], [party("c", typehash="RIHS01_2")]) == {
         "ros2-definition:t": "“c” and “a” have different definitions of “std_msgs/msg/String” on “t”"

@@ -329,7 +329,7 @@ def test_undecodable_message_is_counted_as_failed():
         pub.publish(2)
         counts = settled(route(bridge, "a", "/t"), 3)
         assert (counts.sent, counts.failed) == (2, 1)
-        assert counts.problem.startswith("cannot decode 5 bytes as 'json'")
+        assert counts.problem.startswith("can't decode 5 bytes as 'json'")
 
 
 def test_invalid_json_is_forwarded_if_no_conversion_is_needed():

@@ -69,7 +69,7 @@ def test_alternating_valid_and_invalid_payloads_are_logged_at_growing_intervals(
         unsendable.resolve()
     assert unsendable.count == 500
     assert len(caplog.records) == 3
-    assert caplog.records[-1].getMessage().startswith("a message on 't' cannot be sent (100 so far): ")
+    assert caplog.records[-1].getMessage().startswith("a message on 't' can't be sent (100 so far): ")
 
 
 def test_alternating_valid_and_invalid_messages_are_logged_at_growing_intervals(

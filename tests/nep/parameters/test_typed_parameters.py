@@ -166,9 +166,9 @@ def test_unsupported_parameter_type_cannot_be_declared(
 def test_non_finite_number_in_a_typed_parameter_is_rejected(nodes: tuple[nep.Node, nep.Node]) -> None:
     robot, _tool = nodes
     robot.parameters.declare("limits", Limits(0.0))
-    with pytest.raises(ParameterError, match=r"'limits' .*; least .*finite"):
+    with pytest.raises(ParameterError, match=r"'limits' .*: least .*finite"):
         robot.parameters["limits"] = Limits(float("nan"))
-    with pytest.raises(ParameterError, match=r"'limits' .*; least .*finite"):
+    with pytest.raises(ParameterError, match=r"'limits' .*: least .*finite"):
         robot.parameters["limits"] = {"least": None}
     robot.parameters["limits"] = Limits(-1e300)
     assert robot.parameters["limits"] == Limits(-1e300)
