@@ -301,12 +301,12 @@ def foreign_programs(own: str) -> Iterator[tuple[str, Callable[[int], ForeignSer
         )
     for mechanism in ("CURVE", "PLAIN"):
         yield (
-            "the other side closed the connection during the handshake",
+            "it closed the connection during the handshake",
             lambda port, mechanism=mechanism: ForeignSocket(port, zmq.XPUB, mechanism),
         )
     for said, answer, waits in (
-        ("the other side closed the connection", b"", False),
-        ("the other side closed the connection", GREETING, False),
+        ("it closed the connection", b"", False),
+        ("it closed the connection", GREETING, False),
         ("it uses the security mechanism CURVE", GREETING.replace(b"NULL\0", b"CURVE"), True),
         ("it uses an unknown security mechanism", GREETING.replace(b"NULL", b"\nABC"), True),
         ("it does not speak ZMTP", b"HTTP/1.1 400 Bad Request\r\n\r\n" + bytes(60), False),

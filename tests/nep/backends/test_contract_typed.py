@@ -150,7 +150,7 @@ def test_message_of_a_mismatching_type_is_skipped_and_reported(
         _ = message.payload
     pub.publish(3)
     assert sub.listen(timeout_s=0.5) == (False, None)
-    told = "it is a 'int'; expected a map of the fields of 'PoseStamped'"
+    told = "the value is a 'int'; expected a map of the fields of 'PoseStamped'"
     eventually(lambda: any(told in each.sentence for each in a.graph().alerts))
     pub.publish({})
     assert sub.listen(timeout_s=30.0) == (True, PoseStamped())

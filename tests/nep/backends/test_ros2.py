@@ -378,7 +378,7 @@ def test_invalid_definitions_are_rejected(types: MessageTypes, tmp_path: Path) -
         types.add("mine/Arm", "float64[3] joints\n")
     with pytest.raises(nep.NepError, match="the definition of 'mine/msg/Leg' can't be read"):
         types.add("mine/Leg", "nonsense\n")
-    with pytest.raises(nep.NepError, match=r"'mine/msg/Leg' .*'no/msg/Thing' .*'a'"):
+    with pytest.raises(nep.NepError, match=r"'mine/msg/Leg' has .*'a' .*'no/msg/Thing'"):
         types.add("mine/Leg", "no/Thing a\n")
     with pytest.raises(nep.NepError, match=r"'mine' .*'std_msgs/msg/String'"):
         types.add("mine", "int8 a\n")
@@ -409,7 +409,7 @@ def test_invalid_file_in_a_definition_folder_is_reported_when_its_type_is_used(
     }  # fmt: skip
     with pytest.raises(nep.NepError, match=r"'folder/msg/Wide' .*wstring"):
         types.checked("folder/Wide")
-    with pytest.raises(nep.NepError, match=r"'folder/msg/Uses' .*'folder/msg/Wide' .*'a'"):
+    with pytest.raises(nep.NepError, match=r"'folder/msg/Uses' has .*'a' .*'folder/msg/Wide'"):
         types.checked("folder/Uses")
 
 
