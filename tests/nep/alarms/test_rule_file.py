@@ -90,10 +90,10 @@ def test_example_file_is_valid() -> None:
         ({"when": {"topic": "/t", "is": "silent"}, "do": ["baner"]}, "did you mean 'banner'"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": [{"cal": "x"}]}, "an action is"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": [{"call": ""}]}, "the name is missing"),
-        ({"when": {"topic": "/t", "is": "silent"}, "do": ["stop"] * 11}, "more than 10 actions"),
+        ({"when": {"topic": "/t", "is": "silent"}, "do": ["stop"] * 11}, "at most 10 actions"),
         ({"when": {"topic": "/t", "is": "silent"}, "calm_s": 0}, "0.5 to 3600"),
         ({"when": {"topic": "/t", "is": "silent"}, "onn": True}, "unknown key 'onn'; did you mean 'on'"),
-        ([], "it is not an alarm"),
+        ([], ": not an alarm;"),
     ],
 )  # fmt: skip
 def test_invalid_alarm_is_rejected_with_its_line(alarm: object, said: str) -> None:
@@ -115,9 +115,9 @@ def test_invalid_alarm_is_rejected_with_its_line(alarm: object, said: str) -> No
     [
         ("", "'f.json' isn't valid JSON: line 1"),
         ('{"alarms": [\n{"when": }]}', "'f.json' isn't valid JSON: line 2, column 9"),
-        ("[]", "it is not an alarm file"),
+        ("[]", ": not an alarm file;"),
         ('{"format": 2, "alarms": []}', "newer version"),
-        ('{"format": true, "alarms": []}', "'format': it must be 1"),
+        ('{"format": true, "alarms": []}', "'format': must be 1"),
         ('{"alarm": []}', "unknown key 'alarm'; did you mean 'alarms'"),
         ('{"format": 1}', "'alarms': the list of alarms is missing"),
         ('{"alarms": [' + "1" * 5000 + "]}", ""),

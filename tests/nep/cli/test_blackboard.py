@@ -114,7 +114,7 @@ def test_invalid_arguments_are_reported_in_one_sentence(master: Master, run: Typ
         node.new_server("odd/get", lambda _request: {"entries": [5]}, threads=1)
         odd = run("show", "--name", "odd")
         assert odd.returncode == 1
-        assert "the service that replied is not a blackboard" in odd.stderr
+        assert "the service that replied isn't a blackboard" in odd.stderr
 
 
 def test_missing_master_is_reported(run: TypeIn) -> None:

@@ -58,7 +58,7 @@ def test_write_never_blocks_and_dropped_output_is_reported(stuck: Stuck) -> None
     lines = stuck.getvalue().splitlines()
     assert lines[:3] == ["first", "line 0", "line 1"]
     kept = len(lines) - 2
-    assert lines[-1] == f"… {1000 - kept} lines dropped because the output was not read"
+    assert lines[-1] == f"… {1000 - kept} lines dropped because the output wasn't read"
     assert terminal.write("too late") == 8
     terminal.close()
 

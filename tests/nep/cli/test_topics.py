@@ -43,7 +43,7 @@ def test_image_is_shown_by_its_shape_without_decoding(capfdbinary):
 def test_undecodable_payload_is_shown_as_bytes_with_the_reason(capfdbinary):
     record = record_of(message(b"{oops"), capfdbinary)
     assert record["bytes"] == b"{oops".hex()
-    assert "cannot decode" in record["error"]
+    assert "can't decode" in record["error"]
     assert "payload" not in record
 
 
@@ -90,7 +90,7 @@ def test_argument_is_parsed_according_to_the_message_type(text, msg_type, value)
 
 
 def test_invalid_json_error_suggests_the_string_type():
-    with pytest.raises(NepError, match=r"'hello' is not valid JSON; .* --type string"):
+    with pytest.raises(NepError, match=r"'hello' isn't valid JSON; .* --type string"):
         parse_payload("hello", "json")
 
 

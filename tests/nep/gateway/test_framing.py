@@ -73,7 +73,7 @@ def test_prefixed_json_without_its_prefix_is_decoded():
 
 
 def test_frame_of_another_topic_is_rejected():
-    with pytest.raises(FrameError, match="does not begin with the topic"):
+    with pytest.raises(FrameError, match="doesn't begin with the topic"):
         Shape("t", "prefixed", "string").read(b"t2 hello")
 
 

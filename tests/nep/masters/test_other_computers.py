@@ -64,7 +64,7 @@ def test_nearest_reachable_endpoint_is_selected(endpoints, master, chosen):
 
 def test_only_addresses_of_this_computer_are_accepted_as_listen_addresses():
     assert check_hosts(["10.8.0.2", ANY_HOST, "10.8.0.2"], HERE) == ("10.8.0.2", ANY_HOST)
-    with pytest.raises(NepError, match="'robot' is not an IPv4 address"):
+    with pytest.raises(NepError, match="'robot' isn't an IPv4 address"):
         check_hosts(["robot"], HERE)
     with pytest.raises(NepError, match=r"'192\.168\.1\.21' .*: 10\.8\.0\.2, 192\.168\.1\.20"):
         check_hosts(["192.168.1.21"], HERE)
@@ -91,9 +91,9 @@ def test_master_listens_on_loopback_only_until_another_address_is_configured(mas
 
 def test_rejected_listen_address_leaves_current_listen_addresses_unchanged(master):
     listen([OTHER], master.address)
-    with pytest.raises(RequestRefusedError, match=r"'203\.0\.113\.77' is not an address"):
+    with pytest.raises(RequestRefusedError, match=r"'203\.0\.113\.77' isn't an address"):
         listen(["203.0.113.77"], master.address)
-    with pytest.raises(RequestRefusedError, match="'localhost' is not an IPv4 address"):
+    with pytest.raises(RequestRefusedError, match="'localhost' isn't an IPv4 address"):
         listen(["localhost"], master.address)
     assert master.view().listens == (OTHER,)
 

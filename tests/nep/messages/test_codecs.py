@@ -168,7 +168,7 @@ def test_arbitrary_bytes_after_timestamp_or_map_header_decode_or_raise_decode_er
         ("msgpack", {"a": {1}}, "can't encode a 'dict' as 'msgpack': 'set' can't be encoded as JSON"),
         ("msgpack", 2**70, "can't encode a 'int' as 'msgpack'"),
         ("image", "text", "publish a 'uint8' array"),
-        ("image", b"text", "neither a JPEG nor a PNG"),
+        ("image", b"text", "not a JPEG or PNG image"),
         ("image", np.zeros((2, 2, 3), bool), "the elements are 'bool'; use uint8, int8, uint16"),
         ("image", np.zeros((2, 2, 3), np.complex64), "the elements are 'complex64'; use uint8"),
         ("image", np.zeros((2, 2, 5), np.uint8), r"\(2, 2, 5\) isn't a valid image shape"),

@@ -92,7 +92,7 @@ def test_colour_image_is_downsampled_by_averaging() -> None:
         (ImageFormat("png"), DEPTH.astype(np.float32), "a PNG image needs 'uint8' or 'uint16'"),
         (ImageFormat("png"), np.zeros((4, 4, 2), np.uint8), "a PNG image needs 'uint8' or 'uint16'"),
         (ImageFormat("raw"), "picture", "publish a 'uint8' array"),
-        (ImageFormat("raw"), b"no file", "neither a JPEG nor a PNG image"),
+        (ImageFormat("raw"), b"no file", "not a JPEG or PNG image"),
     ],
 )
 def test_image_unsupported_by_the_format_raises_encode_error(

@@ -141,9 +141,9 @@ def test_valid_topics_are_accepted(topic: str) -> None:
 @pytest.mark.parametrize(
     ("topic", "reason"),
     [
-        ("", "it has 0 bytes"),
-        ("x" * 201, "it has 201 bytes"),
-        ("ü" * 101, "it has 202 bytes"),
+        ("", "the name is 0 bytes"),
+        ("x" * 201, "the name is 201 bytes"),
+        ("ü" * 101, "the name is 202 bytes"),
         ("a b", "the character ' ' isn't allowed"),
         ("a\tb", r"the character '\\t'"),
         ("a{b", "the character '{'"),

@@ -128,7 +128,7 @@ def test_ring_command_saves_the_last_seconds_on_command_and_on_signal(master, tm
         child.send_signal(signal.SIGTERM)
         child.communicate(timeout=60)
         eventually(lambda: not has_flight_recorder(robot.graph()))
-        with pytest.raises(NepError, match="'nep recording ring' is not running"):
+        with pytest.raises(NepError, match="'nep recording ring' isn't running"):
             run(*words)
     assert child.returncode == 0
     assert sorted(each.name for each in tmp_path.iterdir()) == [each.name for each in files()]

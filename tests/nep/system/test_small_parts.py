@@ -286,7 +286,7 @@ def test_did_you_mean_suggests_a_similar_name() -> None:
 
 def test_invalid_node_names_are_rejected() -> None:
     for name in ("", "x" * 201):
-        with pytest.raises(nep.BadNameError, match=f"it has {len(name)} bytes; 1 to 200"):
+        with pytest.raises(nep.BadNameError, match=f"the name is {len(name)} bytes; 1 to 200"):
             nep.node(name)
 
 
