@@ -82,7 +82,10 @@ def test_disabled_loopback_is_reported_by_the_doctor_and_nothing_crashes():
     assert found["loopback"]["command"] == "ip link set lo up"
     assert "no master replied at '127.0.0.1:7780'" in done.stderr
     assert "list 1" in done.stderr
-    assert "programs on this computer can't reach the master: network is unreachable; run 'nep doctor'" in done.stderr
+    assert (
+        "programs on this computer can't reach the master: network is unreachable; run 'nep doctor'"
+        in done.stderr
+    )
     assert "Traceback" not in done.stderr
 
 

@@ -83,7 +83,7 @@ def test_record_command_stops_after_its_duration_and_prints_json(master, tmp_pat
     run("record", "-o", path, "--duration", 0.2, "--not", "/log", "--json", "--master", master.address)
     told = json.loads(capfdbinary.readouterr().out)
     assert (told["path"], told["problem"]) == (str(path), "")
-    with pytest.raises(RecordingError, match=r"a\.mcap'; .*already exists"):
+    with pytest.raises(RecordingError, match=r"a\.mcap': .*already exists"):
         run("record", "-o", path, "--duration", 0.2, "--master", master.address)
     with pytest.raises(typer.BadParameter):
         run("record", "-o", tmp_path / "b.mcap", "--duration", 0, "--master", master.address)

@@ -215,7 +215,7 @@ def test_export_of_a_time_range(recording, tmp_path):
 def test_export_overwrites_no_file_and_leaves_no_partial_file(recording, tmp_path, monkeypatch):
     export(recording, "csv", tmp_path / "out")
     before = (tmp_path / "out" / "t.csv").read_bytes()
-    with pytest.raises(RecordingError, match=r"\.csv'; .*already exists"):
+    with pytest.raises(RecordingError, match=r"\.csv': .*already exists"):
         export(recording, "csv", tmp_path / "out")
     assert (tmp_path / "out" / "t.csv").read_bytes() == before
     monkeypatch.setattr("nep.recordings.export.MAX_COLUMNS", 3)
@@ -282,11 +282,11 @@ def test_mcap_export_of_a_range_preserves_bytes_times_notes_and_run(tmp_path):
             len(wanted),
             (len(wanted),) * 2,
         )
-        with pytest.raises(RecordingError, match=r"a\.mcap'; .*already exists"):
+        with pytest.raises(RecordingError, match=r"a\.mcap': .*already exists"):
             export(whole, "mcap", tmp_path / "out", part)
-        with pytest.raises(RecordingError, match=r"a\.mcap'; .*topics"):
+        with pytest.raises(RecordingError, match=r"a\.mcap': .*topics"):
             export(whole, "mcap", tmp_path / "none", Part(topics=["/nowhere"]))
-        with pytest.raises(RecordingError, match=r"a\.mcap'; .*part"):
+        with pytest.raises(RecordingError, match=r"a\.mcap': .*part"):
             export(whole, "mcap", tmp_path / "none", Part(start_ns=times[-1] + 1))
     with Recording(made.path) as recording:
         assert recording.is_complete

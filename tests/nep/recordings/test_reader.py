@@ -169,7 +169,7 @@ def test_damaged_chunk_is_skipped_and_counted(path, everything, tmp_path):
 def test_file_that_is_not_a_recording_raises_recording_error(tmp_path, size):
     path = tmp_path / "a.mcap"
     path.write_bytes(random.Random(size).randbytes(size))
-    with pytest.raises(RecordingError, match=r"a\.mcap'; .*MCAP file"):
+    with pytest.raises(RecordingError, match=r"a\.mcap': .*MCAP file"):
         Recording(path)
     with pytest.raises(RecordingError):
         Recording(tmp_path)

@@ -69,7 +69,7 @@ def test_unreadable_file_raises_and_other_files_stay_readable(
     tmp_path: Path, path: Path, reader: ReaderProcess
 ) -> None:
     (tmp_path / "none.mcap").write_bytes(b"none")
-    with pytest.raises(RecordingError, match=r"none\.mcap'; .*MCAP file"):
+    with pytest.raises(RecordingError, match=r"none\.mcap': .*MCAP file"):
         reader.open(tmp_path / "none.mcap")
     with pytest.raises(RecordingError):
         reader.open(tmp_path / "gone.mcap")
@@ -86,7 +86,7 @@ def test_unreadable_file_raises_and_other_files_stay_readable(
 def test_crashed_reader_process_raises_and_the_next_open_starts_another(path: Path) -> None:
     with ReaderProcess(DIES) as reader:
         for _again in range(2):
-            with pytest.raises(RecordingError, match=r"a\.mcap'; .*process"):
+            with pytest.raises(RecordingError, match=r"a\.mcap': .*process"):
                 reader.open(path)
     with ReaderProcess(["/no/such/program"]) as reader, pytest.raises(RecordingError, match="/such/program"):
         reader.open(path)

@@ -135,7 +135,7 @@ def test_repaired_file_gets_an_unused_name(path, tmp_path):
         "a.repaired-3.mcap",
     ]
     assert repaired_path(damaged).name == "a.repaired-4.mcap"
-    with pytest.raises(RecordingError, match=r"a\.mcap'; .*already exists"):
+    with pytest.raises(RecordingError, match=r"a\.mcap': .*already exists"):
         repair(damaged, damaged)
     with pytest.raises(RecordingError, match=r"'.*none\.mcap'"):
         repair(tmp_path / "none.mcap")

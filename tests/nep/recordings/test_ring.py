@@ -132,7 +132,7 @@ def test_invalid_flight_recorder_requests_raise_errors(tmp_path):
         FlightRecorder(tmp_path / "file")
     with FlightRecorder(tmp_path / "ring", clock=TestClock(), limits=limits()) as ring:
         ring.post([json_message(1)])
-        with pytest.raises(RecordingError, match=r"file'; .*already exists"):
+        with pytest.raises(RecordingError, match=r"file': .*already exists"):
             ring.save(tmp_path / "file", 1.0)
         with pytest.raises(RecordingError):
             ring.save(tmp_path / "nowhere" / "a.mcap", 1.0)

@@ -291,7 +291,7 @@ class FailingBytes:
 def test_existing_file_or_missing_folder_raises_recording_error(tmp_path):
     path = tmp_path / "a.mcap"
     path.write_bytes(b"mine")
-    with pytest.raises(RecordingError, match=r"a\.mcap'; .*already exists"):
+    with pytest.raises(RecordingError, match=r"a\.mcap': .*already exists"):
         RecordingWriter(path)
     assert path.read_bytes() == b"mine"
     with pytest.raises(RecordingError, match="can't use the recording"):
