@@ -121,7 +121,7 @@ def test_ring_command_saves_the_last_seconds_on_command_and_on_signal(master, tm
         assert [str(each) for each in files()] == [told["path"]]
         child.send_signal(signal.SIGUSR1)
         eventually(lambda: len(files()) == 2, 60.0)
-        with pytest.raises(NepError, match="not a valid duration"):
+        with pytest.raises(NepError, match="isn't a valid duration"):
             run(*words, "--seconds", "-1")
         with pytest.raises(NepError, match="a JSON object"), nep.node("any", master=master.address) as node:
             node.new_client("flight_recorder/keep", timeout_s=60.0).call({"seconds": "x"})
