@@ -101,7 +101,7 @@ def test_payload_is_read_from_a_file(tmp_path):
     assert parse_payload(f"@{file}", "bytes") == b'{"a": 1}'
     with pytest.raises(EncodeError, match="can't read"):
         parse_payload("@/nowhere/at/all", "bytes")
-    with pytest.raises(EncodeError, match=r"@picture\.jpg"):
+    with pytest.raises(EncodeError, match=r"@image\.jpg"):
         parse_payload("hello", "image")
 
 
