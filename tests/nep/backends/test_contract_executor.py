@@ -253,7 +253,7 @@ def test_spin_rejects_coroutine_callback_without_losing_its_message(make: Nodes)
 
     sub = node.new_callback("t", "json", callback)
     make("b", "memory").new_pub("t").publish(1)
-    sentence = "the callback of 't' is a coroutine function, which 'spin' cannot run"
+    sentence = "the callback of 't' is a coroutine function, which 'spin' can't run"
     for spin in (node.spin, lambda: nep.spin(node, make("c", "memory"))):
         with pytest.raises(nep.NepError, match=sentence):
             spin()
