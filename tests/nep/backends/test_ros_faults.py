@@ -328,7 +328,7 @@ def test_queues_are_trimmed_by_count_and_bytes_per_connection() -> None:
 def test_definition_with_another_checksum_is_rejected() -> None:
     assert unpacker_for("json", "std_msgs/String", "", "992ce8a1687cec8c8bd883ec73ca41d1").msg_type == "json"
     with pytest.raises(
-        nep.NepError, match="its 'sensor_msgs/Image' has different fields from the definition"
+        nep.NepError, match="the publisher's 'sensor_msgs/Image' has different fields from the definition"
     ):
         unpacker_for("image", "sensor_msgs/Image", "uint8 data", "0" * 32)
 
