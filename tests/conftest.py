@@ -34,7 +34,7 @@ hypothesis.settings.register_profile(
     "nep", hypothesis.settings(), deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
 )
 hypothesis.settings.load_profile("nep")
-pytest.register_assert_rewrite("tests.robots.whose_words_count")  # a contract: others hold to it
+pytest.register_assert_rewrite("tests.robots.message_senders")  # a contract: others hold to it
 os.environ["NEP_LANG"] = "en"  # what tests read is English, also on a computer that is set to something else
 _GRACE_S = 20.0
 _GRACE_AFTER_LEAK_S = 1.0

@@ -51,8 +51,12 @@ class Group(NamedTuple):
 GROUPS = (
     Group(
         "films",  # every run has the film of test_path_mouse.py
-        tests=("tests/e2e/test_hour_mouse.py", "tests/e2e/test_hour_keys.py", "tests/e2e/test_path_keys.py"),
-        sources=("tests/e2e/film.py", "tests/e2e/fingers.py", "tests/e2e/hour.py"),
+        tests=(
+            "tests/e2e/test_teacher_mouse.py",
+            "tests/e2e/test_teacher_keyboard.py",
+            "tests/e2e/test_path_keys.py",
+        ),
+        sources=("tests/e2e/film.py", "tests/e2e/fingers.py", "tests/e2e/teacher_session.py"),
     ),
     Group(
         "ROS 2",  # every run has the contract of back ends over Cyclone DDS: test_ros2.py[test_contract.py-]

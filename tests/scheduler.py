@@ -29,8 +29,8 @@ USUAL_S, USUAL_OF_STUDIO_S = 0.2, 12.0
 """Duration of a test, and of one that starts Studio."""
 LONG_S = {
     _FIXED_PORTS: 200.0,
-    "tests/e2e/test_hour_mouse.py": 130.0,
-    "tests/e2e/test_hour_keys.py": 120.0,
+    "tests/e2e/test_teacher_mouse.py": 130.0,
+    "tests/e2e/test_teacher_keyboard.py": 120.0,
     "tests/nep/backends/test_ros2.py": 85.0,
     "tests/e2e/test_path_mouse.py": 70.0,
     "tests/e2e/test_soak.py": 65.0,

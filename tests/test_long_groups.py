@@ -78,7 +78,7 @@ def test_changes_are_unknown_in_a_shallow_clone_and_outside_a_repository(
         ("bench/soak.py", {"soak"}),
         ("app/ui/theme/fonts.py", {"high DPI"}),
         ("app/ui/shell/docking/dock.py", {"high DPI", "layout permutations"}),
-        ("tests/e2e/hour.py", {"films"}),
+        ("tests/e2e/teacher_session.py", {"films"}),
         ("README.md", set()),
     ],
 )
@@ -108,7 +108,7 @@ def test_only_tests_of_skipped_groups_are_skipped() -> None:
     assert not is_skipped("tests/installers/test_linux.py::test_x", ["soak"])
     assert not is_skipped("tests/installers/test_contents.py::test_x", ["installers"])
     ros2 = "tests/nep/backends/test_ros2.py::test_inside"
-    assert is_skipped(f"{ros2}[ros2_inside.py-]", ["ROS 2"])
+    assert is_skipped(f"{ros2}[ros2_child.py-]", ["ROS 2"])
     assert not is_skipped(f"{ros2}[test_contract.py-]", ["ROS 2"])
 
 

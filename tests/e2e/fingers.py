@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 
-from tests.e2e.hour import CANVAS, kind_of
 from tests.e2e.person import Person
+from tests.e2e.teacher_session import CANVAS, kind_of
 from tests.e2e.waiting import until
 
 PACE_S = 0.08  # the page moves its focus with the next picture, not with the key

@@ -18,7 +18,7 @@ from tests.e2e.person import STEP_S, Person
 from tests.e2e.x11 import Screen
 
 ROOT = Path(__file__).resolve().parents[2]
-EYES = Path(__file__).parent / "eyes"
+PROBE = Path(__file__).parent / "window_probe"
 START_S, END_S = 60.0, 30.0
 
 
@@ -35,7 +35,7 @@ class Studio(Person):
         self._ended = False
         self._log = (home / "studio.log").open("ab")
         self.process = self._start(arguments, environment)
-        self._reader = threading.Thread(target=self._read, name="eyes-reader", daemon=True)
+        self._reader = threading.Thread(target=self._read, name="probe-reader", daemon=True)
         self._reader.start()
 
     def _start(self, arguments: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
@@ -51,8 +51,8 @@ class Studio(Person):
             "NEP_STUDIO_HOME": str(self.home),
             "NEP_STATE_DIR": str(self.home / "state"),
             "NEP_GATEWAY": "0",
-            "NEP_E2E_EYES": f"{requests},{answers}",
-            "PYTHONPATH": f"{EYES}{os.pathsep}{ROOT}",
+            "NEP_E2E_PROBE": f"{requests},{answers}",
+            "PYTHONPATH": f"{PROBE}{os.pathsep}{ROOT}",
             "PYTHONUNBUFFERED": "1",
             **environment,
         }
@@ -72,7 +72,7 @@ class Studio(Person):
         os.close(answers)
         return process
 
-    # -- its eyes ---------------------------------------------------------------------------------
+    # -- the probe --------------------------------------------------------------------------------
 
     def _read(self) -> None:
         with os.fdopen(self._heard, "rb") as stream:

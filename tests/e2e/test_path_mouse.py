@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from tests.e2e.film import Film, MouseOnly, topic
-from tests.e2e.hour import Hands, of, words_of
 from tests.e2e.person import middle
 from tests.e2e.studio import Studio
+from tests.e2e.teacher_session import Hands, of, words_of
 from tests.e2e.waiting import until
 
 pytestmark = pytest.mark.timeout(230)

@@ -11,7 +11,7 @@ import pytest
 from tests.core.network_of_ones_own import alone
 from tests.nep.backends.ros_programs import skip_without_ros
 
-PROGRAM = ("-m", "tests.core.networks.looking_inside")
+PROGRAM = ("-m", "tests.core.networks.watching_child")
 TWIST = {"linear": {"x": 1.5, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
 
 

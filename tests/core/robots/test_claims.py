@@ -22,7 +22,7 @@ from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInf
 from tests.blocks.samples import block, number, started, workspace
 from tests.blocks.wire_robot import WireRobot
 from tests.core.waiting import tick_until
-from tests.robots.whose_words_count import WhoseWordsCount, announce, described
+from tests.robots.message_senders import WhoseWordsCount, announce, described
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""ROS 2: what needs no network here, and ros2_inside.py and the contract in a network of their own.
+"""ROS 2: what needs no network here, and ros2_child.py and the contract in a network of their own.
 
 Cyclone DDS listens at every address of a computer (0.0.0.0), whatever it is told, so tests that open it run
 in a network namespace that has loopback and nothing else.
@@ -73,14 +73,14 @@ def why_no_fast_dds() -> str:
 @pytest.mark.parametrize(
     ("file", "chosen"),
     [
-        ("ros2_inside.py", ""),
-        ("ros2_vendors_inside.py", "dust"),
-        ("ros2_vendors_inside.py", "fast"),
+        ("ros2_child.py", ""),
+        ("ros2_vendors_child.py", "dust"),
+        ("ros2_vendors_child.py", "fast"),
         ("test_contract.py", ""),
-        ("ros2_services_inside.py", "(plain_dds and AddTwoInts) or service_errors"),
-        ("ros2_history_inside.py", "history_has_no_duplicates_or_gaps_during_continuous_publishing"),
-        pytest.param("ros2_services_inside.py", "", marks=pytest.mark.long),
-        pytest.param("ros2_history_inside.py", "", marks=pytest.mark.long),
+        ("ros2_services_child.py", "(plain_dds and AddTwoInts) or service_errors"),
+        ("ros2_history_child.py", "history_has_no_duplicates_or_gaps_during_continuous_publishing"),
+        pytest.param("ros2_services_child.py", "", marks=pytest.mark.long),
+        pytest.param("ros2_history_child.py", "", marks=pytest.mark.long),
     ],
 )
 def test_ros2_back_end_passes_the_contract_in_an_isolated_network(file: str, chosen: str) -> None:

@@ -22,7 +22,7 @@ def test_ros_2_bridge_tests_pass_in_an_isolated_network() -> None:
     if reason := why_not():
         pytest.skip(reason)
     known = {key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "CYCLONEDDS_"))}
-    file = str(HERE / "ros2_bridge_inside.py")
+    file = str(HERE / "ros2_bridge_child.py")
     done = subprocess.run(
         [*NAMESPACE, sys.executable, "-m", "pytest", "-q", "-n0", "--color=no", file],
         env=known | {"NEP_TEST_ROS2": "1"},

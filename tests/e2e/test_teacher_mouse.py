@@ -12,7 +12,9 @@ import pytest
 
 import nep
 from tests.e2e.film import Film, MouseOnly
-from tests.e2e.hour import (
+from tests.e2e.person import middle
+from tests.e2e.studio import Studio
+from tests.e2e.teacher_session import (
     BACKPACK,
     BIN,
     TAB,
@@ -27,8 +29,6 @@ from tests.e2e.hour import (
     warnings,
     words_of,
 )
-from tests.e2e.person import middle
-from tests.e2e.studio import Studio
 from tests.e2e.test_tabs import tabs
 from tests.e2e.test_virtual_robots import RoomOnScreen
 from tests.e2e.waiting import until

@@ -1,7 +1,8 @@
-"""Eyes in the real Studio: they tell the tests what a person sees and where it is. They touch nothing.
+"""Probe in the real Studio that reports to the tests which texts and controls are visible, and where.
 
-`python -m app` imports this by itself when this folder is on PYTHONPATH. Requests and answers are lines of
-JSON on two pipes whose numbers are in NEP_E2E_EYES; no process that Studio starts inherits them.
+It changes nothing. Python imports this module at startup when its folder is on PYTHONPATH. Requests and
+replies are lines of JSON on two pipes, whose file descriptors are in NEP_E2E_PROBE; child processes don't
+inherit them.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ def _spent() -> tuple[float, float]:
 
 
 def _open() -> None:
-    told = os.environ.pop("NEP_E2E_EYES", "")
+    told = os.environ.pop("NEP_E2E_PROBE", "")
     if not told:
         return
     ask, answer = (int(number) for number in told.split(","))

@@ -17,7 +17,7 @@ from app.robots.identity import subscriber_nodes
 from nep.masters.master import Master
 from tests.blocks.fakes import until
 from tests.blocks.wire_robot import WireRobot
-from tests.robots.whose_words_count import WhoseWordsCount, answer
+from tests.robots.message_senders import WhoseWordsCount, answer
 
 pytestmark = pytest.mark.usefixtures("patient")
 

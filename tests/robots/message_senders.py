@@ -1,7 +1,7 @@
 """The contract of whoever commands robots: it believes its robots' own programs, and nobody else.
 
 A program that runs and Studio keep it alike; each has an adapter (`Side`) beside its own cases, in
-`tests/blocks/runtime/test_whose_words_count.py` and `tests/core/robots/test_claims.py`.
+`tests/blocks/runtime/test_message_senders.py` and `tests/core/robots/test_claims.py`.
 """
 
 from __future__ import annotations

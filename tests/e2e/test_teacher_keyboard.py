@@ -11,8 +11,8 @@ import pytest
 import nep
 from tests.e2e.film import Film, KeysOnly
 from tests.e2e.fingers import TAB, Fingers
-from tests.e2e.hour import has_no_problem, has_problem, kind_of, value_of, warnings, words_of
 from tests.e2e.studio import Studio
+from tests.e2e.teacher_session import has_no_problem, has_problem, kind_of, value_of, warnings, words_of
 from tests.e2e.test_tabs import tabs
 from tests.e2e.waiting import until
 
