@@ -85,7 +85,7 @@ def make_environment(computer: Computer, folder: Path, extra: str) -> Path:
         with timed("making the virtual environment .venv"):
             make = [sys.executable, "-m", "venv", "--clear", str(folder / ".venv")]
             if computer.do(make, computer.environ, None) != 0:
-                raise Trouble("the virtual environment could not be made; Python's own words are above")
+                raise Trouble("the virtual environment couldn't be created; Python's output is above")
     with timed("installing the pinned packages (the first time some 250 MB are brought)"):
         install(computer, python, extra)
     probe = [str(python), "-c", "import PySide6.QtWebEngineWidgets"]
@@ -119,9 +119,9 @@ def install(computer: Computer, python: Path, extra: str) -> None:
     if any(computer.do(step, environ, None) != 0 for step in quickly):
         print("· the quick way did not go, see above: now by pip, which takes longer", flush=True)
         if computer.do([*pip, *pinned], computer.environ, None) != 0:
-            raise Trouble("the packages could not be installed; pip's own words are above")
+            raise Trouble("the packages couldn't be installed; pip's output is above")
     if computer.do([*pip, "--no-deps", "--no-build-isolation", "-e", "."], computer.environ, None) != 0:
-        raise Trouble("Studio could not be installed; pip's own words are above")
+        raise Trouble("Studio couldn't be installed; pip's output is above")
 
 
 @contextlib.contextmanager
@@ -204,7 +204,7 @@ def package(computer: Computer, arguments: Sequence[str]) -> int:
     python = environment(computer, sys.executable, folder, "package", is_for_oldest=True)
     ours = [*pip(python), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
     if computer.do(ours, computer.environ, None) != 0:
-        raise Trouble("Studio could not be installed; pip's own words are above")
+        raise Trouble("Studio couldn't be installed; pip's output is above")
     given = [each for each in arguments if each != "--"]
     return computer.do([str(python), "-m", "installers.package", *given], computer.environ, None)
 

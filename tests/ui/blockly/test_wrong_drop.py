@@ -60,7 +60,7 @@ def corner(them: Person, selector: str, side: str = "top") -> QPoint:
             "ever",
             "[data-id=angle] > .blocklyPath",
             "top",
-            "“repeat forever” has no value, so it doesn't fit into a slot for values.",
+            "“repeat forever” doesn't return a value, so it doesn't fit into a value slot.",
         ),
         ("turn", "[data-id=ever] > .blocklyPath", "bottom", "“repeat forever” can't have blocks below it"),
         ("battery", "[data-id=start] > .blocklyPath", "bottom", "“battery” is a value. Drag it into a slot"),

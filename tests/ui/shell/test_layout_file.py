@@ -104,7 +104,7 @@ def test_layout_is_exported_imported_and_import_can_be_undone(
         assert set(window.bench.open_names()) == {"topics", "console"}
     file.write_bytes(layout_bytes("Arm", "developer", {**saved, "docks": ""}))  # Qt has nothing to put back
     commands.files.open_all([file])
-    assert window.toast.text == "Can't open Mine.nep-layout: it is damaged"
+    assert window.toast.text == "Can't open Mine.nep-layout: the file is damaged"
     assert set(window.bench.open_names()) == {"topics", "console"}
     assert [each.name for each in window.saved_layouts.all()] == ["Arm", "Arm 2"]
     file.write_bytes(b"nothing of the kind")

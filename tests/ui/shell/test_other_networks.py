@@ -86,7 +86,7 @@ def test_invalid_address_is_reported_and_kept_as_typed(sheet: OtherNetworksSheet
     assert [fake.address for fake in world.made] == ["9"]
     row.address.setText("x")
     QTest.keyClick(row.address, Qt.Key.Key_Return)
-    assert "'x' is not a ROS 2 domain" in states(sheet)[1]
+    assert "'x' isn't a ROS 2 domain" in states(sheet)[1]
     assert sheet.isVisible()
     assert row.switch.isChecked(), "what was right goes on"
     row.address.setText(" 10 ")

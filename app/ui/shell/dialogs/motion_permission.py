@@ -61,6 +61,8 @@ class MotionQuestion(QWidget):
         self.always = Switch(theme, "")
         self.let = Button(theme, _("Allow motion"), "footprints", kind="primary", size="form")
         self.not_now = Button(theme, _("Cancel"), size="form")
+        for button in (self.let, self.not_now):
+            button.allow_shrinking()
         self.let.clicked.connect(lambda: self._answer(let=True))
         self.not_now.clicked.connect(lambda: self._answer(let=False))
         self._lay_out(theme)
