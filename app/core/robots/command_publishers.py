@@ -10,7 +10,7 @@ from nep.nodes.node import Node
 from nep.programs.robots.moving import COMMAND_TYPE
 
 Submit = Callable[[str, Callable[[Node], None]], None]
-"""Function that queues a job with the node in the source's thread, given a description and the job."""
+"""Function that queues a job with the node in the source's thread. See `Source.submit`."""
 
 
 class CommandPublishers:
@@ -37,7 +37,7 @@ class CommandPublishers:
             finally:
                 link.is_opening = False
 
-        self._submit(_("connect to {robot}").format(robot=link.name), open_them)
+        self._submit(_failure_text(_("Can't connect to {robot}: {error}"), link), open_them)
 
     def close_outdated(self, link: RobotLink) -> None:
         """Close the publishers for topics that are no longer in the robot's description."""
@@ -49,12 +49,18 @@ class CommandPublishers:
                 publisher.close()
 
         if old:
-            self._submit(_("close the old publishers of {robot}").format(robot=link.name), close_them)
+            text = _failure_text(_("Can't close the old publishers of {robot}: {error}"), link)
+            self._submit(text, close_them)
 
     def close(self, link: RobotLink) -> None:
         """Close the publishers of a robot that is removed, including publishers that are being opened."""
         if link.is_opening or link.publisher is not None or link.world is not None:
             self._submit("", lambda _node: close_publishers(link))
+
+
+def _failure_text(template: str, link: RobotLink) -> str:
+    # Template for `Source.submit`, which inserts only the error. Braces in the name stay what they are.
+    return template.format(robot=link.name.replace("{", "{{").replace("}", "}}"), error="{error}")
 
 
 def close_publishers(link: RobotLink) -> None:
