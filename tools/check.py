@@ -109,7 +109,7 @@ def run(check: Check) -> Outcome:
 def run_all(found: Sequence[Check]) -> list[Outcome]:
     """Run the checks in order and return their outcomes.
 
-    Checks with `is_beside` run in the background from the beginning, and their results come last.
+    Checks with `is_beside` run in the background from the start; later checks wait for them.
     """
     with ThreadPoolExecutor() as pool:
         beside = {check: pool.submit(run, check) for check in found if check.is_beside}

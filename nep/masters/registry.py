@@ -112,8 +112,8 @@ class RegisteredNode:
         hung_for: Ids of nodes to whose publishers this node's subscribers did not connect.
         cpu_ratio: CPU usage of the node's process (1.0 is one core), or None if unknown.
         sources: Publishers that the node's subscribers receive, cached by `Registry.sources_of`.
-        sources_version: Version of `heard` and `remote_nodes`.
-        remote_nodes: Nodes of the publishers in `heard`, except those known to be on the same computer.
+        sources_version: Version of `sources` and `remote_nodes`.
+        remote_nodes: Nodes of the publishers in `sources`, except those known to be on the same computer.
         clock: Clock of the node, or None if unknown.
     """
 

@@ -100,7 +100,7 @@ class ManualInvocations:
             made.execution_start_s = self._clock()
 
     def check_timeouts(self, links: Iterable[RobotLink]) -> None:
-        """End the invocations of robots that don't reply, and invocations that exceed their time limit."""
+        """Cancel invocations that exceed their time limit or whose robot doesn't respond; they failed."""
         now = self._clock()
         for link in links:
             for invocation in link.running:

@@ -594,7 +594,7 @@ def read_entries(file: BinaryIO, info: ChunkInfo, channel: int) -> Sequence[tupl
     Args:
         file: Open file.
         info: Metadata of the chunk.
-        channel: Number of the channel.
+        channel: Id of the channel.
 
     Returns:
         Tuples (log time, offset in the chunk) of the channel's messages; None if there is no message index.

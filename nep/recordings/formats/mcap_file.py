@@ -215,7 +215,7 @@ class FileWriter:
         """Add a message to the current chunk in memory.
 
         Args:
-            channel: Number of the channel.
+            channel: Id of the channel.
             times: Log time and publish time in ns since 1970.
             sequence: Sequence number in the record.
             before: Bytes that precede the data.

@@ -110,7 +110,7 @@ class RawMessage(NamedTuple):
 
     Attributes:
         offset: Offset of the record in the chunk.
-        channel: Number of the channel.
+        channel: Id of the channel.
         sequence: Sequence number.
         log_ns: Time of receipt in ns since 1970.
         publish_ns: Time stamp in ns since 1970.
@@ -129,7 +129,7 @@ def message_head(channel: int, sequence: int, log_ns: int, publish_ns: int, size
     """Encode the part of a message record that precedes the data.
 
     Args:
-        channel: Number of the channel.
+        channel: Id of the channel.
         sequence: Sequence number.
         log_ns: Time of receipt in ns since 1970.
         publish_ns: Time stamp in ns since 1970.
@@ -242,7 +242,7 @@ def pack_message_index(channel: int, entries: Sequence[int]) -> bytes:
     """Encode the message index record of a channel.
 
     Args:
-        channel: Number of the channel.
+        channel: Id of the channel.
         entries: Alternating log times and offsets.
     """
     rest = struct.pack(f"<HI{len(entries)}Q", channel, 8 * len(entries), *entries)

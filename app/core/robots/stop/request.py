@@ -90,7 +90,7 @@ class StopRequest:
         ]
 
     def accept(self, node: str, message: Message, now: float, words: Callable[[object], str]) -> bool:
-        """Apply a message of a program that must reply; return True if the result has changed.
+        """Handle a reply of a program that serves the robot; return True if its result has changed.
 
         A refusal may be followed by a confirmation; any other reply is final.
 

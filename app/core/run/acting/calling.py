@@ -83,7 +83,7 @@ class _CallResult:
 
 
 class ServiceCalls:
-    """Manual service calls, one at a time, while sending is switched on.
+    """Manual service calls, one at a time; they are allowed only while sending is armed.
 
     Not thread-safe; use it from the main thread.
     """

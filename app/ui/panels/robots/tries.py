@@ -1,4 +1,4 @@
-"""Tries of an action: texts for their states, and the list of the latest tries."""
+"""Manual invocations of an action: texts for their states, and the list of the latest ones."""
 
 from __future__ import annotations
 

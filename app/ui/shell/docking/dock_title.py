@@ -185,7 +185,7 @@ class DockTitle(QWidget):
                 tab.setText(self._panel.title())
 
     def set_active(self, active: bool) -> None:
-        """Set whether the panel has the focus; the name is then painted darker."""
+        """Set whether the panel has the focus; its name is then painted in the primary text colour."""
         set_role(self.name, "text" if active else "textSecondary")
 
     def set_tabs(self, names: Sequence[tuple[str, str, bool, Callable[[], object]]]) -> None:
