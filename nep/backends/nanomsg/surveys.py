@@ -38,6 +38,7 @@ class _Survey:
     callback: OutcomeCallback
     is_over: bool = False
     thread: threading.Thread | None = field(default=None)
+    sending: threading.Lock = field(default_factory=threading.Lock)
 
 
 class NanomsgSurveyor:
@@ -109,7 +110,7 @@ class NanomsgSurveyor:
             )
             self._surveys[survey.number] = survey
         # Without the lock: callbacks in pynng's threads acquire it, and sending may wait for them.
-        with contextlib.suppress(load_pynng().NNGException):  # already closed
+        with survey.sending, contextlib.suppress(load_pynng().NNGException):  # already closed
             survey.context.send(bytes(data))
             survey.thread.start()
         return [survey] * count
@@ -131,7 +132,8 @@ class NanomsgSurveyor:
 
     def _finish(self, survey: _Survey) -> None:
         survey.is_over = True
-        close_context(survey.context)
+        with survey.sending:  # nng aborts the process if a context is closed while it sends
+            close_context(survey.context)
         thread = survey.thread
         if thread is not None and thread.ident is not None and thread is not threading.current_thread():
             thread.join(_JOIN_TIMEOUT_S)
