@@ -36,7 +36,7 @@ from app.ui.shell.main_window import MainWindow, Placeholder
 from app.ui.shell.start_page.page import all_examples_text, read_examples
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
-from app.ui.widgets import StatusItem
+from app.ui.widgets import Button, StatusItem
 from app.ui.widgets.lists.entry_list import EntryList, Heading
 from nep import i18n
 from nep.i18n import _
@@ -215,6 +215,21 @@ def test_window_clips_no_text_in_any_language(qtbot, whole: MainWindow) -> None:
 
     everything(qtbot, whole, look)
     assert "\n".join(faults) == ""
+
+
+@pytest.mark.parametrize("language", ["fr"], indirect=True)
+def test_tool_bar_hides_tools_instead_of_shortening_texts(qtbot, whole: MainWindow) -> None:
+    whole.resize(1280, 800)
+    whole.commands.run("layout.developer")
+    whole.tick()
+    bar = whole.tool_bar
+    for view in views():
+        bar.show_view(view)
+        settle(qtbot)
+        assert bar.needed_width() <= bar.width(), view.state
+        for button in bar.findChildren(Button):
+            if button.isVisible() and button is not bar.confirm:
+                assert button.width() >= button.sizeHint().width() - 1, (view.state, button.text())
 
 
 def test_all_menus_are_translated(qtbot, whole: MainWindow) -> None:
