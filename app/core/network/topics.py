@@ -423,8 +423,8 @@ def _subscribed_since(topic: Topic, info: TopicInfo, now: float) -> float | None
     if not info.publishers or not info.subscribers:
         return None
     before = {each.id for each in topic.info.publishers} if topic.info is not None else set()
-    anew = topic.subscribed_since is None or not before & {each.id for each in info.publishers}
-    return now if anew else topic.subscribed_since
+    is_new = topic.subscribed_since is None or not before & {each.id for each in info.publishers}
+    return now if is_new else topic.subscribed_since
 
 
 def _silence_s(topic: Topic, now: float, told_at: float) -> float | None:

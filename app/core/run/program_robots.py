@@ -57,18 +57,18 @@ class ProgramRobots:
             return
         self._revision, owners = self._fleet.revision, owners_of(self._fleet)
         links = [self._fleet.link(name) for name in self._requested_actions]
-        anew = [
+        replaced = [
             link
             for link in links
             if link is not None
             and link.name in owners
             and owners[link.name] != self._known_owners.get(link.name)
         ]
-        moving = [(link.robot, self._requested_actions[link.name]) for link in anew]
+        moving = [(link.robot, self._requested_actions[link.name]) for link in replaced]
         if self._fleet.permission.request_permission(moving, self._send):
             self._send()
         else:
-            self._send(without=[link.name for link in anew])
+            self._send(without=[link.name for link in replaced])
 
     def _has_changed(self) -> bool:
         is_same = self._fleet.revision == self._revision
@@ -81,12 +81,12 @@ class ProgramRobots:
         if self._runner is None:
             return
         owners = {name: id for name, id in owners_of(self._fleet).items() if name not in without}
-        anew = [
+        replaced = [
             name
             for name, id in owners.items()
             if name in self._requested_actions and self._known_owners.get(name) != id
         ]
-        self._fleet.moved.record_command(anew, "behaviour")  # of the robot's current program
+        self._fleet.moved.record_command(replaced, "behaviour")
         self._known_owners = {**self._known_owners, **owners}
         self._topics = self._fleet.moving_topics.topics
         self._runner.set_robots(owners, self._topics)

@@ -33,10 +33,10 @@ class Calculated:
         base = self._inputs[0]
         changed = [each.rewritten_from(seen) for each, seen in zip(self._inputs, self._seen, strict=True)]
         self._seen = [each.rewritten for each in self._inputs]
-        anew = min((each for each in changed if each is not None), default=None)
-        if anew is not None:
-            self.samples.truncate(anew)
-            self._next = min(self._next, base.begun + int(np.searchsorted(base.times, anew, side="left")))
+        change_s = min((each for each in changed if each is not None), default=None)
+        if change_s is not None:
+            self.samples.truncate(change_s)
+            self._next = min(self._next, base.begun + int(np.searchsorted(base.times, change_s, side="left")))
         if self._next < base.begun:
             self.samples.break_line()
         first = max(self._next, base.begun) - base.begun

@@ -144,7 +144,7 @@ class Tasks:
         self._next_beat_s = 0.0
         self._reported_not_ended: tuple[tuple[str, ...], str | None] = ((), None)
         self._stop_is_late = False
-        self._unasked_stop_error: str | None = None  # error of the last failed stop that nobody had requested
+        self._unasked_stop_error: str | None = None  # error of the last failed stop that was not requested
         self._patience_s = max(STOP_REPLY_TIMEOUT_S, within_s)
         self._watchdog = Watchdog(watchdog_s)
         self._dispatcher = Dispatcher(

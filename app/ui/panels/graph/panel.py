@@ -129,8 +129,8 @@ class GraphPanel(PanelWidget):
         self._own = QAction(_("Show NEP's own topics"), self)
         self._own.setCheckable(True)
         self._own.toggled.connect(lambda on: self._update_choices(shows_internal=on))
-        self._anew = QAction(theme.icon("refresh-cw"), _("Rearrange"), self)
-        self._anew.triggered.connect(lambda _on=False: self._reset_layout())
+        self._rearrange = QAction(theme.icon("refresh-cw"), _("Rearrange"), self)
+        self._rearrange.triggered.connect(lambda _on=False: self._reset_layout())
 
     def _connect(self) -> None:
         tools, canvas = self.tools, self.canvas
@@ -545,7 +545,7 @@ class GraphPanel(PanelWidget):
             self.canvas.select(GraphSelection("topic", name), by_key=True)
 
     def more_actions(self) -> list[QAction]:
-        return [self._anew, self._own]
+        return [self._rearrange, self._own]
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
