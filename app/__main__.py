@@ -28,7 +28,7 @@ from nep.system.descriptors import raise_open_file_limit
 from nep.system.streams import close_streams, command_line_arguments, prepare_streams, print_error
 from nep.version import __version__
 
-PROCESSES = (
+CHILD_MODULES = (
     "app.blocks.runtime.child",
     "app.core.graph.layout_process",
     "app.robots.simulated",
@@ -39,7 +39,7 @@ PROCESSES = (
     "nep.recordings.apart.reader_process",
 )
 
-GRACE_S = 5.0
+JOIN_TIMEOUT_S = 5.0
 """Time in seconds that non-daemon threads have to end after the window is closed."""
 
 _log = logging.getLogger("studio")
@@ -162,12 +162,12 @@ def _main(given: Sequence[str]) -> int:
     # Shiboken reads the source of every module imported after Qt, so modules without Qt are imported first.
     importlib.import_module("app.core.session")
     raise_open_file_limit()
-    from app.ui.application import RESTART, Options, run  # noqa: PLC0415  Qt is loaded only for a window
+    from app.ui.application import RESTART_EXIT_CODE, Options, run  # noqa: PLC0415  Qt is loaded only for a window
 
     code = run(
         Options(tuple(options.files), options.demo, options.theme, options.self_drive, options.new_window)
     )
-    if code == RESTART:
+    if code == RESTART_EXIT_CODE:
         restart(options.theme)
         code = 0
     return end_process(code)
@@ -246,9 +246,11 @@ def run_child_module(module: str, arguments: Sequence[str]) -> int:
         module: One of `PROCESSES`; for any other module, the exit code is 2.
         arguments: Command-line arguments of the module.
     """
-    if module not in PROCESSES:
+    if module not in CHILD_MODULES:
         sys.stderr.write(
-            _("no process '{module}'; available: {names}").format(module=module, names=", ".join(PROCESSES))
+            _("no process '{module}'; available: {names}").format(
+                module=module, names=", ".join(CHILD_MODULES)
+            )
             + "\n"
         )
         return 2
@@ -274,7 +276,7 @@ def join_threads(within_s: float) -> tuple[str, ...]:
     return tuple(each.name for each in others if each.is_alive())
 
 
-def end_process(code: int, within_s: float = GRACE_S) -> int:
+def end_process(code: int, within_s: float = JOIN_TIMEOUT_S) -> int:
     """Wait for all non-daemon threads and return ``code``; if some don't end, log them and exit at once.
 
     Python waits for every non-daemon thread at exit. A plug-in's thread that never ends, or a thread that

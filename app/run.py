@@ -22,7 +22,7 @@ from app.blocks.model.workspace import Workspace, parse_workspace
 from app.blocks.runtime.find_robots import FoundRobots, find_robots
 from app.blocks.runtime.interrupts import without_interrupts
 from app.core.documents.document import read
-from app.core.robots.launcher import VIRTUAL_ROBOTS, VirtualProcesses
+from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES, VirtualProcesses
 from app.core.robots.motion.permission import actions_by_robot, risky_actions
 from app.core.robots.stop.lines import StopTarget
 from app.core.robots.stop.report import StopReport
@@ -80,11 +80,11 @@ def run_file(
         known = _parse_descriptions(descriptions)
         wanted = used_robot_names(workspace)
         with nep.node("behaviour runner", master=master) as node:
-            found = _with_trusted_virtual(_robots_for(workspace, node, robot_wait_s, known))
+            found = _with_trusted_virtual(_find_used_robots(workspace, node, robot_wait_s, known))
             for claim in found.rejected_claims:
                 say(_("warning: {sentence}").format(sentence=claim))
             program = compile_behaviour(workspace, found.robots, absent=known, name=name)
-            code = _rejection_code(program, wanted, found.robots, say)
+            code = _rejection_exit_code(program, wanted, found.robots, say)
             if code is not None:
                 return code
             used = [robot for robot in found.robots if robot.name in program.robots]
@@ -104,7 +104,7 @@ def run_file(
         say.report_problem()
 
 
-def _robots_for(
+def _find_used_robots(
     workspace: Mapping[str, object], node: nep.Node, wait_s: float, known: Sequence[Robot]
 ) -> FoundRobots:
     wanted = used_robot_names(workspace)
@@ -118,7 +118,7 @@ def _robots_for(
 
 def _with_trusted_virtual(found: FoundRobots) -> FoundRobots:
     # Only robots whose programs are known to be Studio's own count as virtual (docs/trust.md).
-    processes = VirtualProcesses(VIRTUAL_ROBOTS.values())
+    processes = VirtualProcesses(VIRTUAL_ROBOT_MODULES.values())
     robots = (
         replace(robot, virtual=robot.virtual and processes.is_started_by_studio(found.owners[robot.name]))
         if robot.name in found.owners
@@ -192,7 +192,7 @@ def _parse_descriptions(descriptions: Mapping[str, Mapping[str, object]]) -> lis
     return found
 
 
-def _rejection_code(
+def _rejection_exit_code(
     program: Program, wanted: Sequence[str], robots: Sequence[Robot], say: Callable[[str], None]
 ) -> int | None:
     for problem in program.problems:
@@ -276,8 +276,8 @@ def _run(
         for line in stop_lines(report):
             say(line)
     if was_interrupted:
-        return INTERRUPTED if not report.unproven and not say.has_failed else FAILED
-    return OK if events.ok and not report.unproven else FAILED
+        return INTERRUPTED if not report.unconfirmed_robots and not say.has_failed else FAILED
+    return OK if events.ok and not report.unconfirmed_robots else FAILED
 
 
 class _LateRobotMonitor:
@@ -331,7 +331,7 @@ def stop_lines(report: StopReport) -> list[str]:
         _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored.").format(
             program=program, robot=name
         )
-        for name, program in report.strangers
+        for name, program in report.impostors
     ]
     if not report.robots:
         return strange

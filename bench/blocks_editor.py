@@ -144,7 +144,7 @@ class Bench:
         start = QPoint(round(where[0]) + 12, round(where[1]) + 18)
         end = start + (QPoint(180, 60) if there else QPoint(-180, -60))
         assert self.view.web is not None
-        target = self.view.web.keyboard()
+        target = self.view.web.keyboard_target()
         assert isinstance(target, QWidget)
         before = self.ask("window.benchDrops.length")
         QTest.mouseMove(target, start)

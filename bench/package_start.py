@@ -30,7 +30,7 @@ from pathlib import Path
 
 import psutil
 
-from app.ui.startup.single_instance import OK, socket_name
+from app.ui.startup.single_instance import OK_REPLY, socket_name
 
 ROOT = Path(__file__).resolve().parents[1]
 DROP = Path("/proc/sys/vm/drop_caches")
@@ -84,7 +84,7 @@ def until_answered(name: str, process: subprocess.Popen[bytes], until: float) ->
             line.settimeout(MAX_S)
             line.connect(name)
             line.sendall(json.dumps({"files": [], "demo": False}).encode() + b"\n")
-            if line.recv(len(OK)) == OK:
+            if line.recv(len(OK_REPLY)) == OK_REPLY:
                 return
         PAUSE.wait(LOOK_S)
     raise SystemExit(f"no window answered within {MAX_S:g} s: {process.args!r}")

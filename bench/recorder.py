@@ -208,7 +208,7 @@ def large_file(folder: Path, gigabytes: float) -> bool:
             writer.post(states(at // 5 + 40)[at // 5 :])
     with closing(FileReader(made)) as small, made.open("rb") as file:
         large = FileWriter(path)
-        for number, each in small.facts.channels.items():
+        for number, each in small.info.channels.items():
             large.table.add_numbered(number, each)
         chunks = small.chunks()
         shift = 0
@@ -219,7 +219,7 @@ def large_file(folder: Path, gigabytes: float) -> bool:
                 index = file.read(chunk.index_bytes)
                 struct.pack_into("<QQ", head, 9, chunk.start_ns + shift, chunk.end_ns + shift)
                 large.copy_chunk(bytes(head), _later(chunk, shift), _indexes(index, shift))
-            shift += small.facts.end_ns - small.facts.start_ns + 1_000_000
+            shift += small.info.end_ns - small.info.start_ns + 1_000_000
         large.finish()
     started = time.perf_counter()
     recording = Recording(path)

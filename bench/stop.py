@@ -40,7 +40,7 @@ class Watching:
         self._states: dict[str, list[str]] = {}
         self._commands = {robot.name: node.new_pub(robot.topics.command, "robot/command") for robot in robots}
         for robot in robots:
-            node.new_sub(robot.topics.answer, "robot/answer", sink=self._take)
+            node.new_sub(robot.topics.reply, "robot/answer", sink=self._take)
 
     def _take(self, messages: Sequence[nep.Message]) -> None:
         with self._changed:
@@ -103,7 +103,7 @@ def one_round(
         watching.send(robot.name, id="", op="alive")
     echoed = _timed(lambda: _echo(number, robots, watching))
     report = stopper.stop_all(timeout_s=STOP_S)
-    if not report.is_proven:
+    if not report.is_confirmed:
         raise SystemExit(f"round {number}: {', '.join(report.unconfirmed_names)} did not answer")
     watching.wait(ids, ["canceled"], MOVE_S)
     return report.elapsed_ms, echoed

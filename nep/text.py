@@ -18,21 +18,21 @@ _MAX_QUOTED_LENGTH = 200
 _MAX_SHOWN_DEPTH = 8
 _MAX_INT_BITS = 1_000  # str() of larger ints takes quadratic time, or raises ValueError
 
-_CONTROLS = (
+_CONTROL_CHARACTERS = (
     "\x00-\x1f\x7f-\x9f"  # C0, DEL and C1: cursor, colours, screen, title, clipboard
     "\u061c\u200e\u200f\u202a-\u202e\u2066-\u206f"  # text direction
     "\u2028\u2029"  # line and paragraph separators
     "\u200b\u2060-\u2065\ufeff\ufff9-\ufffb"  # invisible: two different names would look the same
     "\ud800-\udfff"  # lone surrogates can't be encoded
 )
-_CONTROL = re.compile(f"[{_CONTROLS}]")
-_CONTROL_EXCEPT_NEWLINES = re.compile(f"(?![\n\t])[{_CONTROLS}]")
-_SURROGATE = re.compile("[\ud800-\udfff]")
+_CONTROL_PATTERN = re.compile(f"[{_CONTROL_CHARACTERS}]")
+_CONTROL_EXCEPT_NEWLINES_PATTERN = re.compile(f"(?![\n\t])[{_CONTROL_CHARACTERS}]")
+_SURROGATE_PATTERN = re.compile("[\ud800-\udfff]")
 
 
 def first_control(text: str) -> str:
     r"""Return the first control character of `text`, escaped (`\x1b`), or "" if it has none."""
-    found = _CONTROL.search(text)
+    found = _CONTROL_PATTERN.search(text)
     return "" if found is None else _escape_match(found)
 
 
@@ -44,7 +44,7 @@ def escaped(text: str, *, lines: bool = False) -> str:
         lines: True to leave newlines and tabs unescaped. Set this only where a forged line can't be
             mistaken for another message.
     """
-    return (_CONTROL_EXCEPT_NEWLINES if lines else _CONTROL).sub(_escape_match, text)
+    return (_CONTROL_EXCEPT_NEWLINES_PATTERN if lines else _CONTROL_PATTERN).sub(_escape_match, text)
 
 
 def strip_controls(text: str, *, lines: bool = False) -> str:
@@ -55,8 +55,8 @@ def strip_controls(text: str, *, lines: bool = False) -> str:
         lines: True to leave newlines and tabs unchanged; otherwise they are replaced by spaces.
     """
     if lines:
-        return _CONTROL_EXCEPT_NEWLINES.sub("", text)
-    return _CONTROL.sub("", re.sub("[\n\t\u2028\u2029]", " ", text))
+        return _CONTROL_EXCEPT_NEWLINES_PATTERN.sub("", text)
+    return _CONTROL_PATTERN.sub("", re.sub("[\n\t\u2028\u2029]", " ", text))
 
 
 def shortened(text: str, most: int) -> str:
@@ -74,7 +74,7 @@ def bounded_str(value: object, max_length: int = _MAX_QUOTED_LENGTH) -> str:
     class name.
     """
     text = shortened(value, max_length) if isinstance(value, str) else _render_bounded(value, max_length)
-    return _SURROGATE.sub(_escape_match, text)
+    return _SURROGATE_PATTERN.sub(_escape_match, text)
 
 
 def quotable(value: object) -> str:

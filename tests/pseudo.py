@@ -67,7 +67,7 @@ class _Pseudo(NullTranslations):
 
 def words() -> object:
     """What `nep.i18n` holds while this language is in use."""
-    return i18n._Catalogue(i18n.PSEUDO, _Pseudo(), _FACTS)
+    return i18n._Catalogue(i18n.PSEUDO_LANGUAGE, _Pseudo(), _FACTS)
 
 
 @lru_cache(maxsize=1)

@@ -128,7 +128,7 @@ def test_robot_plug_in_is_described_driven_and_offered_as_blocks(write: Write, m
         try:
             found = [t for t in asker.graph().topics.values() if t.msg_type == "robot/description"]
             assert [topic.name for topic in found] == [robot.topics.description]
-            answers = asker.new_sub(robot.topics.answer, "robot/answer")
+            answers = asker.new_sub(robot.topics.reply, "robot/answer")
             commands = asker.new_pub(robot.topics.command, "robot/command")
             commands.publish(
                 {"id": "1", "op": "invoke", "from": "me", "action": "blink", "input": {"times": 2}}

@@ -23,11 +23,11 @@ from app.core.network.remote_access import RemoteAccess, RemoteAccessChanged
 from app.core.network.topics import Topic, Topics
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import RESTART_TIMEOUT_S, Health
-from app.core.robots.health_facts import facts_of
-from app.core.robots.motion.permission import MayNotMoveError, Question
+from app.core.robots.health_facts import health_items
+from app.core.robots.motion.permission import MayNotMoveError, PermissionQuestion
 from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import RobotLink
-from app.core.robots.stop.report import RobotStop, StopReport, not_reached
+from app.core.robots.stop.report import RobotStop, StopReport, unreached_result
 from app.core.run.view import RunState, clock_text, stop_text, view_of
 from app.errors import DocumentError
 from app.robots import simulated
@@ -59,7 +59,7 @@ from tests.pseudo import untranslated
 PEPPER = parse(thing_description(simulated.ROBOT.thing_model, "Pepper"))
 DONE = RobotStop("Pepper", True, 38.2)
 SILENT = RobotStop("Turtle", False, None)
-REFUSED = RobotStop("Turtle", False, 3.0, error="Xx", is_refused=True, program="zz")
+REFUSED = RobotStop("Turtle", False, 3.0, error="Xx", has_failed=True, program="zz")
 RIZE = RobotStop("Nao", False, None, can_confirm=False)
 LISTENS = RobotStop("Turtle", False, None, can_confirm=False, program="zz")
 DATA = ("Turtle", "Nao", "Xx", "zz", "Greeting")
@@ -74,7 +74,7 @@ def said(*texts: object, data: tuple[str, ...] = ()) -> None:
 
 
 def reports() -> list[StopReport]:
-    one = [DONE, SILENT, REFUSED, RIZE, LISTENS, not_reached("Turtle"), not_reached("Turtle", "Xx")]
+    one = [DONE, SILENT, REFUSED, RIZE, LISTENS, unreached_result("Turtle"), unreached_result("Turtle", "Xx")]
     many = [tuple(RobotStop(f"Turtle{number}", False, None) for number in range(9))]
     mixed = [(DONE, SILENT), (DONE, RIZE), (DONE, REFUSED), (DONE, replace(DONE, name="Turtle")), ()]
     return [
@@ -97,7 +97,7 @@ def test_run_bar_is_translated_in_all_states() -> None:
         RunState("proven", "Greeting", finished=True),
         RunState("proven", "Greeting", has_stopped_blocks=True, elapsed_s=100.0),
         *(
-            RunState("unanswered" if each.unproven else "proven", "Greeting", report=each)
+            RunState("unanswered" if each.unconfirmed_robots else "proven", "Greeting", report=each)
             for each in reports()
         ),
     ]
@@ -105,7 +105,7 @@ def test_run_bar_is_translated_in_all_states() -> None:
         for now in (0.01, 9.0):
             for elsewhere in (False, True):
                 view = view_of(state, ["Pepper", "Turtle"], now, elsewhere=elsewhere)
-                said(view.title, view.detail, view.compact, view.result or "", view.confirm_label or "")
+                said(view.title, view.detail, view.compact_text, view.result or "", view.confirm_label or "")
                 said(_(view.run_label), _(view.stop_label))
     said(view_of(RunState(), [], 0).detail)
 
@@ -133,8 +133,8 @@ def test_health_facts_of_robots_are_translated() -> None:
         replace(link, is_connected=False),
         replace(link, is_connected=False, gone_s=3.0),
         replace(link, is_unresponsive=True),
-        replace(link, is_unresponsive=True, replied_s=3.0),
-        replace(link, replied_s=3.0, is_stopping=True, values={"battery": 4}),
+        replace(link, is_unresponsive=True, last_reply_s=3.0),
+        replace(link, last_reply_s=3.0, is_stopping=True, values={"battery": 4}),
         replace(link, values={"battery": 80}),
         replace(link, rejected=ReportedCount(12, 8.0), errors=ReportedCount(1)),
     ]
@@ -142,8 +142,8 @@ def test_health_facts_of_robots_are_translated() -> None:
         for silent_s in (None, 99.0):
             for topic in topics.values():
                 topic.silent_s, topic.age_s, topic.rate_hz = silent_s, silent_s, 3.0
-            each.silent = "" if silent_s else None
-            facts = facts_of(each, cast("Topics", topics), 9.0, lambda age_s: f"{age_s:g} s")
+            each.silence_reason = "" if silent_s else None
+            facts = health_items(each, cast("Topics", topics), 9.0, lambda age_s: f"{age_s:g} s")
             said(*(_(fact.title) for fact in facts), *(fact.text for fact in facts), data=sensors)
         said(each.state_label)
 
@@ -177,7 +177,7 @@ def test_health_alerts_are_translated() -> None:
     now[0] = RESTART_TIMEOUT_S + 1
     health.check({"Pepper"}, {"Turtle"})
     for unchecked in (0, 7):
-        health.update({f"/{unchecked}": CheckResult(3, 2, unchecked, "Xx", is_last_good=False)})
+        health.update({f"/{unchecked}": CheckResult(3, 2, unchecked, "Xx", is_newest_readable=False)})
     health.report_journal_problem("Xx")
     health.confirm_discard("Greeting", "Xx")
     health.report_settings_problem("Xx")
@@ -213,7 +213,7 @@ def test_graph_changes_are_translated() -> None:
 
 
 def test_questions_and_errors_are_translated() -> None:
-    question = Question({"Nao": ("Xx",), "Turtle": ("Xx", "zz")}, lambda: None)
+    question = PermissionQuestion({"Nao": ("Xx",), "Turtle": ("Xx", "zz")}, lambda: None)
     said(question.title, question.message, MayNotMoveError(["Nao", "Turtle"]))
     said(
         app_errors.SettingsError(Path("/Xx"), "Xx"),

@@ -26,7 +26,7 @@ from app.core.session import Session
 from app.ui.application import Options, make_application, make_window
 from app.ui.blockly.view import BlocklyView
 from app.ui.self_drive import SelfDrive, Step
-from app.ui.shell.dialogs.guide import PICTURE_RATIO
+from app.ui.shell.dialogs.guide import IMAGE_PIXEL_RATIO
 from app.ui.shell.main_window import MainWindow
 from nep.i18n import LANG_VARIABLE, translate
 from nep.masters.master import is_running
@@ -278,7 +278,7 @@ class GuidePictures(SelfDrive):
     def _target(self) -> QWidget:
         # The widget that receives mouse and key events.
         web = self._editor.web
-        found = web.keyboard() if web is not None else None
+        found = web.keyboard_target() if web is not None else None
         if not isinstance(found, QWidget):
             raise TypeError("the page of the blocks is not there yet")
         return found
@@ -317,14 +317,14 @@ class GuidePictures(SelfDrive):
         dock = bench.docks[panel]
         return QRect(dock.mapTo(self._window, QPoint()), dock.size())
 
-    def _grab(self, name: str) -> None:
+    def _save_screenshot(self, name: str) -> None:
         if not name:
             return
         crop = self._crops.get(name)
         picture = self._window.grab(crop()) if crop is not None else self._window.grab()
         if self._mouse is not None and crop is not None:
             paint_mouse(picture, self._mouse - crop().topLeft())
-        most = round(WIDE * PICTURE_RATIO)
+        most = round(WIDE * IMAGE_PIXEL_RATIO)
         if picture.width() > most:
             picture = picture.scaledToWidth(most, Qt.TransformationMode.SmoothTransformation)
         path = self._folder / f"{name}.png"
@@ -368,7 +368,7 @@ def take_all(folder: Path) -> int:
     failed = 0
     for language in languages:
         for theme in THEMES:
-            environ = {**os.environ, LANG_VARIABLE: language, "QT_SCALE_FACTOR": f"{PICTURE_RATIO:g}"}
+            environ = {**os.environ, LANG_VARIABLE: language, "QT_SCALE_FACTOR": f"{IMAGE_PIXEL_RATIO:g}"}
             into = folder / language / theme
             command = [sys.executable, "-m", "tools.guide_pictures", str(into), "--theme", theme]
             failed += subprocess.run(command, env=environ, cwd=ROOT, check=False).returncode != 0

@@ -22,7 +22,7 @@ from PySide6.QtCore import QTimer
 from app.core.session import Session
 from app.ui.application import Options, make_application, make_window
 from app.ui.self_drive import SelfDrive, Step
-from app.ui.shell.dialogs.command_palette import Palette
+from app.ui.shell.dialogs.command_palette import CommandPalette
 from app.ui.shell.main_window import MainWindow
 from nep.masters.master import is_running
 from tools.small_png import shrink
@@ -188,7 +188,7 @@ class Pictures(SelfDrive):
     def _find(self) -> None:
         # Opens the palette with the search "rob".
         self._commands.run("palette.open")
-        for palette in self._window.findChildren(Palette):
+        for palette in self._window.findChildren(CommandPalette):
             palette.field.setText("rob")
 
     def _robots(self) -> None:

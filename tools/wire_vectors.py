@@ -31,7 +31,7 @@ MALFORMED_COUNT = 1000
 EPOCH = 1234605616436508552
 KEY = "000102030405060708090a0b0c0d0e0f"
 OTHER_KEY = "f0f1f2f3f4f5f6f7f8f9fafbfcfdfeff"
-PUBLISHER, SUBSCRIBER = requests.id_from(KEY, 1), requests.id_from(KEY, 2)
+PUBLISHER, SUBSCRIBER = requests.derive_id(KEY, 1), requests.derive_id(KEY, 2)
 TOPIC = "example"
 STAMP_NS = 1700000000000000000
 PAYLOAD = b'{"message":"hello"}'
@@ -153,15 +153,15 @@ def notices() -> list[dict[str, Any]]:
 
 def node(key: str, name: str) -> requests.NodeRecord:
     """Create the record of a node with this key."""
-    return requests.NodeRecord(requests.node_id_from(key), name, "here", 4711, key=key)
+    return requests.NodeRecord(requests.derive_node_id(key), name, "here", 4711, key=key)
 
 
 TALKER, LISTENER = node(KEY, "talker"), node(OTHER_KEY, "listener")
 ODOM = requests.PublisherRecord(PUBLISHER, "/odom", "json", "json", ("tcp://127.0.0.1:40000",), number=1)
-LISTENS = requests.SubscriberRecord(requests.id_from(OTHER_KEY, 1), "/odom", "json", number=1)
+LISTENS = requests.SubscriberRecord(requests.derive_id(OTHER_KEY, 1), "/odom", "json", number=1)
 ADDS, SUBSCRIBES = requests.AddPublisher(TALKER, ODOM), requests.AddSubscriber(LISTENER, LISTENS)
 ALL = requests.PublisherRecord(
-    requests.id_from(KEY, 3), "/map", "json", "json", ("tcp://127.0.0.1:40001",), True, False, 3, 5
+    requests.derive_id(KEY, 3), "/map", "json", "json", ("tcp://127.0.0.1:40001",), True, False, 3, 5
 )
 COUNTS = requests.PublisherCount(PUBLISHER, 12, 2**40, 12, STAMP_NS)
 RECEIVED = requests.SubscriberCount(LISTENS.id, 11, 1)
@@ -315,7 +315,7 @@ def master() -> dict[str, Any]:
             }
         )
     ping = encode_request(requests.Ping(), 1)
-    done = msgpack.packb({"is": "done", "re": 1, "what": write(requests.Done(1, 0))})
+    done = msgpack.packb({"is": "done", "re": 1, "what": write(requests.DoneReply(1, 0))})
     return {
         "epoch": str(EPOCH),
         "asked": asked,

@@ -33,7 +33,7 @@ from babel.messages.pofile import read_po, write_po
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from nep.i18n import DOMAIN, EDITOR_CATALOGUE, ENGLISH, LOCALE_FOLDER, PSEUDO, placeholders  # noqa: E402 - started by its path
+from nep.i18n import DOMAIN, EDITOR_CATALOGUE, ENGLISH, LOCALE_FOLDER, PSEUDO_LANGUAGE, placeholders  # noqa: E402 - started by its path
 from tools.pseudo import MARKUP, pseudo, sentences_of_blocks, sentences_of_examples  # noqa: E402
 
 KEYWORDS = {
@@ -231,7 +231,7 @@ def compile_all(folder: Path = LOCALE_FOLDER) -> None:
 
 def compile_pseudo(folder: Path = LOCALE_FOLDER) -> None:
     """Write the pseudo-language, which is not part of a release."""
-    _write_mo(pseudo_catalog(read(pot_file(folder))), po_file(folder, PSEUDO).with_suffix(".mo"))
+    _write_mo(pseudo_catalog(read(pot_file(folder))), po_file(folder, PSEUDO_LANGUAGE).with_suffix(".mo"))
 
 
 def _write_mo(catalog: Catalog, path: Path) -> None:

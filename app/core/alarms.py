@@ -15,7 +15,7 @@ from app.core.documents.background_worker import BackgroundWorker
 from app.core.network.source import Source
 from app.core.network.watches import Watch
 from app.core.robots.fleet import Fleet
-from app.core.robots.motion.permission import Question
+from app.core.robots.motion.permission import PermissionQuestion
 from app.core.robots.stop.moved_robots import OnMoved, ignore_moved
 from app.core.robots.voices import Notes, RobotVoices
 from app.core.run.control import Runs
@@ -34,14 +34,14 @@ from nep.programs.alarms.rule_file import MAX_ALARMS, NewerAlarmsError, encode_a
 from nep.programs.alarms.sentences import duration_text, event_text, subject_text
 from nep.protocol.graph_view import GraphView
 
-FILE = "alarms.json"
-SHOW = "panel:alarms"
+FILE_NAME = "alarms.json"
+SHOW_COMMAND = "panel:alarms"
 """Name of the window command that shows the alarms panel."""
-MAX_AGE_S = 10.0
+MAX_MESSAGE_AGE_S = 10.0
 """Maximum age in seconds of an unsent message. Older messages may be outdated and are discarded."""
 SOUND: Notes = ((880.0, 0.16), (0.0, 0.06), (880.0, 0.16), (0.0, 0.06), (660.0, 0.3))
 VOLUME = 0.6
-ACTION_FAILED = lazy("an alarm can't carry out its action: {error}")
+ACTION_FAILED_MESSAGE = lazy("an alarm can't carry out its action: {error}")
 _MAX_FILE_BYTES = 4_000_000
 WARNING_KINDS = frozenset({*EVENT_KINDS, "loses", "rate_below", "rate_above"})
 """Kinds of conditions with severity "warn"; all other kinds are errors."""
@@ -71,7 +71,7 @@ class AlarmSession(Protocol):
 class _PendingSend:
     """Message to be sent by an alarm once the user confirms that the robot may move."""
 
-    question: Question
+    question: PermissionQuestion
     done: DoneCallback
 
 
@@ -93,7 +93,7 @@ class SessionAlarms:
         clock_s: Callable[[], float] = time.time,
     ) -> None:
         self._session = session
-        self.path: Path | None = session.settings.path.with_name(FILE)
+        self.path: Path | None = session.settings.path.with_name(FILE_NAME)
         self._clock, self._clock_s = clock, clock_s
         self._commands = AlarmCommands(session.fleet.gate.current_rejection_reason)
         self._pending_send: _PendingSend | None = None
@@ -108,7 +108,7 @@ class SessionAlarms:
         self._is_newer = False
         found = self._read(self.path)
         carriers: dict[str, ActionStarter] = {
-            "banner": _done_by_alert,
+            "banner": _complete_with_alert,
             "console": self._log_to_console,
             "sound": self._play_sound,
             "keep": self._save_recording,
@@ -168,7 +168,7 @@ class SessionAlarms:
         text = _("You have {count} alarms, the maximum.").format(count=MAX_ALARMS)
         hint = _("Delete one you don't need.")
         self._session.alerts.raise_alert(
-            "alarms:most", "warn", text, hint, button=_("Show the alarms"), action=SHOW, count=0
+            "alarms:most", "warn", text, hint, button=_("Show the alarms"), action=SHOW_COMMAND, count=0
         )
         return False
 
@@ -219,7 +219,7 @@ class SessionAlarms:
     def tick(self) -> None:
         """Process pending alarm events and run the actions that are due."""
         for event in self.alarms.tick():
-            self._show(event)
+            self._show_event(event)
         self.alarms.take_action_results()
         asked = self._pending_send
         if asked is not None and self._session.fleet.permission.question is not asked.question:
@@ -238,7 +238,7 @@ class SessionAlarms:
                 self._update_alert(rule, self.alarms.evaluator.state(rule).value, count=0)
         self._write()
         try:
-            if self._worker.pop_result(FILE):
+            if self._worker.pop_result(FILE_NAME):
                 self._session.alerts.resolve("alarms:kept")
         except OSError as error:
             self._written = None  # retried at the next check
@@ -256,7 +256,7 @@ class SessionAlarms:
             watch.close()
         self._watches.clear()
         self._write()
-        self._worker.finish(FILE)
+        self._worker.finish(FILE_NAME)
         self._worker.close()
         self._commands.close()
 
@@ -271,7 +271,7 @@ class SessionAlarms:
 
     # ---- alerts
 
-    def _show(self, event: AlarmEvent) -> None:
+    def _show_event(self, event: AlarmEvent) -> None:
         rule, alerts = event.rule, self._session.alerts
         self.on_event(event)
         if event.kind == "off":
@@ -301,7 +301,7 @@ class SessionAlarms:
             f"{words[:1].upper()}{words[1:]}.",
             ". ".join([*(each[:1].upper() + each[1:] for each in details), ""]).strip(),
             button=_("Show the alarm"),
-            action=SHOW,
+            action=SHOW_COMMAND,
             count=max(count, now - known) if known else max(1, count),
         )
 
@@ -345,17 +345,17 @@ class SessionAlarms:
         reason = _("An alarm wants to send a message on {topic} ({what}).").format(
             topic=topic, what=event_text(event.rule.condition, event.value)
         )
-        go_on = partial(self._send_permitted, event, action, done)
+        go_on = partial(self._resume_send, event, action, done)
         if not fleet.gate.request_permission(topic, go_on, msg_type, reason=reason):
             question = fleet.permission.question
             self._pending_send = None if question is None else _PendingSend(question, done)
             return
-        moved = fleet.gate.moved_by(topic, msg_type)
+        moved = fleet.gate.robots_moved_by(topic, msg_type)
         if moved:
             self.on_moved(moved, "alarm")
         self._submit_command(event, action, done)
 
-    def _send_permitted(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
+    def _resume_send(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         self._pending_send = None
         self._send(event, action, done)
 
@@ -363,12 +363,12 @@ class SessionAlarms:
         asked = self._clock()
 
         def job(node: Node) -> None:
-            if self._clock() - asked > MAX_AGE_S:
+            if self._clock() - asked > MAX_MESSAGE_AGE_S:
                 done(False, _("no master was running"))
             else:
                 self._commands.start_action(node, action, done)
 
-        self._session.source.submit(ACTION_FAILED, job)
+        self._session.source.submit(ACTION_FAILED_MESSAGE, job)
 
     # ---- file
 
@@ -388,7 +388,7 @@ class SessionAlarms:
             write_atomically(path, encode_alarms(rules, kept), durable=False, private=True)
             return True
 
-        self._worker.submit(FILE, write)
+        self._worker.submit(FILE_NAME, write)
 
     def _read(self, path: Path) -> AlarmFile:
         def parse(data: bytes) -> tuple[AlarmFile, str]:
@@ -401,7 +401,7 @@ class SessionAlarms:
             some = kept.value is not None
             title = _("Some alarms couldn't be read.") if some else _("The alarms couldn't be read.")
             self._session.alerts.raise_alert(
-                "alarms:file", "warn", title, kept.problem, button=_("Show the alarms"), action=SHOW
+                "alarms:file", "warn", title, kept.problem, button=_("Show the alarms"), action=SHOW_COMMAND
             )
         return kept.value if kept.value is not None else AlarmFile()
 
@@ -413,5 +413,5 @@ def _alert_id(rule_id: str) -> str:
     return f"alarm:{rule_id}"
 
 
-def _done_by_alert(_event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
+def _complete_with_alert(_event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
     done(True, "")

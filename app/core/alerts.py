@@ -112,13 +112,13 @@ class Alerts:
             )
         if new != old:
             self._alerts[id] = new
-            self._changed()
+            self._mark_changed()
 
     def resolve(self, id: str) -> None:
         """Remove an alert. Does nothing if the alert isn't active."""
         self._dismissed.discard(id)
         if self._alerts.pop(id, None) is not None:
-            self._changed()
+            self._mark_changed()
 
     def resolve_all(self, prefix: str) -> None:
         """Resolve every alert whose id starts with ``prefix``."""
@@ -143,6 +143,6 @@ class Alerts:
         """Return True if the user has closed the banner of the alert."""
         return id in self._dismissed
 
-    def _changed(self) -> None:
+    def _mark_changed(self) -> None:
         self._sorted = None
         self.revision += 1

@@ -18,7 +18,7 @@ from nep.nodes import log_handler
 from nep.text import shortened
 
 CAPACITY = 5000
-TEXT_LIMIT = 2000
+MAX_TEXT_LENGTH = 2000
 MAX_IGNORED_PROCESSES = 50
 _LEVELS = {"warning": "warn"}
 
@@ -53,7 +53,7 @@ class Console:
         self._lines: deque[ConsoleRecord | Message] = deque(maxlen=capacity)
         self._unread = 0
         self._own: deque[int] = deque(maxlen=MAX_IGNORED_PROCESSES)
-        self._errors = log_handler.ShownErrors()
+        self._errors = log_handler.NewErrorFilter()
         self._count = 0
         self.left_out = 0
         """Number of records from the network that were dropped because too many arrived at once."""
@@ -102,12 +102,12 @@ class Console:
         self._unread = 0
         self.revision += 1
 
-    def rewind(self) -> None:
+    def reset(self) -> None:
         """Remove all records and the list of known errors.
 
         Called when a replay seeks, because the records are then sent again.
         """
-        self._errors = log_handler.ShownErrors()
+        self._errors = log_handler.NewErrorFilter()
         self.clear()
 
     def _append(self, lines: Sequence[ConsoleRecord | Message]) -> None:
@@ -119,11 +119,11 @@ class Console:
         unread = [self._lines.pop() for _unread in range(self._unread)]
         self._unread = 0
         for line in reversed(unread):
-            for record in self._records_of(line) if isinstance(line, Message) else (line,):
+            for record in self._decode_records(line) if isinstance(line, Message) else (line,):
                 self._count += 1
                 self._lines.append(replace(record, number=self._count))
 
-    def _records_of(self, message: Message) -> Sequence[ConsoleRecord]:
+    def _decode_records(self, message: Message) -> Sequence[ConsoleRecord]:
         try:
             if message.topic == log_handler.LAST_ERRORS_TOPIC:
                 given = self._errors.new_records(message.payload)
@@ -132,9 +132,9 @@ class Console:
                 given = [one] if self._errors.is_new(one) else []
         except NepError:
             return ()  # an alert reports it, as for every topic
-        return [self._record_of(each) for each in given if each.pid is None or each.pid not in self._own]
+        return [self._decode_record(each) for each in given if each.pid is None or each.pid not in self._own]
 
-    def _record_of(self, given: log_handler.LogRecord) -> ConsoleRecord:
+    def _decode_record(self, given: log_handler.LogRecord) -> ConsoleRecord:
         place = f"{given.file}:{given.line}" if given.file and given.line else given.file or ""
         return ConsoleRecord(
             given.stamp_ns / 1e9 if given.stamp_ns else self._clock(),
@@ -147,4 +147,4 @@ class Console:
 
 
 def _truncate(text: str) -> str:
-    return shortened(text, TEXT_LIMIT)
+    return shortened(text, MAX_TEXT_LENGTH)

@@ -29,10 +29,10 @@ FILE_BYTES, FILES_KEPT = 1_000_000, 3
 MAX_COUNTED_FAULTS = 500
 CONSOLE_EXTRA: dict[str, object] = {"in_console": True}
 """``extra`` of a record for the log file only, because the Console already shows the event in other words."""
-WRITER_MESSAGE = "NEP Studio %s writes from here on"
-FORMAT = "%(asctime)s %(levelname)s %(threadName)s %(name)s: %(message)s"
+VERSION_MESSAGE = "NEP Studio %s writes from here on"
+LOG_FORMAT = "%(asctime)s %(levelname)s %(threadName)s %(name)s: %(message)s"
 
-ALERT = "studio"
+ALERT_ID = "studio"
 RECOVERY_S = 5.0
 """Time in seconds without a failure after which a fault is resolved.
 
@@ -131,7 +131,7 @@ class LogFile(RotatingFileHandler):
             folder / "studio.log", maxBytes=FILE_BYTES, backupCount=FILES_KEPT, encoding="utf-8", delay=True
         )
         self.setLevel(logging.WARNING)
-        self.setFormatter(logging.Formatter(FORMAT))
+        self.setFormatter(logging.Formatter(LOG_FORMAT))
         self._repeat_filter = RepeatFilter()
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -145,7 +145,7 @@ class LogFile(RotatingFileHandler):
         path.parent.mkdir(0o700, parents=True, exist_ok=True)
         number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
         stream = os.fdopen(number, "a", encoding="utf-8", errors="backslashreplace")
-        begins = logging.LogRecord("studio", logging.INFO, "", 0, WRITER_MESSAGE, (__version__,), None)
+        begins = logging.LogRecord("studio", logging.INFO, "", 0, VERSION_MESSAGE, (__version__,), None)
         stream.write(f"{self.format(begins)}{self.terminator}")
         return stream
 
@@ -206,7 +206,7 @@ class _Fault:
     """
 
     message: str
-    last_s: float
+    last_failure_s: float
     has_recovered: bool = False
 
 
@@ -243,12 +243,12 @@ class FaultAlerts:
         over = [
             what
             for what, fault in self._faults.items()
-            if now - fault.last_s >= (RECOVERY_S if fault.has_recovered else EXPIRY_S)
+            if now - fault.last_failure_s >= (RECOVERY_S if fault.has_recovered else EXPIRY_S)
         ]
         for what in over:
             del self._faults[what]
         if over and not self._faults:
-            self._alerts.resolve(ALERT)
+            self._alerts.resolve(ALERT_ID)
         elif over:
             self._update_alert(next(iter(self._faults.values())), count=0)
 
@@ -257,11 +257,11 @@ class FaultAlerts:
         while is_new and len(self._faults) >= MAX_FAULTS:
             del self._faults[next(iter(self._faults))]
         self._faults[what] = _Fault(said, self._clock())
-        if not self._alerts.has(ALERT):
+        if not self._alerts.has(ALERT_ID):
             self._update_alert(self._faults[what], count=1)  # further faults and repetitions are in the log
 
     def _update_alert(self, fault: _Fault, *, count: int) -> None:
         title = _("Something went wrong in Studio. It may show outdated values.")
         self._alerts.raise_alert(
-            ALERT, "error", title, fault.message, button=_("Show the log"), action="help.log", count=count
+            ALERT_ID, "error", title, fault.message, button=_("Show the log"), action="help.log", count=count
         )

@@ -22,21 +22,21 @@ from app.core.documents.open_documents import Documents
 from app.core.documents.saved_tabs import SavedTabs
 from app.core.faults import FaultAlerts, log_errors
 from app.core.messages.image_streams import Images
-from app.core.network.decode_checks import Checks
-from app.core.network.doctor import doctor_of
+from app.core.network.decode_checks import DecodeChecker
+from app.core.network.doctor import create_doctor
 from app.core.network.graph_changes import change_messages
-from app.core.network.mailbox import Batch, Drained, Mailbox
-from app.core.network.master import MasterChange, MasterState
+from app.core.network.mailbox import Batch, DrainResult, Mailbox
+from app.core.network.master import MasterChangeDetector, MasterState
 from app.core.network.nodes import Nodes
 from app.core.network.remote_access import RemoteAccess, RemoteAccessChanged
 from app.core.network.source import (
     GraphReceived,
     JobFailed,
     LiveSource,
-    MakeSource,
     MasterFound,
     MasterLost,
     Source,
+    SourceFactory,
     WatchFailed,
 )
 from app.core.network.topics import Topic, Topics, split_key
@@ -52,11 +52,11 @@ from app.core.recording.recordings import SessionRecordings
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import OPEN_DOCTOR_LABEL, Health
 from app.core.robots.last_robots import LastRobots
-from app.core.robots.launcher import VIRTUAL_ROBOTS, Launcher, LaunchFailed, VirtualProcesses
+from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES, Launcher, LaunchFailed, VirtualProcesses
 from app.core.robots.motion.bridged_commands import BridgedCommands
 from app.core.robots.room import SessionRoom
 from app.core.robots.stop.lines import StopTarget
-from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopDone
+from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopCompleted
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.robots.voices import RobotVoices
 from app.core.run.acting.acting import SessionActing
@@ -78,7 +78,7 @@ else:
     replay_module = lazy_module("app.core.recording.replay.replay")
 
 CHECK_INTERVAL_S = 1.0
-MONITORING_FAILED = lazy("can't monitor the robots: {error}")
+MONITORING_FAILED_MESSAGE = lazy("can't monitor the robots: {error}")
 LOG_TOPICS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
 """Message types of the topics that are shown in the Console, by topic."""
 
@@ -102,7 +102,7 @@ class Session:
         settings: Settings | None = None,
         *,
         address: str | None = None,
-        source: MakeSource | None = None,
+        source: SourceFactory | None = None,
         journal_folder: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
         clock_ns: Callable[[], int] = time.time_ns,
@@ -114,7 +114,7 @@ class Session:
         self.settings = settings if settings is not None else Settings()
         self.alerts, self.console = Alerts(), Console()
         self._faults = FaultAlerts(self.alerts, clock)
-        self._mailbox, self._checks = Mailbox(), Checks()
+        self._mailbox, self._checks = Mailbox(), DecodeChecker()
         self._watches = Watches(self._start_watch, self._stop_watch, self._on_unwatched)
         self._add_network(source if source is not None else partial(LiveSource, always=LOG_TOPICS))
         self._add_robots()
@@ -130,7 +130,7 @@ class Session:
         self._reachable: tuple[StopTarget, ...] = ()
         self._retries_stop_connections, self._next_check, self._closing_replays = False, 0.0, []
 
-    def _add_network(self, make_source: MakeSource) -> None:
+    def _add_network(self, make_source: SourceFactory) -> None:
         self.topics, self.nodes = Topics(), Nodes()
         self.traffic = Traffic(self.topics)
         self.images = Images(self.watch, self._clock)
@@ -144,12 +144,12 @@ class Session:
         self.master = MasterState("searching", self.address)
         self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, post_event)
         self.web_pages = WebPages(self.address, post_event)
-        self.doctor = doctor_of(self.address, self.settings.path.parent)
-        self._learning = MasterChange()
+        self.doctor = create_doctor(self.address, self.settings.path.parent)
+        self._learning = MasterChangeDetector()
 
     def _add_robots(self) -> None:
         submit, clock = self.source.submit, self._clock
-        processes = VirtualProcesses(VIRTUAL_ROBOTS.values(), lambda: self.launcher.process_ids)
+        processes = VirtualProcesses(VIRTUAL_ROBOT_MODULES.values(), lambda: self.launcher.process_ids)
         self.fleet = Fleet(self._watches, submit, clock, self.settings, processes)
         self.room = SessionRoom(self.settings, self._watches, submit, clock, self._clock_ns)
         self.voices = RobotVoices(self.settings, self.fleet, self.watch, self.console.add, clock)
@@ -256,7 +256,7 @@ class Session:
         self.networks.start()
         self.alarms.start()
         self.recordings.start()
-        self.source.submit(MONITORING_FAILED, self._make_stopper)
+        self.source.submit(MONITORING_FAILED_MESSAGE, self._create_stopper)
         if self._start_processes:
             self.launcher.ensure_master()
 
@@ -325,7 +325,7 @@ class Session:
             for name in self.fleet.take_settled():
                 self.runs.stop_again(name)
         with self.guarded(lazy("monitor started programs")):
-            self.launcher.start_requested()
+            self.launcher.start_requested_robots()
         with self.guarded(lazy("update the run")):
             self.runs.tick()
             self.recordings.events.update_run(self.runs.state)
@@ -436,10 +436,10 @@ class Session:
     def _on_unwatched(self, topic: str) -> None:
         self._health.discard(topic)  # only now, because the problem doesn't depend on the panel being shown
 
-    def _make_stopper(self, node: Node) -> None:
+    def _create_stopper(self, node: Node) -> None:
         self.stopper = RobotStopper(node)
 
-    def _on_messages(self, drained: Drained, now: float) -> None:
+    def _on_messages(self, drained: DrainResult, now: float) -> None:
         batches, others = split_by_network(drained.batches)
         for topic, batch in batches.items():
             with self.guarded(lazy("receive messages of {topic}"), topic=topic):
@@ -461,17 +461,17 @@ class Session:
             self._health.update(
                 {topic: what for topic, what in found.items() if self._watches.is_watched(topic)}
             )
-        if drained.lost_events:
+        if drained.lost_event_count:
             self.alerts.raise_alert(
                 "mailbox",
                 "warn",
                 ngettext(
                     "{count} event was lost because the window was busy.",
                     "{count} events were lost because the window was busy.",
-                    drained.lost_events,
-                ).format(count=drained.lost_events),
+                    drained.lost_event_count,
+                ).format(count=drained.lost_event_count),
                 _("Panels may be up to a second out of date."),
-                count=drained.lost_events,
+                count=drained.lost_event_count,
             )
 
     def _on_batch(self, topic: str, batch: Batch, now: float) -> None:
@@ -495,18 +495,18 @@ class Session:
             case MasterLost():
                 self._on_master_lost(event)
             case RunnerEvent():
-                self.runs.on_runner(event)
-            case StopDone() | RobotReplied() | RobotStopped() | LateReply():
+                self.runs.on_runner_event(event)
+            case StopCompleted() | RobotReplied() | RobotStopped() | LateReply():
                 self.runs.on_stop(event)
             case LaunchFailed():
-                self.console.add("error", event.what, f"{event.message} {event.detail}".strip())
+                self.console.add("error", event.name, f"{event.message} {event.detail}".strip())
                 self.alerts.raise_alert(
-                    f"companion:{event.what}",
+                    f"companion:{event.name}",
                     "error",
                     event.message,
                     event.detail.splitlines()[-1] if event.detail else "",
                     button=_("Restart it") if event.is_robot else _(OPEN_DOCTOR_LABEL),
-                    action=f"connect:{event.what}" if event.is_robot else "help.doctor",
+                    action=f"connect:{event.name}" if event.is_robot else "help.doctor",
                 )
             case WatchFailed():
                 self.alerts.raise_alert(
@@ -523,8 +523,8 @@ class Session:
                 | WebServerStarted()
             ):
                 self._on_part(event, now)
-            case JobFailed() if event.what:
-                self.console.add("error", "studio", _(event.what).format(error=event.message))
+            case JobFailed() if event.message_template:
+                self.console.add("error", "studio", _(event.message_template).format(error=event.message))
             case _:
                 pass
 
@@ -558,7 +558,7 @@ class Session:
         live.topics.update(view, now)
         live.nodes.update(view, now)
         self.fleet.update(view)
-        self._bridged.update(view, (link.robot for link in self.fleet.links if not link.virtual))
+        self._bridged.update(view, (link.robot for link in self.fleet.links if not link.is_virtual))
         self.room.update(view)
         for note in self.fleet.take_notices():
             self.console.add("warn", "robots", note)
@@ -614,4 +614,4 @@ class Session:
         if stopper is not None and (targets != self._reachable or self._retries_stop_connections):
             self._reachable, self._retries_stop_connections = targets, False
             stopper.set_expected(targets)
-            self.source.submit(MONITORING_FAILED, lambda _node: stopper.set_robots(targets))
+            self.source.submit(MONITORING_FAILED_MESSAGE, lambda _node: stopper.set_robots(targets))

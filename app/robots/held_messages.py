@@ -10,7 +10,7 @@ MAX_PUBLISHERS = 64
 MAX_PER_PUBLISHER = 4
 
 
-class HeldMessages:
+class PendingMessages:
     """Bounded buffer of messages of unknown publishers.
 
     If a publisher sends too many messages, its own oldest message is evicted. If there are too many

@@ -115,7 +115,7 @@ def description_topic_problem(robot: Robot, topic: str) -> str | None:
 def reserved_topics(robot: Robot) -> tuple[str, ...]:
     """Return the topics that move a robot or carry its replies; no other robot may use these topics."""
     topics = robot.topics
-    return tuple(topic for topic in (topics.command, topics.answer, topics.world) if topic is not None)
+    return tuple(topic for topic in (topics.command, topics.reply, topics.world) if topic is not None)
 
 
 def controls_of(robot: Robot, earlier: Iterable[RobotTopics] = ()) -> RobotControls:
@@ -236,7 +236,7 @@ class RobotProcesses(Protocol):
         """Return True if a program has certainly exited."""
 
 
-class AllVirtual:
+class AllVirtualProcesses:
     """Implementation of `RobotProcesses` for tests, in which every robot was started by Studio."""
 
     def is_started_by_studio(self, identity: Identity) -> bool:  # noqa: ARG002

@@ -217,7 +217,7 @@ class VirtualPepper(SimulatedActions):
         with self._simulation.changed:
             self._simulation.body.stand()
         self._wait_until(
-            call, lambda: self._simulation.body.are_joints_at_target, self._simulation.body.hold_joints
+            call, lambda: self._simulation.body.are_joints_at_target, self._simulation.body.stop_joints
         )
 
     # ---- face and lights --------------------------------------------------------------------------

@@ -119,7 +119,7 @@ class VirtualWheels:
                 self._link.happen(happening.event, **happening.data)
             if step % _STATE_PERIOD_STEPS == 0:
                 self._shared.publish_changes()
-                self._link.tell("state", state)
+                self._link.publish_value("state", state)
                 self._link.sense("pose", {"x": state["x"], "y": state["y"], "theta": state["theta_deg"]})
             if step % _SLOW_PERIOD_STEPS == 0:
                 self._link.sense("distance", round(distance, 2))
@@ -152,7 +152,7 @@ class VirtualWheels:
 
     def _run_camera(self) -> None:
         for count, _ in enumerate(Ticker(self._clock, self._ended, 1 / CAMERA_HZ)):
-            is_watched = self._link.watchers("camera") > 0
+            is_watched = self._link.subscriber_count("camera") > 0
             if not is_watched and count % 3:
                 continue
             with self._lock:
@@ -182,7 +182,7 @@ class VirtualWheels:
                 else:
                     self._shared.move(moved, x, y)
             if change.get("reset") is True:
-                self.body.reset(self._shared.restore_start())
+                self.body.reset(self._shared.reset())
             if "start" in change:
                 self._shared.return_to_start(change["start"])
         if isinstance(change.get("happen"), str):

@@ -38,17 +38,17 @@ from app.ui.shell.window_state import WindowState, initial_size
 from app.ui.speaker import QtSpeaker
 from app.ui.startup import graphics, interpreter, portal, qt_log, sandbox, single_instance
 from app.ui.startup.deferred import DeferredSteps
-from app.ui.startup.file_open import Application, IncomingFiles
+from app.ui.startup.file_open import Application, FileDropFilter
 from app.ui.startup.single_instance import StartRequest
 from app.ui.theme import fonts
 from app.ui.theme.theme import MODES, Theme
 from nep.i18n import ENGLISH, _, format_list, language
 
 LOG_INTERVAL_MS = 500
-RESTART = -1
+RESTART_EXIT_CODE = -1
 """Result of `run` when the user requested a restart."""
 FIRST_START_KEY = "begun"  # key of the setting that marks the first start as done
-WEB_VIEW = "app.ui.blockly.view"
+WEB_VIEW_MODULE = "app.ui.blockly.view"
 PRELOADED_MODULES = (
     "app.ui.shell.dialogs.command_palette",
     "app.ui.shell.dialogs.settings",
@@ -135,7 +135,7 @@ def deferred_steps(window: MainWindow, *, web: bool = True) -> list[Callable[[],
     Args:
         web: True to load the block editor.
     """
-    panels = window.panels.steps() if isinstance(window.panels, PanelRegistry) else ()
+    panels = window.panels.import_steps() if isinstance(window.panels, PanelRegistry) else ()
     modules = (partial(importlib.import_module, name) for name in PRELOADED_MODULES)
     view = (partial(import_web_view, window.session.alerts),) if web else ()
     return [*panels, *modules, *view, *window.preload_steps()]
@@ -144,7 +144,7 @@ def deferred_steps(window: MainWindow, *, web: bool = True) -> list[Callable[[],
 def import_web_view(alerts: Alerts) -> None:
     """Import the block editor; if system libraries are missing, raise an alert that names them."""
     try:
-        importlib.import_module(WEB_VIEW)
+        importlib.import_module(WEB_VIEW_MODULE)
     except ImportError as error:
         missing = missing_libraries(error)
         if missing is None:
@@ -207,7 +207,7 @@ def save_version(window: MainWindow, now_s: float) -> None:
     settings = window.session.settings
     kept = studio_versions.add_this_version(settings.all(), now_s, is_first=settings.are_new)
     if kept is not None:
-        window.state.save(studio_versions.KEY, kept)
+        window.state.save(studio_versions.SETTING_KEY, kept)
 
 
 def close_on_signals(window: MainWindow, this_run: StudioRun) -> None:
@@ -345,10 +345,10 @@ def run(options: Options) -> int:
     logging.getLogger().addHandler(CrashLog(CrashReports()))
     application = make_application()
     with StudioRun() as this_run:
-        return _show(application, options, log, this_run, (meeting_place, turn), trial)
+        return _run_window(application, options, log, this_run, (meeting_place, turn), trial)
 
 
-def _show(
+def _run_window(
     application: QApplication,
     options: Options,
     log: qt_log.ConsoleHandler,
@@ -385,9 +385,9 @@ def _show(
         first.append(turn.release)
         first.append(partial(session.last_robots.start, session.launcher))
     soon.prepend(first)
-    IncomingFiles(window, window.commands.files.open_all)
+    FileDropFilter(window, window.commands.files.open_all)
     if isinstance(application, Application):
-        application.open_files_with(window.commands.files.open_all)
+        application.set_file_opener(window.commands.files.open_all)
     if driver is None and options.self_drive is not None:
         driver = SelfDrive(window, options.self_drive)
     sandbox.configure_sandbox(os.environ, trial)  # requires the event loop, which creates the page
@@ -395,4 +395,4 @@ def _show(
     speaker.close()
     if driver is not None and not driver.well:
         return 1
-    return RESTART if window.wants_restart else code
+    return RESTART_EXIT_CODE if window.wants_restart else code

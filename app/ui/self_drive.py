@@ -16,7 +16,7 @@ from typing import Protocol
 from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
-from app.ui.shell.main_window import FIRST_SIZE, MainWindow
+from app.ui.shell.main_window import DEFAULT_SIZE, MainWindow
 from nep.i18n import _, number
 
 POLL_MS = 100
@@ -43,7 +43,7 @@ class Step:
     expected: str
     action: Callable[[], object]
     is_visible: Callable[[], bool]
-    within_s: float = 20.0
+    timeout_s: float = 20.0
     picture: str = ""
     settle_s: float = SETTLE_S
     failure_reason: Callable[[], str] = lambda: ""
@@ -111,7 +111,7 @@ class SelfDrive(QObject):
         self._step: Step | None = None
         self._began = 0.0
         self._seen_at: float | None = None
-        window.resize(FIRST_SIZE)
+        window.resize(DEFAULT_SIZE)
         folder.mkdir(parents=True, exist_ok=True)
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
@@ -144,7 +144,7 @@ class SelfDrive(QObject):
             ),
             Step("dark while it runs", lambda: run("theme.dark"), lambda: True, 5, "behaviour-dark"),
             Step("every robot stopped", lambda: run("run.stop"), state("proven"), 5, "stopped-dark"),
-            Step("the topics", lambda: run("layout.developer"), self._has_topics, 20),
+            Step("the topics", lambda: run("layout.developer"), self._has_demo_topics, 20),
             Step("a message", self._inspect, has_inspected_topic, 20, "developer-dark", 2.5),
             Step("light again", lambda: run("theme.light"), lambda: True, 5, "developer-light"),
             Step("the stopped program", lambda: run("layout.behaviour"), lambda: True, 5, "stopped-light"),
@@ -159,7 +159,7 @@ class SelfDrive(QObject):
         self._commands.run("theme.light")
         self._commands.behaviours.start_demo()
 
-    def _has_topics(self) -> bool:
+    def _has_demo_topics(self) -> bool:
         return len(self._window.session.topics) > 3
 
     def _inspect(self) -> None:
@@ -200,26 +200,26 @@ class SelfDrive(QObject):
             self._seen_at = now
         if self._seen_at is not None:
             if now - self._seen_at >= step.settle_s:
-                self._grab(step.picture)
+                self._save_screenshot(step.picture)
                 self._listener.step_finished(step)
                 self._start_next_step()
         elif wrong := step.failure_reason():
             self._fail(step, wrong)
-        elif now - self._began > step.within_s:
+        elif now - self._began > step.timeout_s:
             self._fail(step, "")
 
     def _fail(self, step: Step, why: str) -> None:
-        self._grab(self._failed_picture)
+        self._save_screenshot(self._failed_picture)
         if why:
             words = _("step failed: {what}: {why}").format(what=step.expected, why=why)
         else:
-            seconds = number(step.within_s, "g")
+            seconds = number(step.timeout_s, "g")
             words = _("step not completed within {seconds} s: {what}").format(
                 seconds=seconds, what=step.expected
             )
         self._finish(False, words)
 
-    def _grab(self, name: str) -> None:
+    def _save_screenshot(self, name: str) -> None:
         if not name:
             return
         path = self._folder / f"{name}.png"

@@ -157,7 +157,7 @@ class WindowSteps:
 
     def _on_painted(self) -> None:
         self._painted = True
-        self._test.report.mark("first_paint")
+        self._test.report.record_time("first_paint")
 
     def _has_master(self) -> bool:
         return self._session.master.kind == "connected" and self._session.launcher.has_started_master
@@ -174,12 +174,12 @@ class WindowSteps:
         self._window.show_layout("developer")
         self._window.open_panel("robot")
 
-    def _link(self) -> RobotLink | None:
+    def _robot_link(self) -> RobotLink | None:
         link = self._session.fleet.link(ROBOT)
         return link if link is not None and link.state in {"ready", "busy"} else None
 
     def _has_robot(self) -> bool:
-        if not self._watched and self._link() is not None:
+        if not self._watched and self._robot_link() is not None:
             self._watched = True
             self._session.watch(STATE_TOPIC)  # watched until the session ends
         return bool(self._state())
@@ -201,7 +201,7 @@ class WindowSteps:
     def _on_drawing(self, drawing: bytes) -> None:
         self._asked, self._drawn = False, drawing
         if drawing:
-            self._test.report.mark("editor_ready")
+            self._test.report.record_time("editor_ready")
 
     def _run(self) -> None:
         self._rest = self._state()
@@ -275,7 +275,7 @@ class SelfTestListener:
     def run_finished(self, well: bool, words: str) -> None:
         """Record a failure, if there was one, and start the last step, the closing of the window."""
         complaints = [each for each in self._session.console.records if each.level in REPORTED_LEVELS]
-        self._test.report.add_computer(
+        self._test.report.add_computer_info(
             console=[
                 f"{each.level} {each.origin}: {each.text}" for each in complaints[-MAX_REPORTED_RECORDS:]
             ]
@@ -309,7 +309,7 @@ def run_window_steps(test: SelfTest, *, web: bool) -> int:
 
     def make_driver(window: MainWindow) -> SelfDrive:
         test.record_success(f"Qt {qVersion()}")
-        test.report.add_computer(
+        test.report.add_computer_info(
             qt=qVersion(), pyside=PySide6.__version__, screen=QGuiApplication.platformName()
         )
         steps = WindowSteps(window, test, web=web).all()

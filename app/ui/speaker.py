@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from PySide6.QtTextToSpeech import QTextToSpeech
 
 LANGUAGES = {"en": lazy("English"), "fr": lazy("French"), "ja": lazy("Japanese"), "es": lazy("Spanish")}
-NO_SOUND = lazy("This computer can't play sound.")
+NO_SOUND_TEXT = lazy("This computer can't play sound.")
 ADVICE = {
     "linux": lazy(
         "Install the packages “speech-dispatcher”, “espeak-ng” and “libpulse0”, then start Studio again."
@@ -79,10 +79,10 @@ def try_voice() -> int:
     with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         # ends the process even if its parent is gone
         faulthandler.dump_traceback_later(TRIAL_TIMEOUT_S, exit=True, file=nowhere)
-        return _make_voice()
+        return _run_voice_trial()
 
 
-def _make_voice() -> int:
+def _run_voice_trial() -> int:
     if sys.platform == "win32":
         # Ends the process on a crash without showing a dialog or debugger.
         kernel = ctypes.windll.kernel32
@@ -239,14 +239,14 @@ class QtEngine:
             from PySide6.QtMultimedia import QAudioFormat, QAudioSink, QMediaDevices  # noqa: PLC0415 (heavy)
         except (ImportError, RuntimeError) as error:
             _log.info("no audio output: %s", error)
-            return _(NO_SOUND)
+            return _(NO_SOUND_TEXT)
         device = QMediaDevices.defaultAudioOutput()
         shape = QAudioFormat()
         shape.setSampleRate(RATE_HZ)
         shape.setChannelCount(1)
         shape.setSampleFormat(QAudioFormat.SampleFormat.Int16)
         if device.isNull() or not device.isFormatSupported(shape):
-            return _(NO_SOUND)
+            return _(NO_SOUND_TEXT)
         while len(self._sinks) >= MAX_TONES:
             self._sinks.pop(0)[0].stop()
         buffer = QBuffer()
@@ -288,15 +288,15 @@ class _SpeechWorker(QObject):
         while self._orders:
             what, given, turn = self._orders.popleft()
             if what == "end":
-                self._silence("all")
+                self._stop_output("all")
                 self._engine = None
                 self.loop.quit()
             elif what == "stop":
-                self._silence(str(given[0]))
+                self._stop_output(str(given[0]))
             elif self._speaker.is_valid(what, turn):
                 self._execute(what, given, turn)
 
-    def _silence(self, which: str) -> None:
+    def _stop_output(self, which: str) -> None:
         if self._engine is not None:
             if which != "tones":
                 self._engine.stop_voice()
@@ -304,7 +304,7 @@ class _SpeechWorker(QObject):
                 self._engine.stop_tones()
 
     def _execute(self, what: str, given: tuple[Any, ...], turn: int) -> None:
-        problem = _(NO_SOUND)
+        problem = _(NO_SOUND_TEXT)
         first, *others = given
         try:
             if self._engine is None:

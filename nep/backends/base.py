@@ -129,10 +129,10 @@ class Closable(Protocol):
 
 
 @runtime_checkable
-class SupportsQuickPublish(Protocol):
+class SupportsFastPublish(Protocol):
     """Optional interface of a `PublisherTransport`: a fast path for publishing."""
 
-    def quick_publish(self, asked: PublishHooks) -> Callable[..., None]:
+    def fast_publish_function(self, asked: PublishHooks) -> Callable[..., None]:
         """Return a publish function with minimal call overhead, which never blocks.
 
         Args:
@@ -329,7 +329,7 @@ class Backend:
     aliases: tuple[str, ...] = ()
     master: Callable[[str | None], str] = master_address
     codec_for: Callable[[str], Codec] = codec_for
-    codec_of_calls: Callable[[str], Codec] | None = None
+    call_codec_for: Callable[[str], Codec] | None = None
     qos: tuple[str, ...] = ()
     has_history: bool = False
     has_patterns: bool = False

@@ -16,12 +16,12 @@ from nep.backends.connection import Configuration
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.messages.codecs import Codec
-from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, CallKind, Reply, error_reply
+from nep.protocol.service_wire import MAX_PAYLOAD_BYTES, CallKind, Reply, error_reply
 
 _logger = logging.getLogger("nep")
-CALLS_MAX = 1000
+MAX_CALLS = 1000
 """Maximum number of calls that a server queues, or that a client has in flight."""
-CALLS_MAX_BYTES = 256 * 2**20
+MAX_CALL_BYTES = 256 * 2**20
 """Maximum total size in bytes of the calls that a server queues, or that a client has in flight."""
 
 
@@ -69,7 +69,7 @@ class ClientSpec:
     msg_type: str = "json"
 
 
-class Tally:
+class ServerStats:
     """Statistics of a server. Thread-safe."""
 
     def __init__(self) -> None:
@@ -79,7 +79,7 @@ class Tally:
     def add(self, reply: Reply) -> None:
         """Count a call by the kind of its reply: answered, failed or rejected."""
         with self._lock:
-            if reply.kind == CallKind.REFUSED:
+            if reply.kind == CallKind.REJECTED:
                 self.refused += 1
                 return
             self.calls += 1
@@ -133,7 +133,7 @@ class CallQueue:
         """Append a call and wake a waiting thread; return False if the queue is full or closed."""
         size = len(call.data)
         with self._changed:
-            if self._is_closed or len(self._calls) >= CALLS_MAX or self._bytes + size > CALLS_MAX_BYTES:
+            if self._is_closed or len(self._calls) >= MAX_CALLS or self._bytes + size > MAX_CALL_BYTES:
                 return False
             self._calls.append(call)
             self._bytes += size
@@ -282,7 +282,7 @@ class ServerTransport(Protocol):
     """Interface of the servers of a back end."""
 
     calls: CallQueue
-    tally: Tally
+    stats: ServerStats
 
     @property
     def endpoints(self) -> tuple[str, ...]:
@@ -398,7 +398,7 @@ class ServiceTransport(Protocol):
         """
 
 
-def check_calls(service: str, count: int, used: int, size: int) -> None:
+def check_call_limits(service: str, count: int, used: int, size: int) -> None:
     """Raise `NepError` if a client has too many calls or bytes in flight for another call.
 
     Args:
@@ -407,9 +407,9 @@ def check_calls(service: str, count: int, used: int, size: int) -> None:
         used: Total size of the calls in flight in bytes.
         size: Size of the new call in bytes.
     """
-    if size > PAYLOAD_MAX_BYTES:
+    if size > MAX_PAYLOAD_BYTES:
         raise NepError(_("the call can't be sent: {reason}").format(reason=size_error_text(size)))
-    if count >= CALLS_MAX or (used and used + size > CALLS_MAX_BYTES):
+    if count >= MAX_CALLS or (used and used + size > MAX_CALL_BYTES):
         raise NepError(
             _("{count} calls of '{service}' are in flight; wait for their replies first").format(
                 count=count, service=service
@@ -419,7 +419,7 @@ def check_calls(service: str, count: int, used: int, size: int) -> None:
 
 def limit_reply_size(reply: Reply) -> Reply:
     """Return `reply`, or an error reply if `reply` exceeds the size limit."""
-    if len(reply.data) <= PAYLOAD_MAX_BYTES:
+    if len(reply.data) <= MAX_PAYLOAD_BYTES:
         return reply
     return error_reply(CallKind.ERROR, "EncodeError", size_error_text(len(reply.data)))
 
@@ -436,11 +436,11 @@ def rejection_reply(service: str, *, is_closed: bool) -> Reply:
         if is_closed
         else _("'{service}' has too many pending calls; try again later")
     )
-    return error_reply(CallKind.REFUSED, "", reason.format(service=service))
+    return error_reply(CallKind.REJECTED, "", reason.format(service=service))
 
 
 def size_error_text(size: int) -> str:
     """Return the error message for a payload of `size` bytes, which exceeds the limit."""
     return _(
         "the payload is {size} bytes, but calls allow at most {most}; publish large data on a topic"
-    ).format(size=size, most=PAYLOAD_MAX_BYTES)
+    ).format(size=size, most=MAX_PAYLOAD_BYTES)

@@ -31,8 +31,8 @@ from nep.protocol.service_wire import CallKind, Reply
 
 CALL_REQUEST = "uint16 codec\nuint32 timeout_ms\nuint8[] data"
 CALL_RESPONSE = "uint8 kind\nuint16 codec\nuint8[] data"
-_KINDS = (CallKind.ANSWER, CallKind.ERROR, CallKind.REFUSED)
-_TIMEOUT_MAX_MS = 2**32 - 1
+_KINDS = (CallKind.REPLY, CallKind.ERROR, CallKind.REJECTED)
+_MAX_TIMEOUT_MS = 2**32 - 1
 
 
 class DecodedCall(NamedTuple):
@@ -88,7 +88,7 @@ class TypedService:
         """
         if not self.is_nep:
             return self.request.encode(codec.decode(data, {}))
-        limit_ms = 0 if timeout_s is None else max(1, min(_TIMEOUT_MAX_MS, round(timeout_s * 1000)))
+        limit_ms = 0 if timeout_s is None else max(1, min(_MAX_TIMEOUT_MS, round(timeout_s * 1000)))
         return self.request.encode({"codec": codec.number, "timeout_ms": limit_ms, "data": bytes(data)})
 
     def decode_reply(self, body: bytes, codec: Codec) -> Reply:
@@ -104,7 +104,7 @@ class TypedService:
         """
         answer = self.response.decode(body)
         if not self.is_nep:
-            return Reply(CallKind.ANSWER, codec.encode(answer).data, codec.number)
+            return Reply(CallKind.REPLY, codec.encode(answer).data, codec.number)
         kind, number, data = answer["kind"], answer["codec"], answer["data"]
         found = next((each for each in _KINDS if each == kind), None)
         if found is None or not isinstance(number, int) or not isinstance(data, bytes):
@@ -138,6 +138,6 @@ class TypedService:
             kind, data = int(reply.kind), bytes(reply.data)
             return self.response.encode({"kind": kind, "codec": reply.codec, "data": data})
         codec = codec_by_number(reply.codec)
-        if codec is None or reply.kind != CallKind.ANSWER:
+        if codec is None or reply.kind != CallKind.REPLY:
             raise DecodeError(self.name, len(reply.data), _("not a service reply"))
         return self.response.encode(codec.decode(reply.data, {}))

@@ -16,7 +16,7 @@ from nep.text import escaped
 _LIBRARY = "nep"
 
 
-class AlertChanges:
+class AlertTracker:
     """Tracker of alerts that returns the difference between successive graph snapshots."""
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class AlertPrinter:
 
     def __init__(self, out: Terminal) -> None:
         self._out = out
-        self._changes = AlertChanges()
+        self._changes = AlertTracker()
 
     def start(self, _master: Master) -> None:
         """Do nothing; alerts are printed from the first graph change on."""
@@ -63,7 +63,7 @@ class AlertLog:
     """
 
     def __init__(self) -> None:
-        self._changes = AlertChanges()
+        self._changes = AlertTracker()
         self._node: Node | None = None
 
     def start(self, master: Master) -> None:

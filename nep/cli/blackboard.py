@@ -198,12 +198,12 @@ def _row(entry: Mapping[str, object]) -> tuple[str, ...]:
     return (
         quotable(entry.get("key")),
         format_payload(entry.get("value"), whole=False),
-        _age(age_s) if isinstance(age_s, int | float) else UNKNOWN,
+        _format_age(age_s) if isinstance(age_s, int | float) else UNKNOWN,
         {"stamp": _("stamp"), "arrival": _("arrival")}.get(quotable(entry.get("age_by")), UNKNOWN),
         quotable(entry.get("source") or UNKNOWN),
         quotable(entry.get("robot") or UNKNOWN),
     )
 
 
-def _age(age_s: float) -> str:
+def _format_age(age_s: float) -> str:
     return f"{age_s:.1f} s" if age_s < 10 else duration(age_s)

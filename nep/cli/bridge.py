@@ -19,10 +19,19 @@ import typer
 
 from nep.cli import interrupts
 from nep.cli.options import AllowMovingOption, JsonOption
-from nep.cli.screen import UNKNOWN, cells, console, padded, print_status, rate, show_json, write
+from nep.cli.screen import (
+    UNKNOWN,
+    console,
+    display_width,
+    format_rate,
+    padded,
+    print_status,
+    show_json,
+    write,
+)
 from nep.errors import NepError
 from nep.i18n import _, lazy
-from nep.masters.rates import Meter
+from nep.masters.rates import TrafficMeter
 from nep.programs.bridges.bridge import Bridge, check_installed
 from nep.programs.bridges.configuration import (
     BridgeConfiguration,
@@ -31,7 +40,7 @@ from nep.programs.bridges.configuration import (
 )
 from nep.programs.bridges.route import Route, RouteCounts
 from nep.programs.bridges.toml_file import EXAMPLE, read_configuration
-from nep.programs.robots.guard import refusal_text
+from nep.programs.robots.guard import denial_text
 from nep.programs.robots.moving import MovingTopics
 from nep.text import escaped, shortened
 
@@ -122,7 +131,7 @@ def bridge(
         Bridge(configuration, allow_moving=allowed) as running,
         _publish_log(running),
     ):
-        for refusal in running.refusals(_ROBOT_DISCOVERY_S):
+        for refusal in running.denial_reasons(_ROBOT_DISCOVERY_S):
             raise typer.BadParameter(refusal)
         report = _report_for(running, notes, as_json=as_json)
         if not as_json:
@@ -176,7 +185,7 @@ def _check_types(configuration: BridgeConfiguration, allowed: Sequence[str]) -> 
     for topic in configuration.topics:
         for origin in topic.origins:
             end = topic.b if origin == "a" else topic.a
-            refusal = refusal_text(end.name, MovingTopics().robots_moved_by(end.name, end.msg_type), allowed)
+            refusal = denial_text(end.name, MovingTopics().robots_moved_by(end.name, end.msg_type), allowed)
             if refusal and not topic.is_pattern:
                 raise typer.BadParameter(refusal)
 
@@ -258,7 +267,7 @@ class _Report:
 
     def __init__(self, running: Bridge) -> None:
         self._running = running
-        self._meters: dict[Route, Meter] = {}
+        self._meters: dict[Route, TrafficMeter] = {}
         names = [running.configuration.side(side).backend.name for side in ("a", "b")]
         self._sides: Mapping[str, str] = dict(zip("ab", names if names[0] != names[1] else "ab", strict=True))
 
@@ -274,7 +283,7 @@ class _Report:
         return [self._row(route, route.counts()) for route in self._running.routes]
 
     def rate_hz(self, route: Route, counts: RouteCounts) -> float | None:
-        meter = self._meters.setdefault(route, Meter())
+        meter = self._meters.setdefault(route, TrafficMeter())
         meter.add(time.monotonic(), counts.sent, counts.bytes)
         rates = meter.rates()
         return None if rates is None else rates[0]
@@ -288,10 +297,10 @@ class _Report:
             counts.waiting, counts.returned,
         )  # fmt: skip
         figures = (UNKNOWN if each is None else str(each) for each in numbers)
-        return _Row(name, (rate(self.rate_hz(route, counts)), *figures), _problem(route, counts))
+        return _Row(name, (format_rate(self.rate_hz(route, counts)), *figures), _problem_text(route, counts))
 
 
-def _problem(route: Route, counts: RouteCounts) -> str:
+def _problem_text(route: Route, counts: RouteCounts) -> str:
     if route.rival:
         return _("the bridge '{name}' forwards this topic, too; stop one of the two").format(
             name=escaped(route.rival)
@@ -323,7 +332,7 @@ class _PlainReport(_Report):
 
     def show(self) -> None:
         rows = self.rows()
-        width = max([0, *(cells(row.name) for row in rows)])
+        width = max([0, *(display_width(row.name) for row in rows)])
         lines = []
         if width > self._width:
             self._width = width
@@ -338,7 +347,7 @@ class _PlainReport(_Report):
 
     def _line(self, name: str, figures: Sequence[str]) -> str:
         return padded(name, self._width) + "".join(
-            padded(figure, max(_CELL_WIDTH, cells(figure) + 1), "right") for figure in figures
+            padded(figure, max(_CELL_WIDTH, display_width(figure) + 1), "right") for figure in figures
         )
 
 

@@ -18,11 +18,20 @@ from nep.cli.complete import complete_field_or_topic, complete_topic
 from nep.cli.message_filter import MessageFilter
 from nep.cli.network import BackendOption, open_command_node
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
-from nep.cli.screen import UNKNOWN, cells, console, json_highlighter, print_status, show_json, size, write
+from nep.cli.screen import (
+    UNKNOWN,
+    console,
+    display_width,
+    json_highlighter,
+    print_status,
+    show_json,
+    size,
+    write,
+)
 from nep.cli.table_file import CsvMessageWriter, FieldExtractor
 from nep.cli.topic_patterns import TopicPatterns, is_pattern
 from nep.cli.topic_wait import TopicMonitor
-from nep.cli.values import cleaned, format_payload, json_of
+from nep.cli.values import encode_json, escape_for_terminal, format_payload
 from nep.errors import DecodeError, WaitTimeoutError
 from nep.i18n import _, format_list, ngettext
 from nep.messages.message import Message
@@ -117,7 +126,7 @@ def echo(
             show = partial(show_record, fields=picked)
         elif as_csv:
             show = CsvMessageWriter(picked, names_topic=names_topic)
-        with closing(_messages(node, topics, graph, timeout_s)) as messages:
+        with closing(_receive_messages(node, topics, graph, timeout_s)) as messages:
             passing = (each for each in messages if condition is None or _matches(condition, each))
             try:
                 for message in itertools.islice(passing, count or None):
@@ -126,7 +135,7 @@ def echo(
                 picked.report_missing()
 
 
-def _messages(
+def _receive_messages(
     node: Node, topics: Sequence[str], graph: GraphView, timeout_s: float | None
 ) -> Generator[Message, None, None]:
     # Yields messages as `_receive_all` does, after subscribing to topics and patterns.
@@ -177,10 +186,10 @@ def _receive_all(
         subscribe_new(patterns.poll())
         received = [message for each in subscribers if (message := each.receive(0.0)) is not None]
         if not received and not subscribers:
-            never.wait(waiting.slice_s(timeout_s))
+            never.wait(waiting.wait_slice_s(timeout_s))
         elif not received:
             message = subscribers[0].receive(
-                _RECEIVE_SLICE_S if len(subscribers) > 1 else waiting.slice_s(timeout_s)
+                _RECEIVE_SLICE_S if len(subscribers) > 1 else waiting.wait_slice_s(timeout_s)
             )
             received = [] if message is None else [message]
         now = time.monotonic()
@@ -262,24 +271,24 @@ class MessagePrinter:
 
     def __call__(self, message: Message) -> None:
         """Print one message."""
-        head = _head(message)
+        head = _format_head(message)
         if self._names_topic:
             head += f"  {escaped(message.topic)}"
-        room = self._console.width - cells(head) - 2
+        room = self._console.width - display_width(head) - 2
         if self._fields is not None and self._fields.names:
             values = self._fields.extract(message)
             if values is None:
                 return
             body = format_payload(self._fields.as_dict(values), whole=self._whole)
         else:
-            body = _body(message, room, whole=self._whole)
+            body = _format_body(message, room, whole=self._whole)
         if self._paint is None or len(body) > _MAX_COLOURED_CHARACTERS:
             write(f"{head}  {body}\n")
         else:
             self._console.print(self._paint(head, body))
 
 
-def _head(message: Message) -> str:
+def _format_head(message: Message) -> str:
     stamp = UNKNOWN
     if message.stamp_ns is not None:
         stamp = (
@@ -291,7 +300,7 @@ def _head(message: Message) -> str:
     return f"{stamp}{seq}"
 
 
-def _body(message: Message, room: int, *, whole: bool) -> str:
+def _format_body(message: Message, room: int, *, whole: bool) -> str:
     if message.codec == "image":
         return _image_summary(message)
     try:
@@ -300,21 +309,21 @@ def _body(message: Message, room: int, *, whole: bool) -> str:
         text = _("{size_bytes}, not valid {codec}: {hexadecimal} ({reason})").format(
             size_bytes=size(message.size_bytes),
             codec=message.codec,
-            hexadecimal=_hexadecimal(message.data),
+            hexadecimal=_format_hexadecimal(message.data),
             reason=error.reason,
         )
-        return cleaned(text)
+        return escape_for_terminal(text)
     if isinstance(payload, str):
-        return cleaned(payload if whole else shortened(payload, _MAX_SHOWN_CHARACTERS))
+        return escape_for_terminal(payload if whole else shortened(payload, _MAX_SHOWN_CHARACTERS))
     if isinstance(payload, bytes):
-        return f"{size(len(payload))}: {_hexadecimal(payload)}"
+        return f"{size(len(payload))}: {_format_hexadecimal(payload)}"
     # re-encoding decoded JSON is 100 times faster than formatting each value
     is_exact = whole and message.codec == "json" and not _has_nan(message.data)
-    line = json_of(payload).decode() if is_exact else format_payload(payload, whole=whole)
-    if len(line) <= room and cells(line) <= room:
+    line = encode_json(payload).decode() if is_exact else format_payload(payload, whole=whole)
+    if len(line) <= room and display_width(line) <= room:
         return line
     laid_out = (
-        json_of(payload, indent=True).decode()
+        encode_json(payload, indent=True).decode()
         if is_exact
         else format_payload(payload, whole=whole, indent=True)
     )
@@ -326,7 +335,7 @@ def _has_nan(data: memoryview) -> bool:
     return b"NaN" in raw or b"Infinity" in raw
 
 
-def _hexadecimal(data: bytes | memoryview) -> str:
+def _format_hexadecimal(data: bytes | memoryview) -> str:
     return bytes(data[:_MAX_SHOWN_BYTES]).hex(" ") + (" …" if len(data) > _MAX_SHOWN_BYTES else "")
 
 

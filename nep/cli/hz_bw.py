@@ -16,7 +16,7 @@ from nep.cli.complete import complete_topic
 from nep.cli.network import BackendOption, open_command_node
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.rate_window import Bandwidth, Delay, Frequency, LatchedFilter, LatencyWindow, RateWindow
-from nep.cli.screen import UNKNOWN, cells, padded, print_status, rate, show_json, size, write
+from nep.cli.screen import UNKNOWN, display_width, format_rate, padded, print_status, show_json, size, write
 from nep.cli.topic_wait import TopicMonitor
 from nep.errors import WaitTimeoutError
 from nep.i18n import _, format_list, lazy
@@ -131,7 +131,7 @@ class _Report:
         self._totals: dict[str, int] = {}
         self._never = threading.Event()
         self._last_received_at = time.monotonic()
-        self._width = max(_MIN_TOPIC_WIDTH, *map(cells, topics))
+        self._width = max(_MIN_TOPIC_WIDTH, *map(display_width, topics))
 
     def run(
         self,
@@ -151,7 +151,7 @@ class _Report:
                 self._subscribers[topic] = opened.enter_context(subscription)
             if not as_json:
                 print_status(_("measuring; press Ctrl+C to stop"))
-                write(f"{self._line(_('topic'), [_(head) for head in self._heads])}\n")
+                write(f"{self._format_line(_('topic'), [_(head) for head in self._heads])}\n")
             started = time.monotonic()
             for number in itertools.count(1):
                 while (left := started + number * _REPORT_PERIOD_S - time.monotonic()) > 0:
@@ -196,7 +196,7 @@ class _Report:
         found, figures = self._figures(self._windows[topic], time.monotonic())
         lost = self._subscribers[topic].lost
         known = str(found.messages) if found else "0"
-        write(f"{self._line(topic, (*figures, known, UNKNOWN if lost is None else str(lost)))}\n")
+        write(f"{self._format_line(topic, (*figures, known, UNKNOWN if lost is None else str(lost)))}\n")
 
     def _show_json(self, topic: str) -> None:
         found, _ = self._figures(self._windows[topic], time.monotonic())
@@ -207,7 +207,7 @@ class _Report:
             {"topic": topic, "stamp_ns": time.time_ns(), **figures, "total": window.total, "lost": lost}
         )
 
-    def _line(self, topic: str, figures: Sequence[str]) -> str:
+    def _format_line(self, topic: str, figures: Sequence[str]) -> str:
         return padded(topic, self._width) + "".join(figure.rjust(12) for figure in figures)
 
 
@@ -262,12 +262,12 @@ class _DelayReport(_Report):
             ages[0] += f" ± {format_duration(uncertainty_s)}"
         return found, (*ages, format_duration(found.std_s))
 
-    def _line(self, topic: str, figures: Sequence[str]) -> str:
+    def _format_line(self, topic: str, figures: Sequence[str]) -> str:
         wide = [
             figures[0].rjust(_MEAN_COLUMN_WIDTH),
             *(each.rjust(_LATENCY_COLUMN_WIDTH) for each in figures[1:3]),
         ]
-        return super()._line(topic, (*wide, *figures[3:]))
+        return super()._format_line(topic, (*wide, *figures[3:]))
 
     def _show(self, topic: str) -> None:
         super()._show(topic)
@@ -290,7 +290,7 @@ def _frequency_cells(window: RateWindow, now: float) -> tuple[Frequency | None, 
     if found is None:
         return None, (UNKNOWN,) * 4
     return found, (
-        rate(found.rate_hz),
+        format_rate(found.rate_hz),
         *(format_duration(each) for each in (found.min_s, found.max_s, found.std_s)),
     )
 

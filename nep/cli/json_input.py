@@ -50,7 +50,7 @@ def parse_json(
     )
 
 
-def text_of(data: bytes, file: str) -> str:
+def decode_text(data: bytes, file: str) -> str:
     """Decode the content of a text file. Raises `NepError` if the content is not UTF-8."""
     try:
         return data.decode("utf-8-sig")
@@ -71,7 +71,7 @@ def _invalid_json_message(fault: JsonFault, shown: str, first_line: int, *, othe
 
 def _not_json_message(text: str, *, other_types: bool) -> str:
     example = text if len(text) <= _MAX_SHOWN_CHARACTERS else _("some text")
-    quoted = _shell_quoted(json.dumps(example, ensure_ascii=bool(first_control(example))))
+    quoted = _quote_for_shell(json.dumps(example, ensure_ascii=bool(first_control(example))))
     message = _("'{text}' isn't valid JSON; put strings in quotes, such as {quoted}")
     if other_types:
         message = _(
@@ -84,5 +84,5 @@ def _excerpt(text: str) -> str:
     return escaped(text if len(text) <= _MAX_SHOWN_CHARACTERS else f"{text[:_MAX_SHOWN_CHARACTERS]} …")
 
 
-def _shell_quoted(word: str) -> str:
+def _quote_for_shell(word: str) -> str:
     return subprocess.list2cmdline([word]) if os.name == "nt" else shlex.quote(word)

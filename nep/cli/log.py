@@ -14,7 +14,7 @@ from nep.cli.complete import complete_node
 from nep.cli.network import open_command_node
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, print_status, show_json, write
-from nep.cli.values import cleaned
+from nep.cli.values import escape_for_terminal
 from nep.errors import DecodeError, did_you_mean
 from nep.i18n import _
 from nep.messages.message import Message
@@ -26,8 +26,8 @@ from nep.nodes.log_handler import (
     LOG_TYPE,
     MAX_TEXT_LENGTH,
     LogRecord,
-    ShownErrors,
-    level_of,
+    NewErrorFilter,
+    parse_level,
 )
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
@@ -81,24 +81,24 @@ def log(
             ),
             param_hint="--level",
         )
-    min_level = LEVELS.index(level_of(level))
+    min_level = LEVELS.index(parse_level(level))
     with open_command_node("log", master) as own, own.new_sub(LOG_TOPIC, LOG_TYPE) as subscriber:
         if not as_json:
             print_status(_("waiting for log records; press Ctrl+C to stop"))
         wanted = (
             record
-            for record in _records(own, subscriber)
+            for record in _receive_records(own, subscriber)
             if LEVELS.index(record.level) >= min_level and node in {None, record.node}
         )
         for record in itertools.islice(wanted, count or None):
-            show_json(record.to_plain()) if as_json else _show(record)
+            show_json(record.to_plain()) if as_json else _show_record(record)
 
 
-def _records(own: Node, subscriber: Subscriber) -> Iterator[LogRecord]:
-    shown = ShownErrors()
+def _receive_records(own: Node, subscriber: Subscriber) -> Iterator[LogRecord]:
+    shown = NewErrorFilter()
     with own.new_sub(LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE) as latched:
         lists = iter(partial(latched.receive, 0.0), None)  # latched messages arrived while connecting
-        last = [record for each in lists for record in _last_errors(each, shown)]
+        last = [record for each in lists for record in _new_errors(each, shown)]
     yield from sorted(last, key=lambda record: record.stamp_ns)
     while True:
         message = subscriber.receive()
@@ -112,20 +112,23 @@ def _records(own: Node, subscriber: Subscriber) -> Iterator[LogRecord]:
             yield record
 
 
-def _last_errors(message: Message, shown: ShownErrors) -> list[LogRecord]:
+def _new_errors(message: Message, shown: NewErrorFilter) -> list[LogRecord]:
     try:
         return shown.new_records(message.payload)
     except DecodeError:
         return []
 
 
-def _show(record: LogRecord) -> None:
+def _show_record(record: LogRecord) -> None:
     out = console()
     moment = datetime.fromtimestamp(record.stamp_ns / 1e9, tz=timezone.utc).astimezone()
     stamp = moment.strftime("%H:%M:%S.%f")[:-3]
     logger = f" [{escaped(record.name)}]" if record.name and record.name != record.node else ""
     if not out.is_terminal:
-        write(f"{stamp}  {record.level:<8}  {escaped(record.node)}{logger}  {cleaned(record.text)}\n")
+        write(
+            f"{stamp}  {record.level:<8}  {escaped(record.node)}{logger}  "
+            f"{escape_for_terminal(record.text)}\n"
+        )
         return
     out.print(_coloured_line(stamp, record, logger))
 
@@ -133,7 +136,7 @@ def _show(record: LogRecord) -> None:
 def _coloured_line(stamp: str, record: LogRecord, logger: str) -> Text:
     from rich.text import Text  # noqa: PLC0415 - see `nep.cli.screen.console`
 
-    style, text = _STYLES.get(record.level, ""), cleaned(shortened(record.text, MAX_TEXT_LENGTH))
+    style, text = _STYLES.get(record.level, ""), escape_for_terminal(shortened(record.text, MAX_TEXT_LENGTH))
     return Text.assemble(
         (stamp, "dim"), "  ", (f"{record.level:<8}", style), "  ", (escaped(record.node), "bold"),
         (logger, "dim"), "  ", (text, style),

@@ -117,7 +117,7 @@ def _start(address: str, owner_pid: int | None, terminal: Terminal, *, joins_ori
         obstacle = doctor.start_blocker(address)
         if obstacle is None:
             raise
-        raise NepError(obstacle.as_error) from error
+        raise NepError(obstacle.error_message) from error
 
 
 def _address(master: str | None, port: int | None) -> str:

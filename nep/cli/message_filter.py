@@ -47,7 +47,7 @@ class MessageFilter:
             message = _("'{text}' isn't a valid filter; use a condition such as '{example}'")
             raise NepError(message.format(text=quotable(text), example=_EXAMPLE)) from error
         try:
-            self._term = _condition(tree.body)
+            self._term = _parse_condition(tree.body)
         except _UnsupportedError as error:
             part = ast.get_source_segment(text.strip(), error.node) or text
             message = _("a filter can't use '{part}'; it compares fields with values, like '{example}'")
@@ -62,28 +62,28 @@ def _is_true(value: object) -> bool:
     return value is not MISSING and bool(value)
 
 
-def _condition(node: ast.expr) -> _Term:
+def _parse_condition(node: ast.expr) -> _Term:
     match node:
         case ast.BoolOp(op=ast.And(), values=values):
-            parts = [_condition(each) for each in values]
+            parts = [_parse_condition(each) for each in values]
             return lambda payload: all(_is_true(part(payload)) for part in parts)
         case ast.BoolOp(values=values):
-            parts = [_condition(each) for each in values]
+            parts = [_parse_condition(each) for each in values]
             return lambda payload: any(_is_true(part(payload)) for part in parts)
         case ast.UnaryOp(op=ast.Not(), operand=operand):
-            negated = _condition(operand)
+            negated = _parse_condition(operand)
             return lambda payload: not _is_true(negated(payload))
         case ast.Compare(left=left, ops=ops, comparators=right):
             tests = [_OPERATORS.get(type(op)) for op in ops]
             known = [test for test in tests if test is not None]
             if len(known) < len(tests):
                 raise _UnsupportedError(node)
-            return _comparison([_term(each) for each in (left, *right)], known)
+            return _create_comparison([_parse_term(each) for each in (left, *right)], known)
         case _:
-            return _term(node)
+            return _parse_term(node)
 
 
-def _comparison(terms: Sequence[_Term], tests: Sequence[_Test]) -> _Term:
+def _create_comparison(terms: Sequence[_Term], tests: Sequence[_Test]) -> _Term:
     def holds(payload: object) -> bool:
         values = [term(payload) for term in terms]
         if any(value is MISSING for value in values):
@@ -112,23 +112,23 @@ _OPERATORS: Mapping[type[ast.cmpop], _Test] = {
 }
 
 
-def _term(node: ast.expr) -> _Term:
+def _parse_term(node: ast.expr) -> _Term:
     match node:
         case ast.Constant(value=str() | int() | float() | None) | ast.UnaryOp(op=ast.USub()):
-            constant = _constant(node)
+            constant = _parse_constant(node)
             return lambda _payload: constant
         case ast.Name(id=name) if name in _CONSTANTS:
             constant = _CONSTANTS[name]
             return lambda _payload: constant
         case ast.List(elts=elements) | ast.Tuple(elts=elements):
-            constants = [_constant(each) for each in elements]
+            constants = [_parse_constant(each) for each in elements]
             return lambda _payload: constants
         case _:
-            path = _path(node)
+            path = _parse_field_path(node)
             return lambda payload: value_at(payload, path)
 
 
-def _constant(node: ast.expr) -> object:
+def _parse_constant(node: ast.expr) -> object:
     match node:
         case ast.Constant(value=str() | int() | float() | None):
             return node.value
@@ -140,7 +140,7 @@ def _constant(node: ast.expr) -> object:
             raise _UnsupportedError(node)
 
 
-def _path(node: ast.expr) -> Path:
+def _parse_field_path(node: ast.expr) -> Path:
     match node:
         case ast.Name(id="m"):
             return ()
@@ -149,17 +149,17 @@ def _path(node: ast.expr) -> Path:
         case ast.Attribute(value=ast.List(elts=[ast.Constant(value=str() as key)]), attr=name):
             return (key, name)
         case ast.Attribute(value=value, attr=name):
-            return (*_path(value), name)
+            return (*_parse_field_path(value), name)
         case ast.Subscript(value=ast.List(elts=[ast.Constant(value=str() as key)]), slice=step):
-            return (key, _step(step))
+            return (key, _parse_step(step))
         case ast.Subscript(value=value, slice=step):
-            return (*_path(value), _step(step))
+            return (*_parse_field_path(value), _parse_step(step))
         case _:
             raise _UnsupportedError(node)
 
 
-def _step(node: ast.expr) -> str | int:
-    step = _constant(node)
+def _parse_step(node: ast.expr) -> str | int:
+    step = _parse_constant(node)
     if isinstance(step, str) or (isinstance(step, int) and not isinstance(step, bool)):
         return step
     raise _UnsupportedError(node)

@@ -56,7 +56,7 @@ def open_node(name: str, master: str | None, backend: str | None = None) -> Node
     return Node(name, backend, master=master if is_given else None)
 
 
-def graph_of(master: str | None, backend: str | None = None) -> GraphView:
+def query_graph(master: str | None, backend: str | None = None) -> GraphView:
     """Return the graph without the querying node.
 
     Raises `MasterUnreachable`, and the exceptions of `open_node`.

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_node
-from nep.cli.network import BackendOption, graph_of
+from nep.cli.network import BackendOption, query_graph
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import (
     UNKNOWN,
@@ -61,7 +61,7 @@ def list_nodes(
     master: MasterOption = None, backend: BackendOption = None, as_json: JsonOption = False
 ) -> None:
     """List nodes with their topics and services."""
-    graph = graph_of(master, backend)
+    graph = query_graph(master, backend)
     nodes = sorted(graph.nodes.values(), key=lambda node: (node.generation != "native", node.name, node.id))
     if as_json:
         show_json(
@@ -94,7 +94,7 @@ def info(
     as_json: JsonOption = False,
 ) -> None:
     """Print information about a node: its program, and its topics and services with their types."""
-    graph = graph_of(master, backend)
+    graph = query_graph(master, backend)
     found = [each for each in graph.nodes.values() if node in {each.name, each.id}]
     if not found:
         message = _("no node '{node}'; {meant}'nep node list' shows all nodes")

@@ -14,12 +14,12 @@ import orjson
 import typer
 
 from nep.cli.complete import complete_node
-from nep.cli.json_input import parse_json, text_of
+from nep.cli.json_input import decode_text, parse_json
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.publish import read_file
 from nep.cli.screen import UNKNOWN, TextColumn, print_status, show_json, show_table, write
 from nep.cli.typer_words import TranslatedGroup
-from nep.cli.values import format_payload, json_of
+from nep.cli.values import encode_json, format_payload
 from nep.errors import DecodeError, MasterUnreachable, NepError, WaitTimeoutError, did_you_mean
 from nep.i18n import _, lazy
 from nep.messages.message import Message
@@ -61,7 +61,7 @@ _NameArgument = Annotated[
 @app.command("list")
 def list_parameters(node: _NodeArgument, master: MasterOption = None, as_json: JsonOption = False) -> None:
     """List the parameters of a node, with their types and limits."""
-    with _parameters(node, master) as parameters:
+    with _open_parameters(node, master) as parameters:
         found = parameters.list()
     if as_json:
         show_json(list(found))
@@ -76,7 +76,7 @@ def get(
     node: _NodeArgument, name: _NameArgument, master: MasterOption = None, as_json: JsonOption = False
 ) -> None:
     """Print the value of a parameter."""
-    with _parameters(node, master) as parameters:
+    with _open_parameters(node, master) as parameters:
         value = parameters.get(name)
     if as_json:
         show_json(value)
@@ -99,7 +99,7 @@ def set_value(
     master: MasterOption = None,
 ) -> None:
     """Set a parameter. Fails with the reason if the node rejects the value."""
-    with _parameters(node, master) as parameters:
+    with _open_parameters(node, master) as parameters:
         kinds = {each.get("name"): each.get("type") for each in parameters.list()}
         parameters.set(name, value if kinds.get(name) == "str" else _parse_value(value))
 
@@ -122,7 +122,7 @@ def watch(
     with Node(f"nep-param-{os.getpid()}", master=master) as own:
         found = node_with_parameters(own.graph(), node)
         with own.new_sub(parameters_topic(found), MSG_TYPE) as subscriber:
-            changes = _changes(_states(own, subscriber, found, timeout_s), name)
+            changes = _changes(_receive_states(own, subscriber, found, timeout_s), name)
             for each, value in itertools.islice(changes, count or None):
                 if as_json:
                     show_json({"name": each, "value": value})
@@ -142,9 +142,9 @@ def dump(
     master: MasterOption = None,
 ) -> None:
     """Write all parameters of a node as JSON, for `nep param load`."""
-    with _parameters(node, master) as parameters:
+    with _open_parameters(node, master) as parameters:
         values = {bounded_str(each.get("name")): each.get("value") for each in parameters.list()}
-    data = json_of(values, indent=True) + b"\n"
+    data = encode_json(values, indent=True) + b"\n"
     if file is None:
         write(data.decode())
         return
@@ -168,20 +168,20 @@ def load(
 ) -> None:
     """Set parameters from a file. If one is rejected, none is changed."""
     shown = escaped(str(file))
-    values = parse_json(text_of(read_file(file, "json"), str(file)), file=str(file))
+    values = parse_json(decode_text(read_file(file, "json"), str(file)), file=str(file))
     if not isinstance(values, dict):
         raise NepError(_("'{file}' isn't a JSON object of names and values").format(file=shown))
-    with _parameters(node, master) as parameters:
+    with _open_parameters(node, master) as parameters:
         parameters.set_all(values)
 
 
 @contextmanager
-def _parameters(node: str, master: str | None) -> Iterator[RemoteParameters]:
+def _open_parameters(node: str, master: str | None) -> Iterator[RemoteParameters]:
     with Node(f"nep-param-{os.getpid()}", master=master) as own, own.parameters_of(node) as parameters:
         yield parameters
 
 
-def _states(
+def _receive_states(
     own: Node, subscriber: Subscriber, node_id: str, timeout_s: float | None
 ) -> Iterator[Mapping[str, object]]:
     # Yields name → value, now and after each change. Raises `WaitTimeoutError`, or `NepError` when the node
@@ -196,7 +196,7 @@ def _states(
         )
         message = subscriber.receive(slice_s)
         if message is not None:
-            values = _values(message)
+            values = _parse_values(message)
             if values is not None:
                 yield values
             deadline = None if timeout_s is None else time.monotonic() + timeout_s
@@ -211,7 +211,7 @@ def _states(
                     )
 
 
-def _values(message: Message) -> Mapping[str, object] | None:
+def _parse_values(message: Message) -> Mapping[str, object] | None:
     try:
         state = message.payload
     except DecodeError:
@@ -231,7 +231,9 @@ def _changes(states: Iterator[Mapping[str, object]], name: str | None) -> Iterat
             said = did_you_mean(name, tuple(values)) if values else _("the node has no parameters")
             raise NepError(_("unknown parameter '{name}'; {said}").format(name=escaped(name), said=said))
         for each, value in values.items():
-            is_same = each in before and json_of(before[each]) == json_of(value)  # 1 and 1.0 and True differ
+            is_same = each in before and encode_json(before[each]) == encode_json(
+                value
+            )  # 1 and 1.0 and True differ
             if not is_same:
                 before[each] = value
                 if name in {None, each}:

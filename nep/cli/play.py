@@ -28,7 +28,7 @@ from nep.i18n import _, format_list, ngettext, number
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
-from nep.programs.robots.guard import MotionGuard, refusal_text
+from nep.programs.robots.guard import MotionGuard, denial_text
 from nep.programs.robots.moving import MovingTopics
 from nep.protocol.wire import check_topic
 from nep.system.lazy_import import lazy_module
@@ -189,7 +189,7 @@ class _MotionPermissions:
         known = known or self._recorded.robots_moved_by(name)
         # names of connected robots win, unless the guard only knows the topic
         robots = known or live if live in ((), (name,)) else live
-        return refusal_text(name, robots, self._allowed)
+        return denial_text(name, robots, self._allowed)
 
 
 def _remapped_names(chosen: Sequence[str], remap: Sequence[str]) -> dict[str, str]:
@@ -240,9 +240,9 @@ class _Sender:
         latched = player.latched_topics(recording, chosen)
         self._latched = {names.get(each, each) for each in latched}
         for topic in chosen:  # before the first message, so that subscribers connect in time
-            self._publisher(names.get(topic, topic), recording.topics[topic].msg_type)
+            self._open_publisher(names.get(topic, topic), recording.topics[topic].msg_type)
 
-    def _publisher(self, topic: str, msg_type: str) -> Publisher:
+    def _open_publisher(self, topic: str, msg_type: str) -> Publisher:
         key = (topic, msg_type)
         if key not in self._publishers:
             publisher = self._node.new_pub(topic, msg_type, latched=topic in self._latched)
@@ -251,7 +251,7 @@ class _Sender:
 
     def send(self, messages: Sequence[Message]) -> None:
         for each in messages:
-            publisher = self._publisher(each.topic, player.published_type(each))
+            publisher = self._open_publisher(each.topic, player.published_type(each))
             subscriber_count = publisher.subscribers
             if subscriber_count != self._subscriber_counts.get(publisher):  # a robot may have connected
                 self._subscriber_counts[publisher] = subscriber_count
@@ -302,7 +302,7 @@ def _ignore_jump(_messages: Sequence[Message]) -> None:
 def _status_line(recording: reader.Recording, status: player.PlayerStatus) -> str:
     at = clock_text((status.position_ns - recording.start_ns) / 1e9)
     line = _("{time} of {whole}").format(time=at, whole=clock_text(recording.duration_s))
-    true_speed = status.true_speed
+    true_speed = status.measured_speed
     if true_speed is not None and true_speed < 0.9 * status.speed:
         line += "  " + _("{is_now}x instead of {asked}x").format(
             asked=number(status.speed, "g"), is_now=number(true_speed, ".1f")

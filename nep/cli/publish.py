@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_topic
-from nep.cli.json_input import parse_json, text_of
+from nep.cli.json_input import decode_text, parse_json
 from nep.cli.network import BackendOption, open_command_node
 from nep.cli.options import MasterOption
 from nep.cli.screen import print_status, size
@@ -195,7 +195,7 @@ def parse_payload(text: str, msg_type: str, first_line: int = 1) -> object:
         data = read_file(Path(text[1:]), msg_type)
         if msg_type in _BYTE_TYPES:
             return data
-        file, text = text[1:], text_of(data, text[1:])
+        file, text = text[1:], decode_text(data, text[1:])
     if msg_type in _TEXT_TYPES:
         return text
     if msg_type == "bytes":

@@ -80,7 +80,7 @@ class RateWindow:
 
     def frequency(self, now: float) -> Frequency | None:
         """Return the rate at the time `now`, or None if the window has fewer than two messages."""
-        moments = sorted(stamp for _, stamp, _ in self._recent(now))
+        moments = sorted(stamp for _, stamp, _ in self._recent_messages(now))
         if len(moments) < 2 or moments[-1] <= moments[0]:
             return None
         gaps = [later - earlier for earlier, later in itertools.pairwise(moments)]
@@ -90,7 +90,7 @@ class RateWindow:
 
     def bandwidth(self, now: float) -> Bandwidth | None:
         """Return the bandwidth at the time `now`, or None if the window has fewer than two messages."""
-        recent = self._recent(now)
+        recent = self._recent_messages(now)
         if len(recent) < 2:
             return None
         sizes = [size for _, _, size in recent]
@@ -101,7 +101,7 @@ class RateWindow:
         bandwidth = sum(sizes[1:]) / span
         return Bandwidth(bandwidth, sum(sizes) / len(sizes), min(sizes), max(sizes), len(sizes))
 
-    def _recent(self, now: float) -> Sequence[tuple[float, float, int]]:
+    def _recent_messages(self, now: float) -> Sequence[tuple[float, float, int]]:
         with self._lock:
             while self._messages and now - self._messages[0][0] > self._seconds:
                 self._messages.popleft()
@@ -177,7 +177,7 @@ class LatencyWindow(RateWindow):
 
     def delay(self, now: float) -> Delay | None:
         """Return the latency at the time `now`, or None if the window has no message of known latency."""
-        ages = [age for _, age, _ in self._recent(now)]
+        ages = [age for _, age, _ in self._recent_messages(now)]
         if not ages:
             return None
         mean = sum(ages) / len(ages)

@@ -98,7 +98,7 @@ def record(
             ),
             param_hint="--duration",
         )
-    max_bytes = _max_bytes(max_size, split=split)
+    max_bytes = _parse_max_bytes(max_size, split=split)
     path = output or Path(datetime.now().astimezone().strftime("recording-%Y-%m-%d-%H-%M-%S.mcap"))
     selection = recorder.TopicSelection(tuple(topics or ()), tuple(excluded or ()))
     ended = threading.Event()
@@ -142,7 +142,7 @@ def _show_result(paths: Sequence[Path], status: writer.RecordingStatus, *, as_js
         print_status(template.format(count=len(paths), path=paths[-1]))
 
 
-def _max_bytes(text: str | None, *, split: bool) -> int | None:
+def _parse_max_bytes(text: str | None, *, split: bool) -> int | None:
     if text is None:
         if split:
             raise typer.BadParameter(_("--split needs a size: --max-size 500MB"), param_hint="--split")

@@ -11,7 +11,7 @@ import typer
 
 from nep.cli.options import JsonOption
 from nep.cli.recording_files import FileArgument, clock_text, exit_if_damaged, progress_bar
-from nep.cli.screen import UNKNOWN, TextColumn, print_status, rate, show_json, show_table, size, write
+from nep.cli.screen import UNKNOWN, TextColumn, format_rate, print_status, show_json, show_table, size, write
 from nep.i18n import _, format_list, lazy, ngettext
 from nep.system.lazy_import import lazy_module
 from nep.text import escaped, quotable
@@ -91,7 +91,7 @@ def _show(recording: reader.Recording, topic_figures: Mapping[str, figures.Topic
     if recording.recorder_metadata.get("part"):
         part = quotable(recording.recorder_metadata["part"])
         write(_("file {number} of a split recording").format(number=part) + "\n")
-    write(f"{_writer_text(recording.facts)}\n")
+    write(f"{_writer_text(recording.info)}\n")
     topics = list(islice(recording.topics.values(), _MAX_ROWS))
     show_table(_COLUMNS, [_row(recording, each, topic_figures.get(each.name)) for each in topics])
     left_out = len(recording.topics) - len(topics)
@@ -102,17 +102,17 @@ def _show(recording: reader.Recording, topic_figures: Mapping[str, figures.Topic
             left_out,
         )
         write(f"{template.format(count=left_out)}\n")
-    if recording.facts.attachments:
+    if recording.info.attachments:
         rows = [
             (quotable(each.name), quotable(each.media_type), size(each.size_bytes))
-            for each in recording.facts.attachments
+            for each in recording.info.attachments
         ]
         show_table(_ATTACHMENT_COLUMNS, rows)
-    for line in _metadata_lines(recording.facts):
+    for line in _metadata_lines(recording.info):
         write(f"{line}\n")
 
 
-def _writer_text(facts: file_reader.FileFacts) -> str:
+def _writer_text(facts: file_reader.FileInfo) -> str:
     kinds = []
     for name, count in sorted(facts.compressions.items()):
         if name == "-":
@@ -128,7 +128,7 @@ def _writer_text(facts: file_reader.FileFacts) -> str:
     )
 
 
-def _metadata_lines(facts: file_reader.FileFacts) -> Iterator[str]:
+def _metadata_lines(facts: file_reader.FileInfo) -> Iterator[str]:
     shown = [each for each in facts.metadata if each[0] not in _OWN_METADATA]
     for name, values in shown[:_MAX_VALUES]:
         pairs = [f"{quotable(key)}: {quotable(value)}" for key, value in islice(values.items(), _MAX_VALUES)]
@@ -162,7 +162,7 @@ def _row(
         quotable(topic.encoding) or UNKNOWN,
         quotable(topic.schema_encoding) or UNKNOWN,
         str(topic.message_count),
-        rate(topic.message_count / duration) if duration > 0 else UNKNOWN,
+        format_rate(topic.message_count / duration) if duration > 0 else UNKNOWN,
         UNKNOWN if topic_figures is None or topic_figures.lost is None else str(topic_figures.lost),
         UNKNOWN if topic_figures is None else str(topic_figures.late),
         UNKNOWN if topic_figures is None else str(topic_figures.undecodable),
@@ -173,7 +173,7 @@ def _row(
 def _to_plain(
     recording: reader.Recording, topic_figures: Mapping[str, figures.TopicStats]
 ) -> dict[str, object]:
-    facts = recording.facts
+    facts = recording.info
     return {
         "path": str(recording.path),
         "start_ns": recording.start_ns,

@@ -77,7 +77,7 @@ def repair(
                 "discarded_bytes": report.discarded_bytes,
                 "lost_s": report.lost_s,
                 "duration_s": report.duration_s,
-                "damaged_places": report.damaged_range_count,
+                "damaged_places": report.corrupt_range_count,
             }
         )
         return

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import IO, TYPE_CHECKING, Literal, cast
 
-from nep.cli.values import json_of
+from nep.cli.values import encode_json
 from nep.i18n import _
 from nep.system.streams import print_error
 from nep.text import escaped
@@ -36,7 +36,7 @@ UNKNOWN = "\N{EN DASH}"
 class TextColumn:
     """Column of a table: heading, alignment and style."""
 
-    head: str
+    heading: str
     justify: Literal["left", "right"] = "left"
     style: str = ""
     is_folded_last: bool = False
@@ -84,11 +84,11 @@ def json_highlighter() -> Callable[[str, str], Text]:
 
 def show_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> None:
     """Print a table to stdout; long cells are wrapped to fit the width of the terminal."""
-    columns = [replace(column, head=_(column.head)) for column in columns]
+    columns = [replace(column, heading=_(column.heading)) for column in columns]
     is_terminal = sys.stdout.isatty()  # files and pipes have no width
     room = shutil.get_terminal_size().columns if is_terminal else _UNLIMITED_WIDTH
     lines = [[escaped(cell, lines=True) for cell in row] for row in rows]
-    widths = _widths(columns, lines, room)
+    widths = _column_widths(columns, lines, room)
     if _total_width(widths) > room:
         write("".join(_record_blocks(columns, lines)))
         return
@@ -105,14 +105,14 @@ def show_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> 
     table = Table(box=box.SIMPLE_HEAD, header_style="dim", pad_edge=False, show_edge=False)
     for column, width in zip(columns, widths, strict=True):
         table.add_column(
-            column.head, justify=column.justify, style=column.style, overflow="fold", width=width
+            column.heading, justify=column.justify, style=column.style, overflow="fold", width=width
         )
     for row in lines:
         table.add_row(*(Text(cell, style="dim" if cell == UNKNOWN else "") for cell in row))
     out.print(table, soft_wrap=False)
 
 
-def cells(text: str) -> int:
+def display_width(text: str) -> int:
     """Return the display width of a line in terminal cells: wide characters take two, accents none."""
     if text.isascii():
         return len(text)
@@ -123,7 +123,7 @@ def cells(text: str) -> int:
 
 def padded(text: str, width: int, justify: Literal["left", "right"] = "left") -> str:
     """Pad a text with spaces to `width` cells."""
-    room = " " * (width - cells(text))
+    room = " " * (width - display_width(text))
     return text + room if justify == "left" else room + text
 
 
@@ -136,12 +136,12 @@ def _record_blocks(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]])
         yield f"{row[0]}\n"
         for column, cell in zip(columns[1:], row[1:], strict=True):
             if cell != UNKNOWN:
-                yield f"  {column.head}: {', '.join(cell.splitlines())}\n"
+                yield f"  {column.heading}: {', '.join(cell.splitlines())}\n"
 
 
 def _cells_fit(rows: Sequence[Sequence[str]], widths: Sequence[int]) -> bool:
     return all(
-        cells(cell) <= width and "\n" not in cell
+        display_width(cell) <= width and "\n" not in cell
         for row in rows
         for cell, width in zip(row, widths, strict=True)
     )
@@ -158,14 +158,18 @@ def _layout_lines(
             for column, text, width in zip(columns, texts, widths, strict=True)
         ).rstrip()
 
-    yield line(column.head for column in columns)
+    yield line(column.heading for column in columns)
     yield "─" * _total_width(widths)
     yield from map(line, rows)
 
 
-def _widths(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], room: int) -> list[int]:
+def _column_widths(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], room: int) -> list[int]:
     widths = [
-        max(cells(line) for cell in (column.head, *(row[at] for row in rows)) for line in cell.split("\n"))
+        max(
+            display_width(line)
+            for cell in (column.heading, *(row[at] for row in rows))
+            for line in cell.split("\n")
+        )
         for at, column in enumerate(columns)
     ]
     is_fixed = [column.is_folded_last or column.justify == "right" for column in columns]
@@ -209,13 +213,13 @@ def write(text: str) -> None:
 
 def show_json(value: object) -> None:
     """Write a value to stdout as one line of UTF-8 JSON, regardless of the terminal's encoding, and flush."""
-    data = json_of(value) + b"\n"
+    data = encode_json(value) + b"\n"
     sys.stdout.flush()
     sys.stdout.buffer.write(data)
     sys.stdout.buffer.flush()
 
 
-def rate(value_hz: float | None) -> str:
+def format_rate(value_hz: float | None) -> str:
     """Format a rate in messages per second; None is shown as `UNKNOWN`."""
     if value_hz is None:
         return UNKNOWN
@@ -234,7 +238,7 @@ def size(value: float | None, per: str = "") -> str:
     return f"{value:.1f} GB{per}"
 
 
-def bandwidth(topic: TopicInfo) -> str:
+def format_bandwidth(topic: TopicInfo) -> str:
     """Format a topic's bandwidth; "not subscribed" if messages are not encoded for lack of subscribers."""
     if topic.rate_hz and not topic.bandwidth_Bps and not topic.subscribers:
         return _("not subscribed")

@@ -9,14 +9,14 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_service, complete_service_type
-from nep.cli.json_input import parse_json, text_of
-from nep.cli.network import BackendOption, graph_of, open_node
+from nep.cli.json_input import decode_text, parse_json
+from nep.cli.network import BackendOption, open_node, query_graph
 from nep.cli.options import JsonOption, MasterOption, check_duration
 from nep.cli.publish import read_file
 from nep.cli.screen import UNKNOWN, TextColumn, print_status, show_alerts, show_json, show_table, size, write
 from nep.cli.topic_wait import suggestion
 from nep.cli.typer_words import TranslatedGroup
-from nep.cli.values import format_payload, ids_as_text, service_type_text
+from nep.cli.values import convert_ids_to_text, format_payload, service_type_text
 from nep.errors import NepError
 from nep.i18n import _, lazy
 from nep.protocol.graph_view import GraphView, ServiceInfo
@@ -60,10 +60,10 @@ def list_services(
     master: MasterOption = None, backend: BackendOption = None, as_json: JsonOption = False
 ) -> None:
     """List services with their servers and clients."""
-    graph = graph_of(master, backend)
+    graph = query_graph(master, backend)
     services = [graph.services[name] for name in sorted(graph.services)]
     if as_json:
-        show_json(ids_as_text([asdict(each) for each in services]))
+        show_json(convert_ids_to_text([asdict(each) for each in services]))
         return
     if services:
         show_table(_COLUMNS, [_row(graph, each) for each in services])
@@ -80,10 +80,10 @@ def info(
     as_json: JsonOption = False,
 ) -> None:
     """Print information about a service: its type, servers and clients."""
-    graph = graph_of(master, backend)
+    graph = query_graph(master, backend)
     found = _find_service(service, graph)
     if as_json:
-        show_json(ids_as_text(_record(graph, found)))
+        show_json(convert_ids_to_text(_record(graph, found)))
         return
     for head, value in (
         (_("service"), escaped(found.name)),
@@ -105,7 +105,7 @@ def show_type(
     as_json: JsonOption = False,
 ) -> None:
     """Print the type of a service."""
-    found = _find_service(service, graph_of(master, backend))
+    found = _find_service(service, query_graph(master, backend))
     if as_json:
         show_json({"service": found.name, "msg_type": found.msg_type})
     else:
@@ -128,7 +128,7 @@ def find(
     as_json: JsonOption = False,
 ) -> None:
     """List services of a type."""
-    graph = graph_of(master, backend)
+    graph = query_graph(master, backend)
     names = sorted(name for name, each in graph.services.items() if each.msg_type == msg_type)
     if as_json:
         show_json(names)
@@ -184,7 +184,7 @@ def _parse_request(text: str) -> object:
     if not text.startswith("@"):
         return parse_json(text)
     file = text[1:]
-    return parse_json(text_of(read_file(Path(file), "json"), file), file=file)
+    return parse_json(decode_text(read_file(Path(file), "json"), file), file=file)
 
 
 def _find_service(service: str, graph: GraphView) -> ServiceInfo:

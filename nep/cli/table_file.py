@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from nep.cli.screen import print_status
-from nep.cli.values import json_of
+from nep.cli.values import encode_json
 from nep.errors import DecodeError
 from nep.i18n import _, ngettext
 from nep.messages.fields import MISSING, Path, parse_path, value_at
@@ -98,7 +98,10 @@ class CsvMessageWriter:
         if values is not None:
             topic = [message.topic] if self._names_topic else []
             self._write(
-                [self._clean(each) for each in (_stamp(message.stamp_ns), *topic, *map(_cell, values))]
+                [
+                    self._clean(each)
+                    for each in (_format_stamp(message.stamp_ns), *topic, *map(_format_cell, values))
+                ]
             )
             self._out.flush()
 
@@ -111,17 +114,17 @@ def _binary_safe_stdout() -> TextSink:
     return sys.stdout
 
 
-def _stamp(stamp_ns: int | None) -> str:
+def _format_stamp(stamp_ns: int | None) -> str:
     return "" if stamp_ns is None else f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
 
 
-def _cell(value: object) -> str:
+def _format_cell(value: object) -> str:
     if value is MISSING or value is None:
         return ""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, (Mapping, list, tuple)):
-        return json_of(value).decode()
+        return encode_json(value).decode()
     if isinstance(value, (bytes, bytearray, memoryview)):
         return bytes(value).hex()
     return str(value)

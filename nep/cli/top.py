@@ -21,17 +21,17 @@ from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import (
     UNKNOWN,
     TextColumn,
-    bandwidth,
     console,
     duration,
+    format_bandwidth,
+    format_rate,
     print_status,
-    rate,
     show_json,
     show_table,
     size,
     write,
 )
-from nep.cli.values import ids_as_text
+from nep.cli.values import convert_ids_to_text
 from nep.errors import NepError
 from nep.i18n import _, lazy, ngettext
 from nep.masters.process import view
@@ -115,7 +115,7 @@ def top(
     graph = view(master)  # fail at once: the address may be wrong
     shown = _GraphPrinter(pattern, order)
     show: Callable[[GraphView, str], None]
-    with _screen(as_json=as_json) as live:
+    with _open_screen(as_json=as_json) as live:
         if as_json:
             show = shown.show_json
         elif live is None:
@@ -144,7 +144,7 @@ def _run(
             problem = str(error)
 
 
-def _screen(*, as_json: bool) -> AbstractContextManager[Live | None]:
+def _open_screen(*, as_json: bool) -> AbstractContextManager[Live | None]:
     if as_json or not sys.stdout.isatty():
         return nullcontext(None)
     from rich.live import Live  # noqa: PLC0415 - only a terminal needs it
@@ -213,7 +213,7 @@ class _GraphPrinter:
             "nodes": plain["nodes"],
             "alerts": plain["alerts"],
         }
-        show_json(ids_as_text(record))
+        show_json(convert_ids_to_text(record))
 
     def show_plain(self, graph: GraphView, problem: str) -> None:
         if problem:
@@ -233,7 +233,7 @@ class _GraphPrinter:
         parts = [
             ngettext("{count} node", "{count} nodes", len(graph.nodes)).format(count=len(graph.nodes)),
             ngettext("{count} topic", "{count} topics", len(graph.topics)).format(count=len(graph.topics)),
-            rate(sum(rates) if rates else None),
+            format_rate(sum(rates) if rates else None),
             size(sum(bytes_s) if bytes_s else None, "/s"),
             ngettext("{count} lost", "{count} lost", sum(lost)).format(count=sum(lost)) if lost else "",
         ]
@@ -245,8 +245,8 @@ class _GraphPrinter:
             escaped(topic.name),
             escaped(topic.msg_type),
             shortened(escaped(", ".join(dict.fromkeys(names))), _MAX_NAMES_LENGTH) or UNKNOWN,
-            rate(topic.rate_hz),
-            bandwidth(topic),
+            format_rate(topic.rate_hz),
+            format_bandwidth(topic),
             str(len(topic.subscribers)),
             UNKNOWN if topic.lost is None else str(topic.lost),
         )
@@ -258,7 +258,7 @@ class _GraphPrinter:
             UNKNOWN if node.pid is None else str(node.pid),
             escaped(node.language) or UNKNOWN,
             UNKNOWN if node.cpu_ratio is None else f"{100 * node.cpu_ratio:.0f} %",
-            rate(published_hz),
+            format_rate(published_hz),
             duration(time.time() - node.since_ns / 1e9) if node.since_ns else UNKNOWN,
         )
 
@@ -288,14 +288,14 @@ class _LiveTables:
             for at, each in enumerate(above)
             if (each.lost or 0) > self._lost.get(each.name, each.lost or 0)
         }
-        parts.append(_table(_TOPIC_COLUMNS, rows, len(topics) - len(above), grown))
+        parts.append(_create_table(_TOPIC_COLUMNS, rows, len(topics) - len(above), grown))
         rows = [self._shown.node_cells(*each) for each in below]
-        parts.append(_table(_NODE_COLUMNS, rows, len(nodes) - len(below), set()))
+        parts.append(_create_table(_NODE_COLUMNS, rows, len(nodes) - len(below), set()))
         self._lost = {each.name: each.lost for each in topics if each.lost is not None}
         self._live.update(Group(*parts), refresh=True)
 
 
-def _table(
+def _create_table(
     columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], left: int, grown: set[int]
 ) -> RenderableType:
     from rich import box  # noqa: PLC0415 - only a terminal needs it
@@ -304,7 +304,7 @@ def _table(
 
     table = Table(box=box.SIMPLE_HEAD, header_style="dim", pad_edge=False, show_edge=False)
     for number, column in enumerate(columns):
-        head = _(column.head) if number or left <= 0 else f"{_(column.head)} (+{left})"
+        head = _(column.heading) if number or left <= 0 else f"{_(column.heading)} (+{left})"
         is_number = column.justify == "right"
         table.add_column(
             head, justify=column.justify, style=column.style, no_wrap=True,

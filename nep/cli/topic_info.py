@@ -8,14 +8,14 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_topic, complete_type
-from nep.cli.network import BackendOption, graph_of
+from nep.cli.network import BackendOption, query_graph
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import (
     UNKNOWN,
     TextColumn,
-    bandwidth,
+    format_bandwidth,
+    format_rate,
     print_status,
-    rate,
     show_alerts,
     show_json,
     show_table,
@@ -23,7 +23,7 @@ from nep.cli.screen import (
     write,
 )
 from nep.cli.topic_wait import suggestion
-from nep.cli.values import ids_as_text
+from nep.cli.values import convert_ids_to_text
 from nep.errors import NepError
 from nep.i18n import _, lazy
 from nep.protocol.graph_view import GraphView, TopicInfo
@@ -62,10 +62,10 @@ def info(
     as_json: JsonOption = False,
 ) -> None:
     """Print information about a topic: its type, publishers and subscribers."""
-    graph = graph_of(master, backend)
+    graph = query_graph(master, backend)
     found = _find_topic(topic, graph)
     if as_json:
-        show_json(ids_as_text(_record(graph, found)))
+        show_json(convert_ids_to_text(_record(graph, found)))
         return
     latched = any(each.latched for each in found.publishers)
     for head, value in (
@@ -73,8 +73,8 @@ def info(
         (_("type"), escaped(found.msg_type)),
         (_("codec"), escaped(found.codec)),
         (_("latched"), _("yes") if latched else _("no")),
-        (_("rate"), rate(found.rate_hz)),
-        (_("bandwidth"), bandwidth(found)),
+        (_("rate"), format_rate(found.rate_hz)),
+        (_("bandwidth"), format_bandwidth(found)),
         (_("lost"), _count_text(found.lost)),
     ):
         write(f"{head}: {value}\n")
@@ -90,7 +90,7 @@ def show_type(
     as_json: JsonOption = False,
 ) -> None:
     """Print the type of a topic."""
-    found = _find_topic(topic, graph_of(master, backend))
+    found = _find_topic(topic, query_graph(master, backend))
     if as_json:
         show_json({"topic": found.name, "msg_type": found.msg_type, "codec": found.codec})
     else:
@@ -104,7 +104,7 @@ def find(
     as_json: JsonOption = False,
 ) -> None:
     """List topics of a type."""
-    graph = graph_of(master, backend)
+    graph = query_graph(master, backend)
     names = sorted(name for name, each in graph.topics.items() if each.msg_type == msg_type)
     if as_json:
         show_json(names)
@@ -142,7 +142,7 @@ def _rows(graph: GraphView, topic: TopicInfo) -> list[tuple[str, ...]]:
             escaped(_node_name(graph, each.node_id) or UNKNOWN),
             _("publishes"),
             str(each.count),
-            rate(each.rate_hz),
+            format_rate(each.rate_hz),
             size(each.bandwidth_Bps, "/s"),
             UNKNOWN,
         )

@@ -17,7 +17,7 @@ from nep.protocol.wire import check_topic
 
 __all__ = ["TopicPatterns", "is_pattern", "matches"]
 
-_GRAPH_POLL_S = 1.0
+_GRAPH_POLL_INTERVAL_S = 1.0
 _GRAPH_TIMEOUT_S = 0.3
 """Time limit of a graph query in seconds; short, because waiting for a missing master delays messages."""
 
@@ -43,7 +43,7 @@ class TopicPatterns:
 
         A pattern without a match is reported once to the user.
         """
-        self._poll_at = time.monotonic() + _GRAPH_POLL_S
+        self._poll_at = time.monotonic() + _GRAPH_POLL_INTERVAL_S
         published = {name: each for name, each in graph.topics.items() if each.publishers}
         for pattern in self.patterns:
             if pattern not in self._reported:
@@ -65,7 +65,7 @@ class TopicPatterns:
         Returns an empty list while the master is down.
         """
         if self.patterns and time.monotonic() >= self._poll_at:
-            self._poll_at = time.monotonic() + _GRAPH_POLL_S
+            self._poll_at = time.monotonic() + _GRAPH_POLL_INTERVAL_S
             with suppress(NepError):
                 return self.new_topics(self._node.graph(_GRAPH_TIMEOUT_S))
         return []

@@ -13,7 +13,7 @@ from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 from nep.protocol.wire import check_topic
 
-_GRAPH_POLL_S = 1.0
+_GRAPH_POLL_INTERVAL_S = 1.0
 _WAIT_SLICE_S = 0.1
 _GRAPH_TIMEOUT_S = 0.3
 """Time limit of a graph query in seconds; short, because waiting for a missing master delays messages."""
@@ -60,22 +60,22 @@ class TopicMonitor:
                 else:
                     template = _("'{topic}' has no publisher yet; {meant}waiting (Ctrl+C to stop)")
                 print_status(template.format(topic=topic, meant=suggestion(topic, other_topics)))
-        self._poll_at = time.monotonic() + _GRAPH_POLL_S
+        self._poll_at = time.monotonic() + _GRAPH_POLL_INTERVAL_S
 
     def mark_received(self, topics: Collection[str]) -> None:
         """Record that messages arrived on these topics."""
         self._published_before.update(topics)
         self._silent.difference_update(topics)
-        self._poll_at = time.monotonic() + _GRAPH_POLL_S
+        self._poll_at = time.monotonic() + _GRAPH_POLL_INTERVAL_S
 
-    def slice_s(self, timeout_s: float | None) -> float:
+    def wait_slice_s(self, timeout_s: float | None) -> float:
         """Return the maximum time in seconds to wait for a message before the next poll."""
         return _WAIT_SLICE_S if timeout_s is None else min(_WAIT_SLICE_S, max(0.0, timeout_s))
 
     def poll(self) -> None:
         """Query the graph if no message arrived for a while. Does nothing while the master is down."""
         if time.monotonic() >= self._poll_at:
-            self._poll_at = time.monotonic() + _GRAPH_POLL_S
+            self._poll_at = time.monotonic() + _GRAPH_POLL_INTERVAL_S
             with suppress(NepError):
                 self.update(self._node.graph(_GRAPH_TIMEOUT_S))
 

@@ -8,22 +8,22 @@ import typer
 
 from nep.cli.echo import echo
 from nep.cli.hz_bw import bw, delay, hz
-from nep.cli.network import BackendOption, graph_of
+from nep.cli.network import BackendOption, query_graph
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.publish import publish
 from nep.cli.screen import (
     UNKNOWN,
     TextColumn,
-    bandwidth,
+    format_bandwidth,
+    format_rate,
     print_status,
-    rate,
     show_alerts,
     show_json,
     show_table,
 )
 from nep.cli.topic_info import find, info, show_type
 from nep.cli.typer_words import TranslatedGroup
-from nep.cli.values import ids_as_text
+from nep.cli.values import convert_ids_to_text
 from nep.i18n import _, lazy
 from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.text import escaped
@@ -57,10 +57,10 @@ def list_topics(
     master: MasterOption = None, backend: BackendOption = None, as_json: JsonOption = False
 ) -> None:
     """List topics with their publishers, subscribers and rates."""
-    graph = graph_of(master, backend)
+    graph = query_graph(master, backend)
     topics = [graph.topics[name] for name in sorted(graph.topics)]
     if as_json:
-        show_json(ids_as_text([asdict(topic) for topic in topics]))
+        show_json(convert_ids_to_text([asdict(topic) for topic in topics]))
         return
     if topics:
         show_table(_COLUMNS, [_row(graph, topic) for topic in topics])
@@ -75,8 +75,8 @@ def _row(graph: GraphView, topic: TopicInfo) -> tuple[str, ...]:
         escaped(topic.msg_type),
         _node_names(graph, [each.node_id for each in topic.publishers]),
         _node_names(graph, [each.node_id for each in topic.subscribers]),
-        rate(topic.rate_hz),
-        bandwidth(topic),
+        format_rate(topic.rate_hz),
+        format_bandwidth(topic),
         UNKNOWN if topic.lost is None else str(topic.lost),
     )
 

@@ -22,11 +22,11 @@ MAX_DEPTH = 40
 _MAX_JSON_DEPTH = 200
 """Maximum nesting depth of JSON output; deeper values are written as text."""
 _ID_KEYS = frozenset({"id", "publisher"})
-_CONTROL = re.compile("[\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]")
+_CONTROL_CHARACTERS = re.compile("[\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]")
 _SAFE_INTEGERS = range(-(1 << 63), 1 << 64)
 
 
-def json_of(value: object, *, indent: bool = False) -> bytes:
+def encode_json(value: object, *, indent: bool = False) -> bytes:
     r"""Encode any value as JSON: NaN and infinity become `null`, bytes become hexadecimal digits.
 
     Control characters of terminals are escaped, such as U+009B as ``\u009b``, which is equivalent JSON.
@@ -38,7 +38,7 @@ def json_of(value: object, *, indent: bool = False) -> bytes:
         data = orjson.dumps(_simplify(value, _MAX_JSON_DEPTH), default=str, option=option)
     if data.isascii() and b"\x7f" not in data:
         return data
-    return _CONTROL.sub(lambda found: f"\\u{ord(found.group()):04x}", data.decode()).encode()
+    return _CONTROL_CHARACTERS.sub(lambda found: f"\\u{ord(found.group()):04x}", data.decode()).encode()
 
 
 def _to_plain(value: object) -> object:
@@ -54,25 +54,25 @@ def _simplify(value: object, depth: int) -> object:
         return [_simplify(each, depth - 1) for each in value] if depth > 0 else "…"
     if isinstance(value, int) and not isinstance(value, bool) and value not in _SAFE_INTEGERS:
         return str(value)
-    return _valid_text(value) if isinstance(value, str) else value
+    return _escape_surrogates(value) if isinstance(value, str) else value
 
 
 def _key_text(key: object) -> str:
-    return _valid_text(key) if isinstance(key, str) else str(_to_plain(key))
+    return _escape_surrogates(key) if isinstance(key, str) else str(_to_plain(key))
 
 
-def _valid_text(text: str) -> str:
+def _escape_surrogates(text: str) -> str:
     return text.encode("utf-8", "backslashreplace").decode()
 
 
-def ids_as_text(value: object) -> object:
+def convert_ids_to_text(value: object) -> object:
     """Convert ids in maps and lists to strings, because many JSON readers lose digits beyond 2^53."""
     if isinstance(value, Mapping):
         return {
-            key: str(each) if key in _ID_KEYS and isinstance(each, int) else ids_as_text(each)
+            key: str(each) if key in _ID_KEYS and isinstance(each, int) else convert_ids_to_text(each)
             for key, each in value.items()
         }
-    return [ids_as_text(each) for each in value] if isinstance(value, (list, tuple)) else value
+    return [convert_ids_to_text(each) for each in value] if isinstance(value, (list, tuple)) else value
 
 
 def format_payload(value: object, *, whole: bool, indent: bool = False) -> str:
@@ -88,7 +88,7 @@ def format_payload(value: object, *, whole: bool, indent: bool = False) -> str:
         if whole
         else (MAX_ITEMS, MAX_FIELDS, MAX_CHARACTERS, MAX_DEPTH)
     )
-    return json_of(_shorten_value(value, *limits), indent=indent).decode()
+    return encode_json(_shorten_value(value, *limits), indent=indent).decode()
 
 
 def _shorten_value(value: object, items: float, fields: float, letters: float, depth: float) -> object:
@@ -136,6 +136,6 @@ def service_type_text(service: ServiceInfo) -> str:
     return escaped(service.msg_type)
 
 
-def cleaned(text: str) -> str:
+def escape_for_terminal(text: str) -> str:
     """Escape the control characters of a text, except line breaks, and indent its continuation lines."""
     return escaped(text, lines=True).replace("\n", "\n    ")

@@ -18,7 +18,7 @@ from nep.cli import interrupts
 from nep.cli.options import AllowMovingOption, JsonOption, MasterOption
 from nep.cli.ring import KEEP_SERVICE, SAVE_TIMEOUT_S, has_flight_recorder
 from nep.cli.screen import console, print_status, show_json, write
-from nep.cli.values import cleaned
+from nep.cli.values import escape_for_terminal
 from nep.errors import NepError, nearest
 from nep.i18n import _
 from nep.messages.message import Message
@@ -35,7 +35,7 @@ from nep.programs.robots.guard import MotionGuard
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped
 
-_GRAPH_POLL_S = 1.0
+_GRAPH_POLL_INTERVAL_S = 1.0
 _GRAPH_TIMEOUT_S = 0.5
 _EVENT_WAIT_S = 0.05
 _ROBOT_DISCOVERY_S = 1.0
@@ -116,7 +116,7 @@ class _EventPrinter:
         self._show(event.kind, event.at_s, what)
 
     def action(self, _rule: AlarmRule, words: str, at_s: float) -> None:
-        self._show("", at_s, f"  {cleaned(words)}")
+        self._show("", at_s, f"  {escape_for_terminal(words)}")
 
     def _show(self, kind: str, at_s: float, words: str) -> None:
         stamp = datetime.fromtimestamp(at_s, tz=timezone.utc).astimezone().strftime("%H:%M:%S.%f")[:-3]
@@ -163,7 +163,7 @@ class _AlarmRunner:
         guard: MotionGuard,
     ) -> None:
         self._node, self._out, self._guard = node, out, guard
-        self._commands = AlarmCommands(self._refusal)
+        self._commands = AlarmCommands(self._rejection_reason)
         self._save_client: Client | None = None
         carriers: Mapping[str, Callable[[AlarmEvent, AlarmAction, DoneCallback], None]] = {
             "banner": _do_nothing,  # every alarm is printed anyway
@@ -171,7 +171,7 @@ class _AlarmRunner:
             "sound": self._ring_bell,
             "call": self._run_command,
             "send": self._run_command,
-            "keep": self._save_ring,
+            "keep": self._save_flight_recorder,
             **dict.fromkeys(_STUDIO_ACTIONS, self._skip_studio_action),
         }
         self.alarms = Alarms(rules, carriers=carriers)
@@ -193,7 +193,7 @@ class _AlarmRunner:
         if sends:
             self._guard.wait_for_descriptions(_ROBOT_DISCOVERY_S)
         for action in sends:
-            refusal = self._guard.refusal(action.name, action.msg_type)
+            refusal = self._guard.denial_reason(action.name, action.msg_type)
             if refusal:
                 raise typer.BadParameter(refusal)
 
@@ -249,7 +249,7 @@ class _AlarmRunner:
             self._was_away = False
             self._report_unknown_once(self._view)
         self.alarms.evaluator.update_graph(self._view)
-        self._poll_at = time.monotonic() + _GRAPH_POLL_S
+        self._poll_at = time.monotonic() + _GRAPH_POLL_INTERVAL_S
 
     def _subscribe(self, view: GraphView) -> None:
         for topic in self.alarms.evaluator.topics:
@@ -261,10 +261,12 @@ class _AlarmRunner:
                 held[1].close()
                 held = None
             if held is None:
-                subscriber = self._node.new_sub(topic, info.msg_type, sink=self._sink(topic), wildcards=False)
+                subscriber = self._node.new_sub(
+                    topic, info.msg_type, sink=self._create_sink(topic), wildcards=False
+                )
                 self._subscribers[topic] = (info.msg_type, subscriber)
 
-    def _sink(self, topic: str) -> Callable[[Sequence[Message]], None]:
+    def _create_sink(self, topic: str) -> Callable[[Sequence[Message]], None]:
         return lambda messages: self.alarms.evaluator.evaluate(topic, messages)
 
     def _report_unknown_once(self, view: GraphView) -> None:
@@ -285,18 +287,18 @@ class _AlarmRunner:
 
     # ---- actions
 
-    def _refusal(self, _node: Node, topic: str, msg_type: str) -> str:
+    def _rejection_reason(self, _node: Node, topic: str, msg_type: str) -> str:
         self._guard.poll()  # alarms are rare, and a robot may just have connected
-        return self._guard.refusal(topic, msg_type)
+        return self._guard.denial_reason(topic, msg_type)
 
     def _run_command(self, _event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         self._commands.start_action(self._node, action, done)
 
-    def _save_ring(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
+    def _save_flight_recorder(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         if self._view is None or not has_flight_recorder(self._view):
             done(False, _("nothing saved: 'nep recording ring' isn't running"))
             return
-        asked = {"seconds": action.seconds, "note": event_text(event.rule.condition, event.value)}
+        asked = {"seconds": action.recording_s, "note": event_text(event.rule.condition, event.value)}
         try:
             if self._save_client is None:
                 self._save_client = self._node.new_client(KEEP_SERVICE, timeout_s=SAVE_TIMEOUT_S)

@@ -17,7 +17,7 @@ from nep.cli.screen import console, print_status
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _, ngettext
 from nep.masters.master import is_running
-from nep.programs.web.access import Access, checked_origin, new_token, query_of
+from nep.programs.web.access import Access, checked_origin, new_token, path_with_token
 from nep.programs.web.server import DEFAULT_PORT, WebServer, WebSettings
 from nep.recordings.formats.channels import LiveChannels
 from nep.system.addresses import ANY_HOST, check_host, master_address, own_addresses
@@ -170,7 +170,7 @@ def _print_start_message(server: WebServer, terminal: Terminal, *, token_file: P
     """Print the URLs and the access rules, and report a missing master."""
     out = console(out=terminal)
     token = server.settings.access.token
-    query = query_of(token) if token and token_file is None else ""
+    query = path_with_token(token) if token and token_file is None else ""
     out.print(_("[bold green]●[/] web pages connect to [bold]{url}[/]").format(url=server.url + query))
     for host in _network_hosts(server.settings.listen):
         url = f"ws://{host}:{server.port}{query}"

@@ -38,10 +38,10 @@ class _Sender:
     name: str
     count: int = 0
     reason: str = ""
-    newest_at: float = 0.0
+    last_request_at: float = 0.0
 
 
-class BadRequests:
+class BadRequestCounter:
     """Counter of malformed requests by sender. Not thread-safe; used only by the master's thread.
 
     All times (`now`) are monotonic, in seconds.
@@ -64,7 +64,11 @@ class BadRequests:
         """
         known = self._senders.pop(sender, None) or _Sender(name)
         self._senders[sender] = known
-        known.name, known.reason, known.newest_at = name, escaped(shortened(reason, _MAX_REASON_LENGTH)), now
+        known.name, known.reason, known.last_request_at = (
+            name,
+            escaped(shortened(reason, _MAX_REASON_LENGTH)),
+            now,
+        )
         known.count += 1
         self._log_tokens = min(_LOG_BURST, self._log_tokens + (now - self._refilled_at) * _LOG_RATE_HZ)
         self._refilled_at = now
@@ -88,7 +92,7 @@ class BadRequests:
         shown = [
             (sender, known)
             for sender, known in reversed(self._senders.items())
-            if now - known.newest_at < _ALERT_DURATION_S
+            if now - known.last_request_at < _ALERT_DURATION_S
         ]
         alerts = [
             Alert(f"request:{sender}", _alert_text(known), _(_HINT)) for sender, known in shown[:_MAX_ALERTS]

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from nep.masters.registry import NodeClock, RegisteredNode, Registry
-from nep.messages.clocks import drift_ns, is_clock
+from nep.messages.clocks import drift_ns, is_plausible_clock
 
 ClockDifferences = dict[str, tuple[int, int]]
 """Clock differences by node id: (offset, uncertainty) in nanoseconds.
@@ -45,7 +45,7 @@ class Clocks:
         """
         if clock is not None and self.is_local(member):
             member.clock = _MASTER_CLOCK
-        elif clock is not None and len(clock) == 2 and is_clock(*clock):
+        elif clock is not None and len(clock) == 2 and is_plausible_clock(*clock):
             member.clock = NodeClock(*clock, now)
         else:
             member.clock = None

@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 
 _RETENTION_S = 60.0
 _MAX_PUBLISHERS = 1000
-_MAX_PER_TOPIC = 64
+_MAX_PUBLISHERS_PER_TOPIC = 64
 """Maximum number of publishers per topic. A program that restarts repeatedly adds one each time."""
 
 P = TypeVar("P")
@@ -52,7 +52,7 @@ class DepartedPublishers(Generic[P]):
         for name in self._names[publisher]:
             found = self._by_name.setdefault(name, {})
             found[publisher] = what
-            if len(found) > _MAX_PER_TOPIC:
+            if len(found) > _MAX_PUBLISHERS_PER_TOPIC:
                 del found[next(iter(found))]
         if len(self._names) > _MAX_PUBLISHERS:
             self._remove(next(iter(self._names)))

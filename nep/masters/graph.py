@@ -19,27 +19,27 @@ from typing import NamedTuple
 from nep.errors import WireError
 from nep.i18n import _
 from nep.masters.clocks import Clocks
-from nep.masters.leases import LEASE_S, Leases, RawRenewal
-from nep.masters.pattern_index import ALL_PATTERNS_MAX, PATTERNS_MAX
+from nep.masters.leases import LEASE_DURATION_S, Leases, RawRenewal
+from nep.masters.pattern_index import MAX_PATTERNS, MAX_PATTERNS_PER_NODE
 from nep.masters.registry import (
-    ALL_RECORDS_MAX,
     GUARANTEED_RECORDS,
-    RECORDS_MAX,
+    MAX_RECORDS,
+    MAX_RECORDS_PER_NODE,
     RegisteredNode,
     Registry,
     check_record,
     check_request,
     records_of,
 )
-from nep.masters.snapshot import GraphViewer
+from nep.masters.snapshot import GraphSnapshotBuilder
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
-    Added,
+    AddedReply,
     AddPublisher,
     AddSubscriber,
-    Done,
+    DoneReply,
     ExpectedSubscriber,
-    Found,
+    FoundReply,
     GraphReply,
     Join,
     Leave,
@@ -52,11 +52,11 @@ from nep.protocol.requests import (
     PublisherRemoved,
     Push,
     QueryGraph,
-    Refused,
+    RejectedReply,
     RemovePublisher,
     RemoveSubscriber,
     Renew,
-    Renewed,
+    RenewedReply,
     Reply,
     ReportAlerts,
     ReportMissing,
@@ -67,11 +67,11 @@ from nep.protocol.requests import (
     node_of,
 )
 
-_MAX_WAITING = 10_000
+_MAX_WAITING_REQUESTS = 10_000
 """Maximum number of requests that wait while the master is learning."""
 
 
-class Outgoing(NamedTuple):
+class OutgoingMessage(NamedTuple):
     """Message to send: a push to a node, or the reply to a request.
 
     Attributes:
@@ -87,11 +87,11 @@ class Outgoing(NamedTuple):
 
 def without_nodes(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
     """Return a copy of an answer that doesn't contain the given nodes, which have turned out to be dead."""
-    if isinstance(answer, Found) and node_ids:
+    if isinstance(answer, FoundReply) and node_ids:
         return replace(
             answer, publishers=tuple(each for each in answer.publishers if each.node_id not in node_ids)
         )
-    if isinstance(answer, Added) and node_ids:
+    if isinstance(answer, AddedReply) and node_ids:
         return replace(
             answer,
             expected=tuple(each for each in answer.expected if each.node_id not in node_ids),
@@ -104,7 +104,7 @@ def with_hosts(answer: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
     """Return a copy of an answer that contains the addresses at which the master serves other computers."""
     if not hosts:
         return answer
-    if isinstance(answer, Added | Found | Renewed):
+    if isinstance(answer, AddedReply | FoundReply | RenewedReply):
         return replace(answer, hosts=hosts)
     if isinstance(answer, GraphReply):
         return replace(answer, view=replace(answer.view, listens=hosts))
@@ -115,13 +115,18 @@ class Graph:
     """State of a master. See the module docstring. Not thread-safe: used only by the master's thread."""
 
     def __init__(
-        self, epoch: int, now: float, learn_s: float = 1.0, lease_s: float = LEASE_S, computer: str = ""
+        self,
+        epoch: int,
+        now: float,
+        learn_s: float = 1.0,
+        lease_s: float = LEASE_DURATION_S,
+        computer: str = "",
     ) -> None:
         self.epoch = epoch
         self._registry = Registry()
         self.clocks = Clocks(self._registry, computer)
         """Clocks of the nodes."""
-        self._viewer = GraphViewer(self._registry)
+        self._viewer = GraphSnapshotBuilder(self._registry)
         self._leases = Leases(self._registry, lease_s)
         self._learning_until = now + learn_s
         self._waiting: list[tuple[AddPublisher | AddSubscriber, int, str, bool]] = []
@@ -145,7 +150,7 @@ class Graph:
 
     def apply(
         self, request: Request, call: int, now: float, sender: str, *, is_foreign: bool = False
-    ) -> tuple[Outgoing, ...]:
+    ) -> tuple[OutgoingMessage, ...]:
         """Execute a request and return the messages to send. Errors become a `Refused` reply.
 
         Args:
@@ -156,32 +161,32 @@ class Graph:
             is_foreign: True if another program sent the request; such a program may only change its own
                 node. See `nep.masters.registry`.
         """
-        out: list[Outgoing] = []
+        out: list[OutgoingMessage] = []
         try:
             if is_foreign:
                 self._authorize(request, sender, out)
             if isinstance(request, AddPublisher | AddSubscriber) and now < self._learning_until:
-                if len(self._waiting) >= _MAX_WAITING:
+                if len(self._waiting) >= _MAX_WAITING_REQUESTS:
                     reason = _("too many programs are registering while the master starts; try again")
                     raise WireError(reason, code="busy")
                 self._waiting.append((request, call, sender, is_foreign))
                 return tuple(out)
             reply = self._execute(request, now, sender, out)
         except WireError as error:
-            reply = Refused(self.epoch, self.revision, error.reason, error.code)
-        out.append(Outgoing(sender, reply, call))
+            reply = RejectedReply(self.epoch, self.revision, error.reason, error.code)
+        out.append(OutgoingMessage(sender, reply, call))
         return tuple(out)
 
-    def tick(self, now: float) -> tuple[Outgoing, ...]:
+    def tick(self, now: float) -> tuple[OutgoingMessage, ...]:
         """Finish learning, expire leases, and adapt the renewal interval; return the messages to send."""
-        out: list[Outgoing] = []
+        out: list[OutgoingMessage] = []
         if self._waiting and now >= self._learning_until:
             waiting, self._waiting = self._waiting, []
             for request, call, sender, is_foreign in waiting:
                 out.extend(self.apply(request, call, now, sender, is_foreign=is_foreign))
-        out.extend(self.unregister_nodes(self._leases.expired(now)))
+        out.extend(self.unregister_nodes(self._leases.expired_node_ids(now)))
         self._registry.departed.tick(now)
-        self._leases.set_renew_interval(now)
+        self._leases.update_renew_interval(now)
         return tuple(out)
 
     @property
@@ -189,21 +194,23 @@ class Graph:
         """Time at which `tick` must be called to execute waiting requests, or None if no request waits."""
         return self._learning_until if self._waiting else None
 
-    def probes_for_overdue(self, now: float) -> tuple[Outgoing, ...]:
+    def probes_for_overdue(self, now: float) -> tuple[OutgoingMessage, ...]:
         """Return probe messages for nodes that have missed a renewal.
 
         A node to which its probe can't be sent is dead.
         """
-        return self.probes_for(self._leases.overdue(now))
+        return self.probes_for(self._leases.overdue_node_ids(now))
 
-    def probes_for(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
+    def probes_for(self, node_ids: Iterable[str]) -> tuple[OutgoingMessage, ...]:
         """Return probe messages for the given nodes; unregistered ones are ignored."""
         probe = Probe(self.epoch, self.revision)
-        return tuple(Outgoing(node_id, probe) for node_id in node_ids if node_id in self._registry.members)
+        return tuple(
+            OutgoingMessage(node_id, probe) for node_id in node_ids if node_id in self._registry.members
+        )
 
-    def unregister_nodes(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
+    def unregister_nodes(self, node_ids: Iterable[str]) -> tuple[OutgoingMessage, ...]:
         """Unregister nodes that are dead or don't respond; return the messages to send."""
-        out: list[Outgoing] = []
+        out: list[OutgoingMessage] = []
         for node_id in node_ids:
             member = self._registry.members.get(node_id)
             if member is not None:
@@ -239,7 +246,7 @@ class Graph:
 
     # ---- authorization
 
-    def _authorize(self, request: Request, sender: str, out: list[Outgoing]) -> None:
+    def _authorize(self, request: Request, sender: str, out: list[OutgoingMessage]) -> None:
         # Raises `WireError`. A proven owner of an id evicts an unproven one.
         check_request(request)
         if isinstance(request, Join | AddPublisher | AddSubscriber):
@@ -254,7 +261,7 @@ class Graph:
         if member is not None and member.route != sender and not isinstance(request, Renew):
             raise WireError(_("a node can only send requests for itself"), code="speaker")
 
-    def _authorize_node(self, node: NodeRecord, sender: str, out: list[Outgoing]) -> None:
+    def _authorize_node(self, node: NodeRecord, sender: str, out: list[OutgoingMessage]) -> None:
         if node.key and not is_proven(node):
             reason = _("the node id '{id}' doesn't match the node's key").format(id=node.id)
             raise WireError(reason, code="node-key")
@@ -277,7 +284,7 @@ class Graph:
             self._unregister_node(known, out, is_closed=False)
 
     def _authorize_record(
-        self, node: NodeRecord, record: PublisherRecord | SubscriberRecord, out: list[Outgoing]
+        self, node: NodeRecord, record: PublisherRecord | SubscriberRecord, out: list[OutgoingMessage]
     ) -> None:
         if record.number and not is_proven(node, record):
             raise WireError(
@@ -307,19 +314,19 @@ class Graph:
         member = registry.members.get(request.node.id)
         held = 0 if member is None else len(member.publishers) + len(member.subscribers)
         needed = count if isinstance(request, Join) else held + 1
-        if needed > max(held, RECORDS_MAX):
+        if needed > max(held, MAX_RECORDS_PER_NODE):
             raise WireError(
                 _("a node can have at most {RECORDS_MAX} publishers and subscribers").format(
-                    RECORDS_MAX=RECORDS_MAX
+                    RECORDS_MAX=MAX_RECORDS_PER_NODE
                 ),
                 code="limit",
             )
         self._check_pattern_limits(request)
         total = len(registry.publisher_owners) + len(registry.subscriber_owners)
-        if needed > max(held, GUARANTEED_RECORDS) and total + needed - held > ALL_RECORDS_MAX:
+        if needed > max(held, GUARANTEED_RECORDS) and total + needed - held > MAX_RECORDS:
             raise WireError(
                 _("the graph already has {ALL_RECORDS_MAX} publishers and subscribers, the maximum").format(
-                    ALL_RECORDS_MAX=ALL_RECORDS_MAX
+                    ALL_RECORDS_MAX=MAX_RECORDS
                 ),
                 code="limit",
             )
@@ -333,20 +340,20 @@ class Graph:
         held = {each.record.id for each in known if each.record.pattern}
         needed = new if isinstance(request, Join) else held | new
         total = len(self._registry.patterns) - len(held) + len(needed)
-        limit = max(len(self._registry.patterns), ALL_PATTERNS_MAX)
-        if len(needed) > max(len(held), PATTERNS_MAX) or total > limit:
+        limit = max(len(self._registry.patterns), MAX_PATTERNS)
+        if len(needed) > max(len(held), MAX_PATTERNS_PER_NODE) or total > limit:
             raise WireError(
                 _(
                     "a node can have at most {PATTERNS_MAX} subscribers with wildcards, and all nodes "
                     "together "
                     "at most {ALL_PATTERNS_MAX}"
-                ).format(PATTERNS_MAX=PATTERNS_MAX, ALL_PATTERNS_MAX=ALL_PATTERNS_MAX),
+                ).format(PATTERNS_MAX=MAX_PATTERNS_PER_NODE, ALL_PATTERNS_MAX=MAX_PATTERNS),
                 code="limit",
             )
 
     # ---- requests
 
-    def _execute(self, request: Request, now: float, sender: str, out: list[Outgoing]) -> Reply:
+    def _execute(self, request: Request, now: float, sender: str, out: list[OutgoingMessage]) -> Reply:
         if isinstance(request, AddPublisher):
             return self._add_publisher(request, now, sender, out)
         if isinstance(request, AddSubscriber):
@@ -361,12 +368,12 @@ class Graph:
             self._registry.report_alerts(request.source, request.alerts)
         elif not isinstance(request, Ping | Listen):
             self._update(request, out)
-        return Done(self.epoch, self.revision)
+        return DoneReply(self.epoch, self.revision)
 
     def _update(
         self,
         request: RemovePublisher | RemoveSubscriber | Leave | ReportMissing,
-        out: list[Outgoing],
+        out: list[OutgoingMessage],
     ) -> None:
         if isinstance(request, RemovePublisher):
             self._remove_publisher(request, out)
@@ -383,10 +390,12 @@ class Graph:
         self, node: NodeRecord, now: float, sender: str, *, is_managed: bool | None = None
     ) -> RegisteredNode:
         member = self._registry.add_node(node, now, is_managed=is_managed)
-        self._registry.bind(member, sender)
+        self._registry.bind_route(member, sender)
         return member
 
-    def _add_publisher(self, request: AddPublisher, now: float, sender: str, out: list[Outgoing]) -> Reply:
+    def _add_publisher(
+        self, request: AddPublisher, now: float, sender: str, out: list[OutgoingMessage]
+    ) -> Reply:
         check_record(request.publisher)
         member = self._register_node(request.node, now, sender)
         id = request.publisher.id
@@ -400,13 +409,15 @@ class Graph:
                 entry = ExpectedSubscriber(subscriber.record.id, other.node.id, other.node.name)
                 # hung for this node: not waited for. Hung for another node: waited for unless its renewal is
                 # late, too.
-                is_hung = member.node.id in other.hung_for or (
-                    other.hung_for and self._leases.is_late(other, now)
+                is_hung = member.node.id in other.unconnected_node_ids or (
+                    other.unconnected_node_ids and self._leases.is_late(other, now)
                 )
                 (hung if is_hung else expected).append(entry)
-        return Added(self.epoch, self.revision, tuple(expected), tuple(hung))
+        return AddedReply(self.epoch, self.revision, tuple(expected), tuple(hung))
 
-    def _add_subscriber(self, request: AddSubscriber, now: float, sender: str, out: list[Outgoing]) -> Reply:
+    def _add_subscriber(
+        self, request: AddSubscriber, now: float, sender: str, out: list[OutgoingMessage]
+    ) -> Reply:
         check_record(request.subscriber)
         member = self._register_node(request.node, now, sender)
         self._registry.add_subscriber(member, request.subscriber)
@@ -417,9 +428,9 @@ class Graph:
         )
         # if a probe can't be sent, the dead publisher is removed from the reply
         out.extend(self.probes_for(sorted({remote.node_id for remote in found} - {member.node.id})))
-        return Found(self.epoch, self.revision, found, pattern=request.subscriber.pattern)
+        return FoundReply(self.epoch, self.revision, found, pattern=request.subscriber.pattern)
 
-    def _join(self, request: Join, now: float, sender: str, out: list[Outgoing]) -> Reply:
+    def _join(self, request: Join, now: float, sender: str, out: list[OutgoingMessage]) -> Reply:
         records: tuple[PublisherRecord | SubscriberRecord, ...] = (*request.publishers, *request.subscribers)
         for record in records:
             check_record(record)
@@ -436,7 +447,7 @@ class Graph:
             self._register_publisher(member, publisher, out, is_new=False)
         topics = self._registry.topics_received_by(member)
         found = [remote for topic in sorted(topics) for remote in self._registry.publishers_of(topic)]
-        return Found(self.epoch, self.revision, tuple(found))
+        return FoundReply(self.epoch, self.revision, tuple(found))
 
     def _renew_member(self, renewal: RawRenewal, now: float, sender: str) -> RegisteredNode | None:
         # None: the node must join again.
@@ -469,7 +480,7 @@ class Graph:
             unknown = self._member_at(request.node_id, sender)
             if unknown is not None:
                 unknown.renewed_at = now
-            return Renewed(self.epoch, self.revision, again=True)
+            return RenewedReply(self.epoch, self.revision, again=True)
         topics: Iterable[str] = ()
         if self._registry.publishers_revision > request.revision:
             topics = sorted(self._registry.topics_received_by(member))
@@ -480,9 +491,13 @@ class Graph:
         )
         last_seqs, next_s = self._registry.last_seqs(member), self._leases.renew(member, now)
         clocks = self.clocks.differences(member, now)
-        return Renewed(self.epoch, self.revision, False, changed, last_seqs, next_s=next_s, clocks=clocks)
+        return RenewedReply(
+            self.epoch, self.revision, False, changed, last_seqs, next_s=next_s, clocks=clocks
+        )
 
-    def _unregister_publisher(self, member: RegisteredNode, publisher: int, out: list[Outgoing]) -> None:
+    def _unregister_publisher(
+        self, member: RegisteredNode, publisher: int, out: list[OutgoingMessage]
+    ) -> None:
         # For a publisher that did not unregister itself.
         last_seq = member.publishers[publisher].last_seq
         record = self._registry.remove_publisher(member.node.id, publisher)
@@ -490,7 +505,7 @@ class Graph:
             gone = PublisherRemoved(self.epoch, self.revision, record.id, record.topic, False, last_seq)
             self._notify_subscribers(record, gone, out)
 
-    def _remove_publisher(self, request: RemovePublisher, out: list[Outgoing]) -> None:
+    def _remove_publisher(self, request: RemovePublisher, out: list[OutgoingMessage]) -> None:
         member = self._registry.members.get(request.node_id)
         known = member.publishers.get(request.id) if member is not None else None
         if known is not None:
@@ -505,13 +520,15 @@ class Graph:
     # ---- notifying subscribers
 
     def _register_publisher(
-        self, member: RegisteredNode, record: PublisherRecord, out: list[Outgoing], *, is_new: bool
+        self, member: RegisteredNode, record: PublisherRecord, out: list[OutgoingMessage], *, is_new: bool
     ) -> None:
         if self._registry.add_publisher(member, record) and record.endpoints:
             remote = self._registry.remote_publisher(member, record)
             self._notify_subscribers(record, PublisherAdded(self.epoch, self.revision, remote, is_new), out)
 
-    def _unregister_node(self, member: RegisteredNode, out: list[Outgoing], *, is_closed: bool) -> None:
+    def _unregister_node(
+        self, member: RegisteredNode, out: list[OutgoingMessage], *, is_closed: bool
+    ) -> None:
         publishers = list(member.publishers.values())
         self._registry.remove_node(member.node.id)
         for publisher in publishers:
@@ -525,9 +542,9 @@ class Graph:
             )
             self._notify_subscribers(publisher.record, gone, out)
 
-    def _notify_subscribers(self, record: PublisherRecord, push: Push, out: list[Outgoing]) -> None:
+    def _notify_subscribers(self, record: PublisherRecord, push: Push, out: list[OutgoingMessage]) -> None:
         notified: set[str] = set()
         for member, _subscriber in self._registry.receivers_of(record.topic):
             if not member.is_managed and member.node.id not in notified:
                 notified.add(member.node.id)
-                out.append(Outgoing(member.node.id, push))
+                out.append(OutgoingMessage(member.node.id, push))

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Protocol
 
 from nep.errors import ClosedError, RequestRefusedError
 from nep.masters.graph import Graph
-from nep.masters.leases import LEASE_S
+from nep.masters.leases import LEASE_DURATION_S
 from nep.masters.process import Owner, is_running, listen, start_process
 from nep.masters.server import MasterServer
 from nep.protocol.graph_view import GraphView
-from nep.protocol.requests import GraphReply, Listen, QueryGraph, Refused, Reply, Request
+from nep.protocol.requests import GraphReply, Listen, QueryGraph, RejectedReply, Reply, Request
 from nep.system.addresses import master_address
 from nep.system.computer import computer_id
 from nep.system.forks import close_in_child, watch
@@ -66,7 +66,7 @@ class Master:
         *,
         attachments: Sequence[Attachment] = (),
         learn_s: float = 1.0,
-        lease_s: float = LEASE_S,
+        lease_s: float = LEASE_DURATION_S,
         owner_pid: int | None = None,
     ) -> None:
         self.address = master_address(address)
@@ -162,7 +162,7 @@ class Master:
             ClosedError: The master has stopped.
         """
         reply = self.submit(Listen(tuple(hosts)))
-        if isinstance(reply, Refused):
+        if isinstance(reply, RejectedReply):
             raise RequestRefusedError(reply.reason)
 
     def view(self) -> GraphView:

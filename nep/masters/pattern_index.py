@@ -12,9 +12,9 @@ from typing import Generic, TypeVar
 
 from nep.protocol.topic_pattern import matches
 
-PATTERNS_MAX = 100
+MAX_PATTERNS_PER_NODE = 100
 """Maximum number of one node's subscribers with patterns."""
-ALL_PATTERNS_MAX = 1_000
+MAX_PATTERNS = 1_000
 """Maximum number of all nodes' subscribers with patterns."""
 
 T = TypeVar("T")

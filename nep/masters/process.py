@@ -15,8 +15,17 @@ from nep.errors import MasterUnreachable, RequestRefusedError, WireError
 from nep.i18n import _
 from nep.protocol.encoding import decode_reply, encode_request
 from nep.protocol.graph_view import GraphView
-from nep.protocol.requests import Done, GraphReply, Listen, Ping, QueryGraph, Refused, Reply, Request
-from nep.system.addresses import MasterName, endpoint_of, master_address
+from nep.protocol.requests import (
+    DoneReply,
+    GraphReply,
+    Listen,
+    Ping,
+    QueryGraph,
+    RejectedReply,
+    Reply,
+    Request,
+)
+from nep.system.addresses import MasterNameResolver, endpoint_of, master_address
 from nep.system.descriptors import check_free_descriptors
 from nep.system.lazy_import import lazy_module
 
@@ -26,10 +35,10 @@ else:
     psutil = lazy_module("psutil")
 
 _DESCRIPTORS_NEEDED = 16
-_RETRY_S = 0.5
+_RETRY_INTERVAL_S = 0.5
 """Time in seconds after which an unanswered request is sent again."""
 
-_MAX_REQUEST_S = 4.0
+_MAX_REQUEST_TIMEOUT_S = 4.0
 
 NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """`creationflags` with which Windows doesn't open a console window for a subprocess; 0 on other systems."""
@@ -64,7 +73,7 @@ def is_running(address: str | None = None, timeout_s: float = 0.5) -> bool:
     """
     chosen = master_address(address)
     try:
-        return isinstance(_request(Ping(), chosen, timeout_s), Done)
+        return isinstance(_request(Ping(), chosen, timeout_s), DoneReply)
     except (MasterUnreachable, RequestRefusedError):
         return False
 
@@ -115,7 +124,7 @@ def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 
 def _request(request: Request, address: str, timeout_s: float) -> Reply:
     check_free_descriptors(_DESCRIPTORS_NEEDED, "a question to the master")
     started = time.monotonic()
-    name = MasterName(address, lambda _known: None)
+    name = MasterNameResolver(address, lambda _known: None)
     name.resolve(started)
     if not name.wait(timeout_s):
         raise MasterUnreachable(address, timeout_s, is_known=False)
@@ -127,7 +136,7 @@ def _request(request: Request, address: str, timeout_s: float) -> Reply:
         endpoint, body = endpoint_of(name.known), encode_request(request, 1)
         socket.connect(endpoint)
         _send(socket, endpoint, body)
-        deadline, again_at = time.monotonic() + timeout_s, time.monotonic() + _RETRY_S
+        deadline, again_at = time.monotonic() + timeout_s, time.monotonic() + _RETRY_INTERVAL_S
         while (left := deadline - time.monotonic()) > 0:
             if socket.poll(int(min(left, 0.1) * 1000) + 1):
                 reply = _decode_reply(socket.recv())
@@ -135,7 +144,7 @@ def _request(request: Request, address: str, timeout_s: float) -> Reply:
                     return reply
             # the request may have been sent to a master that was just stopping
             elif time.monotonic() >= again_at:
-                again_at += _RETRY_S
+                again_at += _RETRY_INTERVAL_S
                 _send(socket, endpoint, body)
         raise MasterUnreachable(address, timeout_s)
     finally:
@@ -159,7 +168,7 @@ def _decode_reply(body: bytes) -> Reply | None:
         raise RequestRefusedError(
             _("the master's reply can't be read: {reason}").format(reason=error.reason)
         ) from error
-    if isinstance(answer, Refused):
+    if isinstance(answer, RejectedReply):
         raise RequestRefusedError(answer.reason)
     return answer if isinstance(answer, Reply) else None
 
@@ -205,7 +214,7 @@ def start_process(
     while (left := began + timeout_s - time.monotonic()) > 0 and process.poll() is None:
         if is_running(chosen, min(asked_s, left)):
             return process
-        asked_s = min(2 * asked_s, _MAX_REQUEST_S)  # a busy computer may need longer for every reply
+        asked_s = min(2 * asked_s, _MAX_REQUEST_TIMEOUT_S)  # a busy computer may need longer for every reply
     if process.poll() is None:
         process.kill()
     process.wait(5.0)

@@ -9,7 +9,7 @@ _MIN_MESSAGES = 10
 _MIN_SPAN_S = 0.5
 
 
-class Meter:
+class TrafficMeter:
     """Calculator of messages and bytes per second from increasing counters.
 
     The window covers ten messages, but at most ten seconds, so that fast topics show changes

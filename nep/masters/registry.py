@@ -14,11 +14,11 @@ from nep.errors import NepError, WireError
 from nep.i18n import _
 from nep.masters.departed import DepartedPublishers
 from nep.masters.pattern_index import PatternIndex
-from nep.masters.rates import Meter
+from nep.masters.rates import TrafficMeter
 from nep.protocol.graph_view import Alert
 from nep.protocol.requests import (
-    COUNT_MAX,
-    RENEW_S,
+    MAX_COUNT,
+    RENEW_INTERVAL_S,
     AddPublisher,
     AddSubscriber,
     Join,
@@ -27,26 +27,26 @@ from nep.protocol.requests import (
     RemotePublisher,
     Request,
     SubscriberRecord,
-    as_count,
+    clamp_count,
 )
 from nep.protocol.wire import check_node_name, check_topic
 from nep.text import escaped, first_control, shortened
 
-RECORDS_MAX = 5_000
+MAX_RECORDS_PER_NODE = 5_000
 """Maximum number of publishers and subscribers of one node."""
-ALL_RECORDS_MAX = 20_000
+MAX_RECORDS = 20_000
 """Maximum number of publishers and subscribers of all nodes."""
 GUARANTEED_RECORDS = 100
 """Number of publishers and subscribers allowed per node even if the limit for all nodes is reached."""
-_ENDPOINTS_MAX = 32
-_PID_MAX = 2**32 - 1
-_NODE_ID = re.compile("[0-9a-f]{16}")
-_ENDPOINT = re.compile(
+_MAX_ENDPOINTS = 32
+_MAX_PID = 2**32 - 1
+_NODE_ID_PATTERN = re.compile("[0-9a-f]{16}")
+_ENDPOINT_PATTERN = re.compile(
     r"tcp://(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}(?:%[\w.-]{1,20})?\]):(\d{1,5})", re.ASCII
 )
-_NANOMSG_ENDPOINT = re.compile(r"nanomsg://[A-Za-z0-9._-]{1,253}:(\d{1,5})/(\d{1,5})", re.ASCII)
+_NANOMSG_ENDPOINT_PATTERN = re.compile(r"nanomsg://[A-Za-z0-9._-]{1,253}:(\d{1,5})/(\d{1,5})", re.ASCII)
 
-_MAX_HUNG = 100
+_MAX_UNCONNECTED_NODES = 100
 """Maximum number of ids in `RegisteredNode.hung_for`."""
 _MAX_CORES = 100_000.0
 _MAX_PROBLEM_LENGTH = 500
@@ -62,7 +62,7 @@ class RegisteredPublisher:
     """Registered publisher and its statistics."""
 
     record: PublisherRecord
-    meter: Meter = field(default_factory=Meter)
+    meter: TrafficMeter = field(default_factory=TrafficMeter)
     count: int = 0
     bytes: int = 0
     last_seq: int = 0
@@ -119,12 +119,12 @@ class RegisteredNode:
 
     node: NodeRecord
     renewed_at: float
-    renew_s: float = RENEW_S
+    renew_interval_s: float = RENEW_INTERVAL_S
     is_managed: bool = False
     route: str = ""
     publishers: dict[int, RegisteredPublisher] = field(default_factory=dict)
     subscribers: dict[int, RegisteredSubscriber] = field(default_factory=dict)
-    hung_for: set[str] = field(default_factory=set)
+    unconnected_node_ids: set[str] = field(default_factory=set)
     cpu_ratio: float | None = None
     sources: dict[int, RegisteredPublisher] = field(default_factory=dict)
     sources_version: int = -1
@@ -275,15 +275,15 @@ class Registry:
             member.is_managed = is_managed
         return member
 
-    def bind(self, member: RegisteredNode, route: str) -> None:
+    def bind_route(self, member: RegisteredNode, route: str) -> None:
         """Set the connection over which a node sends requests; "" for none."""
         if member.route != route:
-            self._unbind(member)
+            self._unbind_route(member)
             member.route = route
         if route:
             self.speaking[route] = member
 
-    def _unbind(self, member: RegisteredNode) -> None:
+    def _unbind_route(self, member: RegisteredNode) -> None:
         if self.speaking.get(member.route) is member:
             del self.speaking[member.route]
 
@@ -359,7 +359,7 @@ class Registry:
             self.remove_publisher(node_id, publisher)
         for subscriber in list(member.subscribers):
             self.remove_subscriber(node_id, subscriber)
-        self._unbind(member)
+        self._unbind_route(member)
         del self.members[node_id]
         self.revision += 1
 
@@ -399,7 +399,7 @@ class Registry:
                     return False
                 self.update_counts(publisher, count, size_bytes, now)
                 self.update_last_message(publisher, last_seq, stamp_ns)
-                publisher.errors = as_count(errors)
+                publisher.errors = clamp_count(errors)
                 if problem != publisher.problem:
                     self.update_problem(publisher, problem)
             for seen in subscriber_counts:
@@ -407,16 +407,16 @@ class Registry:
                 if {type(received), type(lost)} - {int, type(None)} or type(problem) is not str:
                     return False
                 self.update_subscriber(subscribers[seen["id"]], received, lost, problem)
-            member.renewed_at, member.cpu_ratio = now, _as_ratio(cpu_ratio)
-            if member.hung_for:
-                member.hung_for.clear()
+            member.renewed_at, member.cpu_ratio = now, _parse_ratio(cpu_ratio)
+            if member.unconnected_node_ids:
+                member.unconnected_node_ids.clear()
         except (LookupError, TypeError, AttributeError):  # a missing field or publisher, or not a map
             return False
         return True
 
     def update_counts(self, publisher: RegisteredPublisher, count: int, size_bytes: int, now: float) -> None:
         """Store a publisher's counters."""
-        count, size_bytes = as_count(count), as_count(size_bytes)
+        count, size_bytes = clamp_count(count), clamp_count(size_bytes)
         if count != publisher.count:
             publisher.changed_at = now
             publisher.count, publisher.bytes = count, size_bytes
@@ -429,8 +429,8 @@ class Registry:
         self, publisher: RegisteredPublisher, last_seq: int, last_stamp_ns: int | None
     ) -> None:
         """Store sequence number and time stamp of a publisher's newest message."""
-        publisher.last_seq = as_count(last_seq)
-        publisher.last_stamp_ns = None if last_stamp_ns is None else as_count(last_stamp_ns)
+        publisher.last_seq = clamp_count(last_seq)
+        publisher.last_stamp_ns = None if last_stamp_ns is None else clamp_count(last_stamp_ns)
 
     def update_problem(self, publisher: RegisteredPublisher, problem: str) -> None:
         """Store the problem that a publisher reports, or "" if the problem is solved."""
@@ -441,8 +441,8 @@ class Registry:
         self, subscriber: RegisteredSubscriber, received: int | None, lost: int | None, problem: str
     ) -> None:
         """Store a subscriber's statistics."""
-        received = None if received is None else as_count(received)
-        lost = None if lost is None else as_count(lost)
+        received = None if received is None else clamp_count(received)
+        lost = None if lost is None else clamp_count(lost)
         if problem:
             problem = escaped(shortened(problem, _MAX_PROBLEM_LENGTH))
         if received != subscriber.received or lost != subscriber.lost or problem != subscriber.problem:
@@ -465,8 +465,8 @@ class Registry:
             return
         for subscriber in subscribers:
             member = self._subscribing.get(known.record.topic, {}).get(subscriber)
-            if member is not None and len(member.hung_for) < _MAX_HUNG:
-                member.hung_for.add(reporter.node.id)
+            if member is not None and len(member.unconnected_node_ids) < _MAX_UNCONNECTED_NODES:
+                member.unconnected_node_ids.add(reporter.node.id)
 
     def report_alerts(self, source: str, alerts: tuple[Alert, ...]) -> None:
         """Replace the alerts that the attachment `source` reports."""
@@ -485,7 +485,7 @@ class Registry:
         self.publishers_revision = self._topic_revisions[topic] = self.revision
 
 
-def _as_ratio(value: float | None) -> float | None:
+def _parse_ratio(value: float | None) -> float | None:
     # None for an implausible CPU usage.
     return value if value is not None and 0.0 <= value < _MAX_CORES else None
 
@@ -502,13 +502,13 @@ def _discard(table: dict[str, dict[int, RegisteredNode]], topic: str, known: int
 
 def is_nanomsg_endpoint(endpoint: str) -> bool:
     """Return True for `nanomsg://HOST:PORT/PORT`, the endpoint of a nanomsg publisher."""
-    found = _NANOMSG_ENDPOINT.fullmatch(endpoint)
+    found = _NANOMSG_ENDPOINT_PATTERN.fullmatch(endpoint)
     return found is not None and all(1 <= int(port) <= 65535 for port in found.groups())
 
 
 def is_tcp_endpoint(endpoint: str) -> bool:
     """Return True for `tcp://HOST:PORT`, the endpoint of a ZeroMQ publisher."""
-    found = _ENDPOINT.fullmatch(endpoint)
+    found = _ENDPOINT_PATTERN.fullmatch(endpoint)
     return found is not None and 1 <= int(found.group(1)) <= 65535
 
 
@@ -547,7 +547,7 @@ def check_record(record: PublisherRecord | SubscriberRecord) -> None:
 
 
 def _check_node(node: NodeRecord) -> None:
-    if not _NODE_ID.fullmatch(node.id):
+    if not _NODE_ID_PATTERN.fullmatch(node.id):
         raise WireError(
             _("'{id}' isn't a node id; node ids have 16 hexadecimal digits").format(
                 id=shortened(node.id, 40)
@@ -563,16 +563,16 @@ def _check_node(node: NodeRecord) -> None:
     _check_text("generation", node.generation, 50)
     _check_text("key", node.key, 200)
     _check_text("computer", node.computer, 64)
-    if node.pid is not None and not 0 <= node.pid <= _PID_MAX:
+    if node.pid is not None and not 0 <= node.pid <= _MAX_PID:
         raise WireError(_("{pid} isn't a process id").format(pid=node.pid), code="pid")
-    if not 0 <= node.since_ns <= COUNT_MAX:
+    if not 0 <= node.since_ns <= MAX_COUNT:
         reason = _("{since_ns} isn't a valid start time of a node").format(since_ns=node.since_ns)
         raise WireError(reason, code="since")
 
 
 def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
     check_record(record)
-    if not 1 <= record.id <= COUNT_MAX:
+    if not 1 <= record.id <= MAX_COUNT:
         raise WireError(
             _("{id} isn't the id of a publisher or subscriber; it must be from 1 to 2^63-1").format(
                 id=record.id
@@ -582,10 +582,10 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
     _check_text("type", record.msg_type, 200)
     if isinstance(record, PublisherRecord):
         _check_text("codec", record.codec, 50)
-        if len(record.endpoints) > _ENDPOINTS_MAX:
+        if len(record.endpoints) > _MAX_ENDPOINTS:
             raise WireError(
                 _("a publisher has {count} endpoints; at most {most} are allowed").format(
-                    count=len(record.endpoints), most=_ENDPOINTS_MAX
+                    count=len(record.endpoints), most=_MAX_ENDPOINTS
                 ),
                 code="endpoint-count",
             )

@@ -13,19 +13,19 @@ from nep.errors import AddressInUseError
 from nep.system.addresses import endpoint_of
 from nep.system.descriptors import check_free_descriptors
 
-REQUEST_MAX_BYTES = 4 * 2**20
+MAX_REQUEST_BYTES = 4 * 2**20
 """Maximum size of a part in bytes; a peer that sends more is disconnected."""
-UNREAD_MAX_BYTES = 32 * 2**20
+MAX_UNREAD_BYTES = 32 * 2**20
 """Maximum number of unread bytes per connection in large bodies (4 kB and more)."""
 _LARGE_BODY_BYTES = 4096
 _RECEIVE_QUEUE_LENGTH = 16
 """Receive queue length per connection; further requests wait at the sender."""
 _DONTWAIT, _SNDMORE = int(zmq.DONTWAIT), int(zmq.SNDMORE)
 _DESCRIPTORS_NEEDED = 16
-_RECONNECT_S = 0.5
+_RECONNECT_TIMEOUT_S = 0.5
 """Time in seconds in which a disconnected node may reconnect before it is probed."""
 _SRCFD = int(zmq.SRCFD)
-_EVENT = struct.Struct("=HI")
+_MONITOR_EVENT = struct.Struct("=HI")
 """Layout of a monitor event of libzmq: kind of event, and number of the connection."""
 
 
@@ -56,7 +56,7 @@ class MasterRouter:
         self.socket.setsockopt(zmq.SNDHWM, 10_000)
         self.socket.setsockopt(zmq.RCVHWM, _RECEIVE_QUEUE_LENGTH)
         self.socket.copy_threshold = _LARGE_BODY_BYTES
-        self.socket.setsockopt(zmq.MAXMSGSIZE, REQUEST_MAX_BYTES)
+        self.socket.setsockopt(zmq.MAXMSGSIZE, MAX_REQUEST_BYTES)
         try:
             self.socket.bind(endpoint_of(address))
         except zmq.ZMQError as error:
@@ -86,7 +86,7 @@ class MasterRouter:
         self._record_connection(frames[0], parts[0])
         return parts
 
-    def peer(self) -> str:
+    def peer_address(self) -> str:
         """Return the address from which the last request came, or "" if it is unknown."""
         try:
             return "" if self._last_frame is None else str(self._last_frame.get("Peer-Address"))
@@ -117,10 +117,10 @@ class MasterRouter:
                 event = self._monitor.recv_multipart(_DONTWAIT)[0]
             except zmq.Again:
                 break
-            sender = self._senders.pop(_EVENT.unpack(event)[1], None)
+            sender = self._senders.pop(_MONITOR_EVENT.unpack(event)[1], None)
             if sender is not None:
                 self._ended.setdefault(sender, now)
-        ended = [sender for sender, at in self._ended.items() if now - at >= _RECONNECT_S]
+        ended = [sender for sender, at in self._ended.items() if now - at >= _RECONNECT_TIMEOUT_S]
         for sender in ended:
             del self._ended[sender]
         return ended
@@ -137,7 +137,7 @@ class MasterRouter:
                 self._send(body, _DONTWAIT)
                 return True
             unread = [each for each in self._unread.get(to, ()) if not each[0].done]
-            if sum(size for _tracker, size in unread) + len(body) > UNREAD_MAX_BYTES and unread:
+            if sum(size for _tracker, size in unread) + len(body) > MAX_UNREAD_BYTES and unread:
                 return True
             self._send(to, _SNDMORE | _DONTWAIT)
             tracker = cast("zmq.MessageTracker", self._send(body, _DONTWAIT, False, True))

@@ -15,21 +15,21 @@ import zmq
 
 from nep.errors import ClosedError, NepError, WaitTimeoutError, WireError
 from nep.i18n import _
-from nep.masters.bad_requests import BadRequests, describe_sender
-from nep.masters.graph import Graph, Outgoing, with_hosts, without_nodes
-from nep.masters.leases import encode_renewed, is_renewal, read_renewal
+from nep.masters.bad_requests import BadRequestCounter, describe_sender
+from nep.masters.graph import Graph, OutgoingMessage, with_hosts, without_nodes
+from nep.masters.leases import encode_renewed, is_renewal, parse_renewal
 from nep.masters.listen_addresses import ListenAddresses
 from nep.masters.process import Owner
 from nep.masters.router import MasterRouter
 from nep.protocol.encoding import ReceivedRequest, ReplyEncoder, decode_request, gc_disabled
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
-    Done,
+    DoneReply,
     Listen,
     QueryGraph,
-    Refused,
+    RejectedReply,
     Renew,
-    Renewed,
+    RenewedReply,
     Reply,
     ReportAlerts,
     Request,
@@ -40,13 +40,13 @@ from nep.system.log_rarely import is_logged
 from nep.system.wakeup import Waker
 
 _logger = logging.getLogger("nep.master")
-_TICK_S = 0.25
+_TICK_INTERVAL_S = 0.25
 _MIN_SUSPENSION_S = 1.0
 """Pause in seconds (suspended computer, large request) after which the next tick expires no node."""
 _MAX_COLLECT_MS = 10
 _NODES_PER_MS = 50
 """Number of nodes for each millisecond in which renewals are collected, up to `_MAX_COLLECT_MS`."""
-_ADDRESS_CHECK_S = 2.0
+_ADDRESS_CHECK_INTERVAL_S = 2.0
 """Interval in seconds for checking this computer's addresses while other computers are served."""
 
 
@@ -95,7 +95,7 @@ class MasterServer:
         self._pending: dict[int, Submission] = {}
         self._calls = 0
         self._encoder = ReplyEncoder()
-        self._bad_requests = BadRequests()
+        self._bad_requests = BadRequestCounter()
         self._renewals: list[tuple[bytes, bytes, int]] = []
         """Renewals without a reply yet: sender, body, and time of receipt (ns since 1970)."""
         self._notify_at = 0.0
@@ -164,7 +164,7 @@ class MasterServer:
                 due = self._graph.learning_end
                 is_due = now >= tick_at or (due is not None and now >= due)
                 if is_due:
-                    tick_at = now + _TICK_S
+                    tick_at = now + _TICK_INTERVAL_S
                 try:
                     self._run_once(waker, is_due=is_due)
                 except Exception as error:  # noqa: BLE001 - logged; one program must not stop the master
@@ -221,7 +221,7 @@ class MasterServer:
         if self._owner is not None and self._owner.is_gone() and not self._is_needed():
             self._closing = True
         if self._listening.hosts and now >= self._follow_at:
-            self._follow_at = now + _ADDRESS_CHECK_S
+            self._follow_at = now + _ADDRESS_CHECK_INTERVAL_S
             self._report_lost_addresses()
 
     def _report_lost_addresses(self) -> None:
@@ -237,10 +237,10 @@ class MasterServer:
             submission = self._submitted.popleft()
             self._calls -= 1  # negative numbers are distinct from calls of nodes
             self._pending[self._calls] = submission
-            self._apply(ReceivedRequest(self._calls, submission.request), "")
+            self._apply_request(ReceivedRequest(self._calls, submission.request), "")
 
     def _serve_router(self) -> None:
-        enough_at = time.monotonic() + _TICK_S
+        enough_at = time.monotonic() + _TICK_INTERVAL_S
         for _round in range(1000):  # then other work
             if time.monotonic() > enough_at:
                 return
@@ -255,19 +255,19 @@ class MasterServer:
                 self._renewals.append((sender, body[0], time.time_ns()))
             else:
                 self._reply_to_renewals()  # in order of arrival
-                self._serve(sender, body, self._port.peer())
+                self._serve_request(sender, body, self._port.peer_address())
 
     def _reply_to_renewals(self) -> None:
         # All replies are sent together, so that libzmq's thread wakes once.
         renewals, self._renewals = self._renewals, []
-        answers = [self._renew_safely(*renewal) for renewal in renewals]
+        answers = [self._try_renew(*renewal) for renewal in renewals]
         for (sender, body, _came_ns), answer in zip(renewals, answers, strict=True):
             if answer is None:
-                self._serve(sender, [body], "")
+                self._serve_request(sender, [body], "")
             elif not self._port.send(sender, answer):
                 self._send(self._graph.unregister_nodes(self._node_ids_at(_route_of(sender))))
 
-    def _renew_safely(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
+    def _try_renew(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
         # If this fails for a renewal, the general path handles it and replies.
         try:
             return self._renew_fast(sender, body, came_ns)
@@ -277,7 +277,7 @@ class MasterServer:
 
     def _renew_fast(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
         # None if it is not a usual renewal.
-        renewal = read_renewal(body)
+        renewal = parse_renewal(body)
         if renewal is None:
             return None
         graph = self._graph
@@ -294,31 +294,31 @@ class MasterServer:
             graph.revision,
             last_seqs,
             self._listening.hosts,
-            member.renew_s,
+            member.renew_interval_s,
             times=times,
             clocks=clocks,
         )
 
-    def _serve(self, sender: bytes, body: list[bytes], peer: str) -> None:
+    def _serve_request(self, sender: bytes, body: list[bytes], peer: str) -> None:
         asked = decode_request(body[-1] if len(body) == 1 else b"")
         if isinstance(asked.request, Listen) and self._listening.hosts and peer != "127.0.0.1":
             reason = _("this setting can be changed only on the master's own computer")
             asked = ReceivedRequest(asked.call, WireError(reason, code="listen"))
         name = _route_of(sender)
-        reason = self._apply(asked, name)
+        reason = self._apply_request(asked, name)
         if reason:
             member = self._graph.node_at(name)
             node_id, node_name = ("", "") if member is None else (member.node.id, member.node.name)
             self._bad_requests.add(*describe_sender(node_id, node_name, peer), reason, time.monotonic())
 
-    def _apply(self, asked: ReceivedRequest, sender: str) -> str:
+    def _apply_request(self, asked: ReceivedRequest, sender: str) -> str:
         # An empty sender means this process. Returns the reason of a rejection, or "".
-        request, outgoing = asked.request, tuple[Outgoing, ...]()
+        request, outgoing = asked.request, tuple[OutgoingMessage, ...]()
         try:
             if isinstance(request, WireError):
-                outgoing = (Outgoing(sender, self._refusal(request), asked.call),)
+                outgoing = (OutgoingMessage(sender, self._create_rejection(request), asked.call),)
             elif isinstance(request, Listen):
-                outgoing = (Outgoing(sender, self._listen(request), asked.call),)
+                outgoing = (OutgoingMessage(sender, self._listen(request), asked.call),)
             else:
                 now, is_foreign = time.monotonic(), bool(sender)
                 with gc_disabled() if isinstance(request, QueryGraph) else nullcontext():
@@ -330,17 +330,17 @@ class MasterServer:
                 return _rejection_reason(outgoing)
         except Exception as error:  # noqa: BLE001 - logged; one request must not stop the master
             self._log_failure(error, "a request")
-            outgoing = (Outgoing(sender, self._refusal(), asked.call),)
+            outgoing = (OutgoingMessage(sender, self._create_rejection(), asked.call),)
         self._send(outgoing)
         return request.reason if isinstance(request, WireError) else ""
 
-    def _with_times(self, outgoing: Sequence[Outgoing], came_ns: int) -> tuple[Outgoing, ...]:
+    def _with_times(self, outgoing: Sequence[OutgoingMessage], came_ns: int) -> tuple[OutgoingMessage, ...]:
         # Adds receipt and reply time to replies of a renewal.
         return tuple(
             each._replace(
                 body=replace(each.body, times=self._graph.clocks.renewal_timestamps(member, came_ns))
             )
-            if isinstance(each.body, Renewed) and (member := self._graph.node_at(each.to)) is not None
+            if isinstance(each.body, RenewedReply) and (member := self._graph.node_at(each.to)) is not None
             else each
             for each in outgoing
         )
@@ -349,11 +349,11 @@ class MasterServer:
         try:
             self._listening.serve(request.hosts)
         except NepError as error:
-            return Refused(self._graph.epoch, self._graph.revision, str(error), "listen")
+            return RejectedReply(self._graph.epoch, self._graph.revision, str(error), "listen")
         self._report_lost_addresses()
-        return Done(self._graph.epoch, self._graph.revision)
+        return DoneReply(self._graph.epoch, self._graph.revision)
 
-    def _send(self, outgoing: Sequence[Outgoing]) -> None:
+    def _send(self, outgoing: Sequence[OutgoingMessage]) -> None:
         # Nodes found dead on the way are dropped.
         dead: set[str] = set()
         for each in outgoing:
@@ -364,13 +364,13 @@ class MasterServer:
         if dead:
             self._send(self._graph.unregister_nodes(dead))
 
-    def _reply_to_submission(self, each: Outgoing) -> None:
+    def _reply_to_submission(self, each: OutgoingMessage) -> None:
         submission = self._pending.pop(each.call or 0, None)
         if submission is not None:
             submission.reply = with_hosts(each.body, self._listening.hosts)  # type: ignore[assignment]
             submission.done.set()
 
-    def _deliver(self, each: Outgoing, dead: frozenset[str]) -> bool:
+    def _deliver(self, each: OutgoingMessage, dead: frozenset[str]) -> bool:
         # False if the connection is gone.
         route = each.to
         if each.call is None:
@@ -385,18 +385,18 @@ class MasterServer:
             self._log_failure(error, "an answer")
             if each.call is None:
                 return True
-            body = self._encoder.encode(self._refusal(), each.call)
+            body = self._encoder.encode(self._create_rejection(), each.call)
         return self._port.send(route.encode("utf-8", "surrogateescape"), body)
 
     def _node_ids_at(self, route: str) -> tuple[str, ...]:
         member = self._graph.node_at(route)
         return () if member is None else (member.node.id,)
 
-    def _refusal(self, error: WireError | None = None) -> Refused:
+    def _create_rejection(self, error: WireError | None = None) -> RejectedReply:
         error = error or WireError(
             _("the master failed to execute the request; see its log"), code="internal"
         )
-        return Refused(self._graph.epoch, self._graph.revision, error.reason, error.code)
+        return RejectedReply(self._graph.epoch, self._graph.revision, error.reason, error.code)
 
     def _notify_listeners(self, now: float) -> None:
         # Rate-limited, so that notifying takes at most a quarter of the time when many nodes join.
@@ -415,8 +415,8 @@ class MasterServer:
         self._waker.close()
 
 
-def _rejection_reason(outgoing: Sequence[Outgoing]) -> str:
-    return next((each.body.reason for each in outgoing if isinstance(each.body, Refused)), "")
+def _rejection_reason(outgoing: Sequence[OutgoingMessage]) -> str:
+    return next((each.body.reason for each in outgoing if isinstance(each.body, RejectedReply)), "")
 
 
 def _route_of(sender: bytes) -> str:

@@ -19,14 +19,14 @@ from nep.protocol.graph_view import (
     SubscriberInfo,
     TopicInfo,
 )
-from nep.protocol.requests import as_count
+from nep.protocol.requests import clamp_count
 from nep.protocol.service_wire import SURVEY_PREFIX, service_of
 
 _MAX_NAMES = 5
 """Maximum number of program names in an alert."""
 
 
-class GraphViewer:
+class GraphSnapshotBuilder:
     """Factory of graph snapshots. Unchanged parts are the same objects as in the previous snapshot."""
 
     def __init__(self, registry: Registry) -> None:
@@ -64,7 +64,7 @@ class GraphViewer:
                     self._alerts[name] = tuple(_topic_alerts(name, publishing, subscribing))
         nodes = {each.node.id: _node_info(each) for each in registry.members.values()}
         topics = {name: topic for name in names if (topic := known[name]) is not None}
-        services = {each.name: each for each in (_service(name, registry) for name in served)}
+        services = {each.name: each for each in (_service_info(name, registry) for name in served)}
         alerts = (
             *self._all_alerts(),
             *_service_alerts(services, registry),
@@ -124,7 +124,7 @@ def _topic_info(
     rate = bandwidth = None
     stamp_ns: int | None = None
     is_alone = len(publishing) < 2
-    counted = publishing if is_alone else _rate_publishers(publishing)
+    counted = publishing if is_alone else _publishers_for_rate(publishing)
     publishers, subscribers = [], []
     for entry in publishing:
         member, publisher = entry
@@ -140,7 +140,7 @@ def _topic_info(
     for member, subscriber in subscribing:
         subscribers.append(_subscriber_info(member, subscriber))
         if subscriber.lost is not None:
-            lost = as_count((lost or 0) + subscriber.lost)
+            lost = clamp_count((lost or 0) + subscriber.lost)
             received += subscriber.received or 0
     every_field: dict[str, object] = {
         "name": name,
@@ -157,7 +157,7 @@ def _topic_info(
     return create_frozen(TopicInfo, every_field)
 
 
-def _rate_publishers(
+def _publishers_for_rate(
     publishing: list[tuple[RegisteredNode, RegisteredPublisher]],
 ) -> list[tuple[RegisteredNode, RegisteredPublisher]]:
     # Gateway publishers repeat messages of original programs, and would count them twice.
@@ -194,7 +194,7 @@ def _subscriber_info(member: RegisteredNode, subscriber: RegisteredSubscriber) -
     return create_frozen(SubscriberInfo, every_field)
 
 
-def _service(topic: str, registry: Registry) -> ServiceInfo:
+def _service_info(topic: str, registry: Registry) -> ServiceInfo:
     publishing, subscribing = registry.publishers_with_nodes(topic), registry.subscribers_of(topic)
     servers = tuple(
         ServerInfo(each.record.id, member.node.id, each.record.endpoints, each.count, each.errors, each.bytes)
@@ -210,8 +210,8 @@ def _service(topic: str, registry: Registry) -> ServiceInfo:
         kinds[0],
         servers,
         clients,
-        as_count(sum(each.calls for each in servers)),
-        as_count(sum(each.errors for each in servers)),
+        clamp_count(sum(each.calls for each in servers)),
+        clamp_count(sum(each.errors for each in servers)),
     )
 
 
@@ -224,7 +224,7 @@ def _service_alerts(services: Mapping[str, ServiceInfo], registry: Registry) -> 
                 _("The service “{service}” has {count} servers: {nodes}").format(
                     service=name,
                     count=len(servers),
-                    nodes=_names(registry.members[each.node_id].node.name for each in servers),
+                    nodes=_format_names(registry.members[each.node_id].node.name for each in servers),
                 ),
                 _(
                     "Clients call the first server and use another one only when it stops. Rename one of the "
@@ -242,9 +242,9 @@ def _original_client_alerts(services: Mapping[str, ServiceInfo], registry: Regis
             yield Alert(
                 f"service:{name}:original",
                 _("{clients} of the original NEP can't call the service “{service}” of {servers}").format(
-                    clients=_names(registry.members[each.node_id].node.name for each in clients),
+                    clients=_format_names(registry.members[each.node_id].node.name for each in clients),
                     service=name,
-                    servers=_names(registry.members[each.node_id].node.name for each in servers),
+                    servers=_format_names(registry.members[each.node_id].node.name for each in servers),
                 ),
                 _(
                     "Use a fixed address in both programs: nep.client(ip, port) in the client, "
@@ -274,11 +274,12 @@ def _name_alerts(registry: Registry) -> Iterator[Alert]:
 
 def _missing_alerts(registry: Registry) -> Iterator[Alert]:
     for member in registry.members.values():
-        if member.hung_for:
+        if member.unconnected_node_ids:
             yield Alert(
                 f"missing:{member.node.id}",
                 _("“{node}” doesn't respond to {others}").format(
-                    node=member.node.name, others=_names(_names_of(registry, member.hung_for))
+                    node=member.node.name,
+                    others=_format_names(_names_of(registry, member.unconnected_node_ids)),
                 ),
                 _("It may be busy or stopped in a debugger. Messages published in the meantime may be lost."),
             )
@@ -295,7 +296,7 @@ def _topic_alerts(
             types.setdefault(publisher.record.msg_type, []).append(member.node.name)
     if len(types) > 1:
         parts = [
-            _("{nodes} as “{kind}”").format(nodes=_names(names), kind=kind)
+            _("{nodes} as “{kind}”").format(nodes=_format_names(names), kind=kind)
             for kind, names in sorted(types.items())
         ]
         yield Alert(
@@ -333,7 +334,7 @@ def _names_of(registry: Registry, node_ids: Iterable[str]) -> set[str]:
     }
 
 
-def _names(nodes: Iterable[str]) -> str:
+def _format_names(nodes: Iterable[str]) -> str:
     # Shortened list of names.
     unique = sorted(set(nodes))
     names = ", ".join(f"“{name}”" for name in unique[:_MAX_NAMES])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-OFFSET_MAX_NS = 2**62
+MAX_OFFSET_NS = 2**62
 """Maximum plausible clock offset in nanoseconds: 146 years."""
-UNCERTAINTY_MAX_NS = 10_000_000_000
+MAX_UNCERTAINTY_NS = 10_000_000_000
 """Maximum uncertainty in nanoseconds with which an offset is still useful."""
 _DRIFT_DIVISOR = 20_000
 """Reciprocal of the maximum drift between two clocks that aren't synchronized: 50 µs per second."""
@@ -18,9 +18,9 @@ def drift_ns(elapsed_ns: float) -> int:
     return int(max(0.0, elapsed_ns)) // _DRIFT_DIVISOR
 
 
-def is_clock(offset_ns: int, uncertainty_ns: int) -> bool:
+def is_plausible_clock(offset_ns: int, uncertainty_ns: int) -> bool:
     """Return True if an offset and uncertainty are plausible. Untrusted peers may send any number."""
-    return abs(offset_ns) <= OFFSET_MAX_NS and 0 <= uncertainty_ns <= UNCERTAINTY_MAX_NS
+    return abs(offset_ns) <= MAX_OFFSET_NS and 0 <= uncertainty_ns <= MAX_UNCERTAINTY_NS
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ from nep.errors import DecodeError, EncodeError, did_you_mean
 from nep.i18n import _
 from nep.messages import image_codec
 from nep.messages.encoded import Encoded, new_encoded
-from nep.messages.nesting import MAX_LEVELS, json_is_too_deep, packed_is_too_deep, too_deep_reason
+from nep.messages.nesting import MAX_LEVELS, is_json_too_deep, is_packed_too_deep, too_deep_reason
 from nep.messages.packing import pack, unpack
 
 __all__ = [
@@ -122,7 +122,7 @@ def _encode_json(payload: object) -> Encoded:
         is_deep = isinstance(error, RecursionError) or "Recursion limit" in str(error)
         reason = too_deep_reason() if is_deep else str(error.__cause__ or error) or _("unsupported value")
         raise EncodeError("json", type(payload).__name__, reason) from error
-    if json_is_too_deep(data):
+    if is_json_too_deep(data):
         raise EncodeError("json", type(payload).__name__, too_deep_reason())
     return Encoded(data)
 
@@ -135,13 +135,13 @@ def _encode_json_fast(payload: object) -> bytes:
 
 
 def _check_depth(data: bytes, payload: object) -> bytes:
-    if len(data) > 2 * MAX_LEVELS and json_is_too_deep(data):
+    if len(data) > 2 * MAX_LEVELS and is_json_too_deep(data):
         raise EncodeError("json", type(payload).__name__, too_deep_reason())
     return data
 
 
 def _decode_json(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
-    if len(data) > 2 * MAX_LEVELS and json_is_too_deep(data):
+    if len(data) > 2 * MAX_LEVELS and is_json_too_deep(data):
         raise DecodeError("json", len(data), too_deep_reason())
     try:
         return orjson.loads(data)
@@ -228,7 +228,7 @@ def _encode_msgpack(payload: object) -> Encoded:
         raise EncodeError(
             "msgpack", type(payload).__name__, too_deep_reason() if is_deep else str(error)
         ) from error
-    if packed_is_too_deep(data, payload):
+    if is_packed_too_deep(data, payload):
         raise EncodeError("msgpack", type(payload).__name__, too_deep_reason())
     return Encoded(data)
 
@@ -239,7 +239,7 @@ def _decode_msgpack(data: bytes | memoryview, _extension: Mapping[str, object]) 
     except ValueError as error:
         is_deep = isinstance(error.__cause__, msgpack.StackError)
         raise DecodeError("msgpack", len(data), too_deep_reason() if is_deep else str(error)) from error
-    if packed_is_too_deep(data, value):
+    if is_packed_too_deep(data, value):
         raise DecodeError("msgpack", len(data), too_deep_reason())
     return value
 

@@ -13,7 +13,7 @@ Path = tuple[str | int, ...]
 MISSING = object()
 """Value that `value_at` returns for a missing field."""
 
-_STEP = re.compile(r"""\.?(?:\[(-?\d{1,19})\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
+_STEP_PATTERN = re.compile(r"""\.?(?:\[(-?\d{1,19})\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
 _MAX_DEPTH = 40
 _PLAIN_NAME = re.compile(r"[^.\[\]\"\s]+")
 
@@ -25,7 +25,7 @@ def parse_path(text: str) -> Path:
     steps: list[str | int] = []
     at = 0
     while at < len(text):
-        found = _STEP.match(text, at)
+        found = _STEP_PATTERN.match(text, at)
         if found is None or (text[at] != "." and text[at] != "[" and at > 0):
             raise NepError(
                 _(

@@ -42,8 +42,8 @@ _NAMED_LAYOUTS = {
     "rgba16": ("<u2", 4),
 }  # fmt: skip
 _DTYPES = {"8U": "u1", "8S": "i1", "16U": "<u2", "16S": "<i2", "32S": "<i4", "32F": "<f4", "64F": "<f8"}
-_LAYOUT = re.compile(r"(8U|8S|16U|16S|32S|32F|64F)C([1-4])")
-_ENCODINGS = {value: key for key, value in _NAMED_LAYOUTS.items() if not key.startswith("rgb")}
+_LAYOUT_PATTERN = re.compile(r"(8U|8S|16U|16S|32S|32F|64F)C([1-4])")
+_ENCODINGS_BY_LAYOUT = {value: key for key, value in _NAMED_LAYOUTS.items() if not key.startswith("rgb")}
 _DTYPE_NAMES = lazy("uint8, int8, uint16, int16, int32, float32 or float64")
 
 
@@ -145,23 +145,23 @@ def encode(payload: object) -> Encoded:
         raise EncodeError("image", kind, _(_INSTALL_HINT)) from error
 
 
-def _channels(frame: NDArray[Any]) -> int:
+def _channel_count(frame: NDArray[Any]) -> int:
     return 1 if frame.ndim == 2 else int(frame.shape[2])
 
 
 def _encode_default(frame: NDArray[Any], quality: int) -> Encoded:
     # The module docstring describes the default format.
-    if frame.dtype.name == "uint8" and _channels(frame) in (1, 3):
+    if frame.dtype.name == "uint8" and _channel_count(frame) in (1, 3):
         return _encode_jpeg(frame, quality)
     return _encode_png(frame) if _can_encode_png(frame) else _encode_raw(frame)
 
 
 def _can_encode_png(frame: NDArray[Any]) -> bool:
-    return frame.dtype.name in ("uint8", "uint16") and _channels(frame) in (1, 3, 4)
+    return frame.dtype.name in ("uint8", "uint16") and _channel_count(frame) in (1, 3, 4)
 
 
 def _encode_jpeg(frame: NDArray[Any], quality: int) -> Encoded:
-    if frame.dtype.name != "uint8" or _channels(frame) not in (1, 3):
+    if frame.dtype.name != "uint8" or _channel_count(frame) not in (1, 3):
         reason = _("a JPEG image needs 'uint8' and one or three channels; choose 'png', 'raw' or 'auto'")
         raise EncodeError("image", type(frame).__name__, reason)
     return _encode_file(frame, "jpeg", [1, quality])  # 1 = IMWRITE_JPEG_QUALITY
@@ -211,7 +211,7 @@ def _encode_file(frame: NDArray[Any], kind: str, options: list[int]) -> Encoded:
 def _encode_raw(frame: NDArray[Any]) -> Encoded:
     shape = _shape(frame)
     numbers = _dtype_name(frame.dtype)
-    encoding = _ENCODINGS.get((numbers, shape[2]))
+    encoding = _ENCODINGS_BY_LAYOUT.get((numbers, shape[2]))
     if encoding is None:
         encoding = f"{next(name for name, each in _DTYPES.items() if each == numbers)}C{shape[2]}"
     # not copied: a publisher copies it once, into shared memory if possible
@@ -336,7 +336,7 @@ def raw_layout(encoding: object) -> RawLayout | None:
     named = _NAMED_LAYOUTS.get(encoding)
     if named is not None:
         return RawLayout(*named, is_red_first=encoding.startswith("rgb"))
-    found = _LAYOUT.fullmatch(encoding)
+    found = _LAYOUT_PATTERN.fullmatch(encoding)
     return None if found is None else RawLayout(_DTYPES[found[1]], int(found[2]))
 
 
@@ -361,7 +361,7 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
     return flat.reshape((height, width) if layout.channels == 1 else (height, width, layout.channels))
 
 
-def picture_info(data: bytes | memoryview) -> dict[str, object] | None:
+def image_info(data: bytes | memoryview) -> dict[str, object] | None:
     """Return the message extension for a JPEG or PNG file; None if `decode` would reject the file."""
     try:
         return parse_header(data).extension

@@ -87,9 +87,9 @@ def parse_header(data: bytes | memoryview) -> ImageFile:
     file = data if isinstance(data, bytes) else memoryview(data).cast("B")
     head = bytes(file[:8])
     if head == _PNG_SIGNATURE:
-        return _Png(file).read()
+        return _PngReader(file).read()
     if head.startswith(_JPEG_SIGNATURE):
-        return _Jpeg(file).read()
+        return _JpegReader(file).read()
     size = len(file)
     if not size:
         raise DecodeError("image", 0, _("the image is empty"))
@@ -129,7 +129,7 @@ def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> 
         raise DecodeError("image", size_bytes, reason)
 
 
-class _Reader:
+class _HeaderReader:
     """Base class of the JPEG and PNG header readers."""
 
     kind: Literal["jpeg", "png"]
@@ -146,7 +146,7 @@ class _Reader:
         return DecodeError("image", self.size, reason)
 
 
-class _Jpeg(_Reader):
+class _JpegReader(_HeaderReader):
     """Reader of JPEG segments up to the first scan.
 
     Unusual structures are rejected, because a decoder might interpret them differently and the decoded
@@ -173,7 +173,7 @@ class _Jpeg(_Reader):
                     raise self.error(_("pixels before the frame header"))
                 return self._check_frame(frame, orientation, at)
             elif marker == _APP1:
-                orientation = _orientation(self.data[at + 2 : at + length]) or orientation
+                orientation = _parse_orientation(self.data[at + 2 : at + length]) or orientation
             elif marker not in _TABLE_MARKERS:
                 raise self.error(_("unknown marker 'ff{marker}'").format(marker=number(marker, "02x")))
             at += length
@@ -193,7 +193,7 @@ class _Jpeg(_Reader):
             raise self.error(_("the data is truncated"))
         return self.data[at], at + 1
 
-    def _read_frame(self, marker: int, at: int, length: int) -> _Frame:
+    def _read_frame(self, marker: int, at: int, length: int) -> _JpegFrame:
         bits, height, width = self.number(at + 2, 1), self.number(at + 3, 2), self.number(at + 5, 2)
         components = self.number(at + 7, 1)
         if length != 8 + 3 * components or components not in (1, 3, 4):
@@ -210,9 +210,9 @@ class _Jpeg(_Reader):
         factors = [(each >> 4, each & 15) for each in sampling]
         if not all(1 <= across <= 4 and 1 <= down <= 4 for across, down in factors):
             raise self.error(_("invalid sampling factors of the colour components"))
-        return _Frame(width, height, components, _FRAME_MARKERS[marker], factors)
+        return _JpegFrame(width, height, components, _FRAME_MARKERS[marker], factors)
 
-    def _check_frame(self, frame: _Frame, orientation: int, at: int) -> ImageFile:
+    def _check_frame(self, frame: _JpegFrame, orientation: int, at: int) -> ImageFile:
         channels = 1 if frame.components == 1 else 3
         pixel_bytes = float(_DECODER_COPIES * channels)
         is_refined = frame.is_progressive or self.number(at + 2, 1) != frame.components
@@ -234,7 +234,7 @@ class _Jpeg(_Reader):
 
 
 @dataclass(frozen=True)
-class _Frame:
+class _JpegFrame:
     """JPEG frame header."""
 
     width: int
@@ -255,7 +255,7 @@ class _Frame:
         return 128 * blocks / max(1, self.width * self.height)
 
 
-class _Png(_Reader):
+class _PngReader(_HeaderReader):
     """Reader of PNG chunks."""
 
     kind = "png"
@@ -301,7 +301,7 @@ class _Png(_Reader):
                     needed.append((at, end))
             elif kind == b"eXIf":
                 orientation = (
-                    _orientation(b"Exif\0\0" + bytes(self.data[at + 8 : at + 8 + _MAX_EXIF_BYTES]))
+                    _parse_orientation(b"Exif\0\0" + bytes(self.data[at + 8 : at + 8 + _MAX_EXIF_BYTES]))
                     or orientation
                 )
             at = end
@@ -314,7 +314,7 @@ _MAX_EXIF_BYTES = 4096
 """Number of bytes of EXIF data that are searched for the orientation."""
 
 
-def _orientation(exif: bytes | memoryview) -> int | None:
+def _parse_orientation(exif: bytes | memoryview) -> int | None:
     # None without an orientation.
     data = bytes(exif[:_MAX_EXIF_BYTES])
     if data[:6] != b"Exif\0\0" or data[6:10] not in (b"II*\0", b"MM\0*"):

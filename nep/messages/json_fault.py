@@ -14,7 +14,7 @@ from nep.text import shortened
 
 _MAX_WORD_LENGTH = 30
 _STRING_OR_CONSTANT = re.compile(r'"(?:[^"\\\n]|\\.)*"?|(?P<constant>-?\b(?:NaN|Infinity)\b)')
-_WORD = re.compile(r"[^\W\d][\w.-]*")
+_WORD_PATTERN = re.compile(r"[^\W\d][\w.-]*")
 _CLOSING_BRACKETS = {"{": "}", "[": "]"}
 _FOREIGN_CONSTANTS = {"True": "true", "False": "false", "None": "null", "undefined": "null", "nil": "null"}
 _JSON_START = re.compile(r'\s*(?:[{["]|-?\d|-?(?:Infinity|NaN)\b|(?:true|false|null)\b)')
@@ -134,38 +134,38 @@ def _explain(text: str, error: json.JSONDecodeError) -> JsonFault:
         example = _("the text is empty; write JSON, such as {example}").format(example='{"x": 1}')
         return _fault_at(text, 0, example)
     if message.startswith(("Unterminated", "Invalid control")):
-        return _invalid_string(text, position)
+        return _invalid_string_fault(text, position)
     if message.startswith("Invalid \\"):
         fix = JsonFix(position, position, "\\") if text[position : position + 1] == "\\" else None
         return _fault_at(text, position, _("a string contains a single \\; use \\\\"), fix)
     if message.startswith("Extra data"):
         return _fault_at(text, position, _("there is extra text after the first value"))
     if message.startswith("Illegal trailing comma"):
-        return _trailing_comma(text, text.rfind(",", 0, position + 1))
-    return _unexpected_character(text, position, message)
+        return _trailing_comma_fault(text, text.rfind(",", 0, position + 1))
+    return _unexpected_character_fault(text, position, message)
 
 
-def _unexpected_character(text: str, position: int, message: str) -> JsonFault:
+def _unexpected_character_fault(text: str, position: int, message: str) -> JsonFault:
     sign, end = text[position : position + 1], len(text[:position].rstrip())
     last = text[end - 1 : end]
     if sign in {"}", "]"} and last == ",":
-        return _trailing_comma(text, end - 1)
+        return _trailing_comma_fault(text, end - 1)
     if message.startswith("Expecting ':'"):
         return _fault_at(text, end, _("a colon is missing after the name"), JsonFix(end, end, ":"))
     if not sign:
-        return _unclosed_bracket(text, end)
+        return _unclosed_bracket_fault(text, end)
     if message.startswith("Expecting ','"):
-        return _missing_comma(text, position, end)
+        return _missing_comma_fault(text, position, end)
     if sign in {"}", "]", ","} and last == ":":
         return _fault_at(text, end, _("a value is missing after the colon"))
-    return _missing_value(text, position, is_name=message.startswith("Expecting property name"))
+    return _missing_value_fault(text, position, is_name=message.startswith("Expecting property name"))
 
 
-def _trailing_comma(text: str, position: int) -> JsonFault:
+def _trailing_comma_fault(text: str, position: int) -> JsonFault:
     return _fault_at(text, position, _("there is an extra comma"), JsonFix(position, position + 1, ""))
 
 
-def _missing_comma(text: str, position: int, end: int) -> JsonFault:
+def _missing_comma_fault(text: str, position: int, end: int) -> JsonFault:
     sign = text[position]
     if sign in {"}", "]"}:
         return _fault_at(text, position, _("{sign} doesn't match the opening bracket").format(sign=sign))
@@ -174,7 +174,7 @@ def _missing_comma(text: str, position: int, end: int) -> JsonFault:
     return _fault_at(text, end, _("a comma is missing between two values"), JsonFix(end, end, ","))
 
 
-def _unclosed_bracket(text: str, end: int) -> JsonFault:
+def _unclosed_bracket_fault(text: str, end: int) -> JsonFault:
     opened: list[str] = []
     for found in re.finditer(r'"(?:[^"\\\n]|\\.)*"|[{}\[\]]', text):
         sign = found[0]
@@ -190,8 +190,8 @@ def _unclosed_bracket(text: str, end: int) -> JsonFault:
     return _fault_at(text, end, _("a closing {signs} is missing at the end").format(signs=shown), fix)
 
 
-def _missing_value(text: str, position: int, *, is_name: bool) -> JsonFault:
-    word = _WORD.match(text, position)
+def _missing_value_fault(text: str, position: int, *, is_name: bool) -> JsonFault:
+    word = _WORD_PATTERN.match(text, position)
     if text[position] == "'":
         end = text.find("'", position + 1)
         inside = text[position + 1 : end] if end > position else ""
@@ -212,7 +212,7 @@ def _missing_value(text: str, position: int, *, is_name: bool) -> JsonFault:
     return _fault_at(text, position, _("{word} needs double quotes").format(word=shown), fix)
 
 
-def _invalid_string(text: str, position: int) -> JsonFault:
+def _invalid_string_fault(text: str, position: int) -> JsonFault:
     # No closing quote, or a character that must be escaped.
     sign = text[position : position + 1]
     if sign == "\t":

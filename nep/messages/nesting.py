@@ -31,7 +31,7 @@ def too_deep_reason() -> str:
     return _("the value has more than {levels} levels of lists and maps").format(levels=MAX_LEVELS)
 
 
-def json_is_too_deep(data: bytes | memoryview) -> bool:
+def is_json_too_deep(data: bytes | memoryview) -> bool:
     """Return True if JSON has more than 64 levels. The result for invalid JSON is undefined."""
     size = len(data)
     if size <= 2 * MAX_LEVELS:
@@ -76,7 +76,7 @@ def _exceeds_levels(brackets: bytes) -> bool:
     return True
 
 
-def packed_is_too_deep(data: bytes | memoryview, value: object) -> bool:
+def is_packed_too_deep(data: bytes | memoryview, value: object) -> bool:
     """Return True if a value has more than 64 levels; `data` is its msgpack encoding."""
     size = len(data)
     if size <= MAX_LEVELS:

@@ -74,11 +74,11 @@ def _unpack_slow(data: bytes | memoryview) -> object:
 
 
 def _to_dict(pairs: list[tuple[object, object]]) -> dict[object, object]:
-    return {_hashable(key): value for key, value in pairs}
+    return {_to_hashable(key): value for key, value in pairs}
 
 
-def _hashable(key: object) -> object:
-    return tuple(map(_hashable, key)) if isinstance(key, list) else key
+def _to_hashable(key: object) -> object:
+    return tuple(map(_to_hashable, key)) if isinstance(key, list) else key
 
 
 def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:

@@ -12,7 +12,7 @@ QueuePolicy = Literal["all", "latest"]
 
 MAX_MESSAGES = 10_000
 MAX_BYTES = 256 * 2**20
-_FAST_READ_S = 10e-6
+_FAST_READ_INTERVAL_S = 10e-6
 """Maximum time in seconds between two reads of a fast reader, whose batch size is doubled."""
 MAX_READ_AHEAD = 64
 
@@ -103,16 +103,16 @@ class ReadAhead:
         self._most = max(1, min(MAX_READ_AHEAD, max_messages))
         self.now = 1
         """Current number of messages per read."""
-        self.span_s = _FAST_READ_S
+        self.span_s = _FAST_READ_INTERVAL_S
         """Maximum time in seconds between two reads for the reader to count as fast."""
 
     def increase(self) -> int:
         """Increase the number of messages for a fast reader, and return it."""
         self.now = min(2 * self.now, self._most)
-        self.span_s = self.now * _FAST_READ_S
+        self.span_s = self.now * _FAST_READ_INTERVAL_S
         return self.now
 
     def reset(self) -> None:
         """Reset to one message, because the reader is slow or fewer messages were available."""
         self.now = 1
-        self.span_s = _FAST_READ_S
+        self.span_s = _FAST_READ_INTERVAL_S

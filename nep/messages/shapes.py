@@ -33,7 +33,7 @@ class ShapeMismatch(Exception):  # noqa: N818 - internal
         self.steps: list[str] = []
         super().__init__(reason)
 
-    def in_field(self, name: object) -> ShapeMismatch:
+    def prepend_field(self, name: object) -> ShapeMismatch:
         """Add the field `name` of the enclosing value to the path; return self."""
         self.steps.append(f".{escaped(shortened(str(name), _MAX_TEXT_LENGTH))}")
         return self
@@ -230,14 +230,16 @@ def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
         if is_of_kind(value):  # msgpack has times
             return value
         if not isinstance(value, str):
-            raise wrong_type_error(value, _("a string such as {example}").format(example=_EXAMPLES[kind]))
+            raise wrong_type_error(
+                value, _("a string such as {example}").format(example=_DATETIME_EXAMPLES[kind])
+            )
         whole = f"{value[:-1]}+00:00" if value.endswith("Z") else value  # Python 3.10 does not parse "Z"
         try:
             return kind.fromisoformat(whole)
         except ValueError:
             raise ShapeMismatch(
                 _("is {value}; expected a string such as {example}").format(
-                    value=short_repr(value), example=_EXAMPLES[kind]
+                    value=short_repr(value), example=_DATETIME_EXAMPLES[kind]
                 )
             ) from None
 
@@ -250,7 +252,7 @@ def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
     return shape
 
 
-_EXAMPLES: Mapping[type, str] = {
+_DATETIME_EXAMPLES: Mapping[type, str] = {
     datetime: "'2026-01-31T12:00:00+00:00'",
     date: "'2026-01-31'",
     time: "'12:00:00'",
@@ -272,7 +274,7 @@ SCALAR_SHAPES: Mapping[Any, ValueShape] = {
 # ---- alternatives
 
 
-def _is_same(value: object, allowed: object) -> bool:
+def _matches_literal(value: object, allowed: object) -> bool:
     # 1 is neither True nor 1.0; but a float may be sent as an int.
     if value != allowed or isinstance(value, bool) is not isinstance(allowed, bool):
         return False
@@ -292,7 +294,7 @@ def literal_shape(values: Sequence[object]) -> ValueShape | None:
 
     def convert(value: object) -> object:
         for each in values:
-            if _is_same(value, each):
+            if _matches_literal(value, each):
                 return each
         raise ShapeMismatch(
             _("is {value}; expected {wanted}").format(value=short_repr(value), wanted=shape.expected)
@@ -312,7 +314,7 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
 
     def read(value: object) -> object:
         for each in members:
-            if _is_same(value, each.value):
+            if _matches_literal(value, each.value):
                 return each
         if is_flag and isinstance(value, int) and not isinstance(value, bool):
             try:
@@ -445,7 +447,7 @@ def map_shape(item: ValueShape) -> ValueShape:
             try:
                 converted[word.write(key)] = way(part)
             except ShapeMismatch as mismatch:
-                raise mismatch.in_field(key) from mismatch.__cause__
+                raise mismatch.prepend_field(key) from mismatch.__cause__
         return converted
 
     shape.read = lambda value: convert(value, item.read)

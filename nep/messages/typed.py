@@ -48,7 +48,7 @@ from nep.messages.shapes import (
 from nep.system.arguments import check_type_name
 from nep.text import escaped, shortened
 
-OTHER_NAME = "nep.other_name"
+OTHER_NAME_KEY = "nep.other_name"
 """Key of a field's metadata for an alternative name that is accepted in received messages."""
 
 _MAX_NAME_LENGTH = 100
@@ -156,7 +156,7 @@ class TypedReader:
         self._declared = declared
         self._kinds: tuple[MessageKind, MessageKind] | None = None
 
-    def typed(self, message: Message) -> Message:
+    def convert(self, message: Message) -> Message:
         """Return a copy of `message` whose payload is decoded to the type at the first access.
 
         `message` is not changed and may be shared.
@@ -298,7 +298,7 @@ def _name_of(hint: object) -> str:
     return shortened(name, _MAX_NAME_LENGTH)
 
 
-def _hints(declared: type) -> dict[str, Any]:
+def _type_hints(declared: type) -> dict[str, Any]:
     try:
         return typing.get_type_hints(declared, include_extras=True)
     except (NameError, TypeError, AttributeError, SyntaxError) as error:
@@ -336,12 +336,12 @@ def _read_fields(value: object, entries: Sequence[_FieldEntry], whole: ValueShap
             elif is_required:
                 raise missing_value_error(shape)
     except ShapeMismatch as mismatch:
-        raise mismatch.in_field(name) from mismatch.__cause__
+        raise mismatch.prepend_field(name) from mismatch.__cause__
     return values
 
 
 def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, ValueShape]) -> None:
-    hints = _hints(declared)
+    hints = _type_hints(declared)
     entries: list[_FieldEntry] = []
     written: list[tuple[str, ValueShape]] = []
     for each in fields(declared):
@@ -351,7 +351,7 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
             field_shape = _shape(hints[each.name], where, known)
             written.append((each.name, field_shape))
             if each.init:
-                other_name = each.metadata.get(OTHER_NAME, each.name)
+                other_name = each.metadata.get(OTHER_NAME_KEY, each.name)
                 entries.append(_FieldEntry(each.name, other_name, field_shape, is_required))
         elif is_required:
             raise ValueError(_("{where} isn't sent; add a default value").format(where=where))
@@ -368,7 +368,7 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
             try:
                 values[name] = field_shape.write(getattr(value, name))
             except ShapeMismatch as mismatch:
-                raise mismatch.in_field(name) from mismatch.__cause__
+                raise mismatch.prepend_field(name) from mismatch.__cause__
         return values
 
     shape.read, shape.write = read, write
@@ -399,7 +399,7 @@ def _create_instance(declared: type, arguments: Mapping[str, object]) -> object:
 
 
 def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]) -> None:
-    hints = _hints(declared)
+    hints = _type_hints(declared)
     required: frozenset[str] = getattr(declared, "__required_keys__", frozenset())
     entries: list[_FieldEntry] = []
     for name, hint in hints.items():
@@ -427,7 +427,7 @@ def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]
                 if is_required and name not in values:
                     raise missing_value_error(field_shape)
         except ShapeMismatch as mismatch:
-            raise mismatch.in_field(name) from mismatch.__cause__
+            raise mismatch.prepend_field(name) from mismatch.__cause__
         return values
 
     shape.read = lambda value: _read_fields(value, entries, shape)

@@ -38,7 +38,7 @@ async def spin(work: Work, timeout_s: float | None) -> None:
                 if not turns:
                     await yield_to_loop()
                 continue
-            await waiter.wait(min(work.until_next_timer_s, deadline - work.clock()))
+            await waiter.wait(min(work.next_timer_delay_s, deadline - work.clock()))
         work.check_not_forked()
     finally:
         work.unwatch(waiter)

@@ -45,7 +45,7 @@ def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
             # a generator would stop at the first
             if any([each.run() for each in running if each.is_running]):  # noqa: C419
                 continue
-            left = min(left, *(each.until_next_timer_s for each in running))
+            left = min(left, *(each.next_timer_delay_s for each in running))
             if left > 0.0:
                 _wait(waits, running, left)
         for each in works:

@@ -41,15 +41,15 @@ MAX_BURST = 200
 MAX_TEXT_LENGTH = 8_000
 """Maximum length of a record's text in characters; longer texts are truncated."""
 
-_ERROR_TEXT_LIMIT = 1_000
+_MAX_ERROR_TEXT_LENGTH = 1_000
 _MAX_SHOWN_ERRORS = 2_000
 _DROP_REPORT_INTERVAL_S = 1.0
 _FLUSH_TIMEOUT_S = 1.0
 _OPEN_RETRY_DELAY_S = 1.0
-_MAX_QUEUED = 1_000
+_MAX_QUEUED_RECORDS = 1_000
 _PUBLISHED_BY_ATTRIBUTE = "nep_published_by"
 _ERROR_LEVELS = ("error", "critical")
-_ALIASES = {"warn": "warning", "fatal": "critical", "err": "error", "trace": "debug"}
+_LEVEL_ALIASES = {"warn": "warning", "fatal": "critical", "err": "error", "trace": "debug"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ class LogRecord:
         fields = payload if isinstance(payload, Mapping) else {"text": payload}
         text, stamp = fields.get("text"), _int_or_none(fields.get("stamp_ns"))
         return cls(
-            level_of(fields.get("level")),
+            parse_level(fields.get("level")),
             "" if text is None else bounded_str(text, MAX_TEXT_LENGTH),
             _short_text(fields.get("name")),
             _short_text(fields.get("node")),
@@ -110,14 +110,14 @@ class LogRecord:
         )
 
 
-def level_of(given: object) -> str:
+def parse_level(given: object) -> str:
     """Return the level for a name or an alias such as "WARN"; "info" for an unknown name."""
     word = given.strip().lower() if isinstance(given, str) else ""
-    word = _ALIASES.get(word, word)
+    word = _LEVEL_ALIASES.get(word, word)
     return word if word in LEVELS else "info"
 
 
-class ShownErrors:
+class NewErrorFilter:
     """Filter for errors that were already shown, because each error is received live and in the latched list.
 
     Remembers the newest 2000 errors.
@@ -230,7 +230,7 @@ class LogHandler(logging.Handler):
             self.handleError(record)
             return
         with self._has_work:
-            if len(self._queue) >= _MAX_QUEUED:
+            if len(self._queue) >= _MAX_QUEUED_RECORDS:
                 self._dropped += 1
                 return
             try:
@@ -312,7 +312,7 @@ class LogHandler(logging.Handler):
         if not records or self._open_errors is None:
             return
         for record in records:
-            text = shortened(str(record["text"]), _ERROR_TEXT_LIMIT)
+            text = shortened(str(record["text"]), _MAX_ERROR_TEXT_LENGTH)
             self._errors.append({**record, "text": text})
         with suppress(NepError):  # retried with the next error
             if self._errors_publisher is None:

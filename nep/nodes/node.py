@@ -55,14 +55,14 @@ from nep.nodes.log_handler import LogHandler, new_log_handler
 from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import Subscriber
 from nep.nodes.timer import Timer
-from nep.nodes.typed import MsgType, codec_of, name_of, new_subscriber, sink_of
+from nep.nodes.typed import MsgType, codec_of, name_of, new_subscriber, wrap_sink
 from nep.nodes.work import Callback, Work
 from nep.patterns.parameters.owned import MSG_TYPE, Parameters, parameters_topic
 from nep.patterns.parameters.remote import RemoteParameters, node_with_parameters
 from nep.patterns.services.owned import ServiceRegistry
 from nep.patterns.services.service_node import ServiceNode
 from nep.protocol.graph_view import GraphView
-from nep.protocol.requests import NodeRecord, id_from, node_id_from
+from nep.protocol.requests import NodeRecord, derive_id, derive_node_id
 from nep.protocol.service_wire import SERVICE_PREFIX
 from nep.protocol.wire import check_node_name, check_topic
 from nep.system import forks
@@ -133,7 +133,7 @@ class Node(ServiceNode):
     ) -> None:
         self.name = check_node_name(name)
         key = secrets.token_hex(16)
-        self.id: str = node_id_from(key)
+        self.id: str = derive_node_id(key)
         """Id in the graph: 16 hexadecimal digits, new at each start of the program."""
         self._key = key
         self._numbers = itertools.count(1)
@@ -271,7 +271,7 @@ class Node(ServiceNode):
         history_length = max(check_history(self._backend, history, connected), 1 if latched is True else 0)
         number = next(self._numbers)
         spec = PublisherSpec(
-            id_from(self._key, number),
+            derive_id(self._key, number),
             _check_user_topic(topic),
             name_of(msg_type),
             codec_with_image_format(codec_of(self._backend, msg_type), image),
@@ -335,14 +335,14 @@ class Node(ServiceNode):
         """
         number = next(self._numbers)
         spec = SubscriberSpec(
-            id_from(self._key, number),
+            derive_id(self._key, number),
             _check_user_topic(topic),
             name_of(msg_type),
             require_topic_support(self._resolve_configuration(configuration)),
             self._wait_s,
             check_choice("keep", keep, ("all", "latest")),
             check_at_least("max_messages", max_messages, 1),
-            sink=sink_of(msg_type, sink),
+            sink=wrap_sink(msg_type, sink),
             number=number,
             qos=check_quality(self._backend, qos),
             is_pattern=check_bool("wildcards", wildcards)
@@ -390,7 +390,7 @@ class Node(ServiceNode):
         check_bool("with_message", with_message)
         number = next(self._numbers)
         spec = SubscriberSpec(
-            id_from(self._key, number),
+            derive_id(self._key, number),
             _check_user_topic(topic),
             name_of(msg_type),
             require_topic_support(self._resolve_configuration(configuration)),
@@ -408,7 +408,7 @@ class Node(ServiceNode):
 
     def _new_id(self) -> tuple[int, int]:
         number = next(self._numbers)
-        return id_from(self._key, number), number
+        return derive_id(self._key, number), number
 
     def _wake(self) -> None:
         self._work.wake()

@@ -18,7 +18,7 @@ from nep.backends.base import (
     PublisherSpec,
     PublisherTransport,
     PublishHooks,
-    SupportsQuickPublish,
+    SupportsFastPublish,
     SupportsSubscriberIds,
 )
 from nep.errors import ClosedError, EncodeError, WireError
@@ -76,7 +76,7 @@ class Publisher:
         self._is_latched = spec.is_latched
         self.is_closed = False
         """True if the publisher or its node was closed."""
-        if isinstance(transport, SupportsQuickPublish) and (encode := fast_encoder(spec.codec)) is not None:
+        if isinstance(transport, SupportsFastPublish) and (encode := fast_encoder(spec.codec)) is not None:
             self._install_fast_publish(transport, encode)
 
     @property
@@ -154,7 +154,7 @@ class Publisher:
             ClosedError: The publisher is closed.
         """
         if strict or self._is_strict:
-            self._publish_strictly(payload)
+            self._publish_strict(payload)
             return
         if self.is_closed or not (self._transport.has_subscribers or self._is_latched):
             self._skip(payload)
@@ -162,7 +162,7 @@ class Publisher:
         try:
             encoded_payload = payload if isinstance(payload, Encoded) else self._encode(payload)
         except Exception as error:  # noqa: BLE001 - a payload of any class may raise anything
-            self._check(payload)
+            self._check_payload(payload)
             self._rejected.add(payload, error)
             return
         if encoded_payload is payload or self._rejected.problem:
@@ -170,18 +170,18 @@ class Publisher:
         else:
             self._transport.send(encoded_payload)
 
-    def _publish_strictly(self, payload: object) -> None:
+    def _publish_strict(self, payload: object) -> None:
         if self.is_closed:
             raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
         try:
             if isinstance(payload, Encoded):
-                self._check(payload)
+                self._check_payload(payload)
                 check_sendable(payload)
                 encoded_payload = payload
             else:
                 encoded_payload = self._encode(payload)
         except Exception as error:
-            self._check(payload)  # raises a more specific error
+            self._check_payload(payload)  # raises a more specific error
             raise self._rejected.error(payload, error, self._spec.codec.name) from error
         self._rejected.resolve()
         if self._transport.has_subscribers or self._is_latched:
@@ -189,11 +189,13 @@ class Publisher:
         else:
             self._transport.skip()
 
-    def _install_fast_publish(self, transport: SupportsQuickPublish, encode: Callable[[Any], bytes]) -> None:
+    def _install_fast_publish(self, transport: SupportsFastPublish, encode: Callable[[Any], bytes]) -> None:
         # Replaces self.publish; payloads that the fast path can't handle fall back to Publisher.publish.
         on_null = None if self._json_encoder is None else self._json_encoder.check_for_nan
         kind = bytes if self._spec.codec.name == "bytes" else None
-        fast_publish = transport.quick_publish(PublishHooks(self, kind, encode, on_null, self.publish))
+        fast_publish = transport.fast_publish_function(
+            PublishHooks(self, kind, encode, on_null, self.publish)
+        )
         fast_publish.__doc__ = Publisher.publish.__doc__
         setattr(self, "publish", fast_publish)  # noqa: B010 - mypy rejects the assignment to a method
 
@@ -224,7 +226,7 @@ class Publisher:
 
     def _send(self, encoded_payload: Encoded) -> None:
         if type(encoded_payload.data) is not bytes or encoded_payload.extension is not None:
-            self._check(encoded_payload)
+            self._check_payload(encoded_payload)
         try:
             self._transport.send(encoded_payload)
         except WireError as error:  # in the extension
@@ -233,7 +235,7 @@ class Publisher:
         if self._rejected.problem:
             self._rejected.resolve()
 
-    def _check(self, payload: object) -> None:
+    def _check_payload(self, payload: object) -> None:
         # Raises `EncodeError` for errors visible without encoding.
         if not isinstance(payload, Encoded):
             self._spec.codec.check(payload)
@@ -248,7 +250,7 @@ class Publisher:
         # Counts a message without subscribers; encodes it from time to time to detect errors.
         if self.is_closed:
             raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
-        self._check(payload)
+        self._check_payload(payload)
         if self._rejected.is_valid(payload):
             self._transport.skip()
 

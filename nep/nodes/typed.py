@@ -43,12 +43,12 @@ def codec_of(backend: Backend, msg_type: MsgType) -> Codec:
     return typed.typed_codec(declared, backend.codec_for(declared.name))
 
 
-def sink_of(msg_type: MsgType, sink: Sink | None) -> Sink | None:
+def wrap_sink(msg_type: MsgType, sink: Sink | None) -> Sink | None:
     """Return a sink that passes messages with typed payloads to `sink`. Raises `ValueError`."""
     if sink is None or not isinstance(msg_type, type):
         return None if sink is None else check_function("sink", sink)
     give, reader = check_function("sink", sink), typed.TypedReader(typed.message_type(msg_type))
-    return lambda messages: give([reader.typed(each) for each in messages])
+    return lambda messages: give([reader.convert(each) for each in messages])
 
 
 class TypedSubscriber(Subscriber):
@@ -69,11 +69,11 @@ class TypedSubscriber(Subscriber):
 
     def typed(self, message: Message) -> Message:
         """Return a message with a typed payload."""
-        return self._reader.typed(message)
+        return self._reader.convert(message)
 
     def decoded_unshared(self, message: Message) -> object:
         """Return the typed payload of a message that no other reader shares."""
-        return self.decoded(self._reader.typed(message))
+        return self.decoded(self._reader.convert(message))
 
     def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
         """Return (True, payload) for the next message, or (False, None) if there is none."""
@@ -83,14 +83,14 @@ class TypedSubscriber(Subscriber):
     def receive(self, timeout_s: float | None = None) -> Message | None:
         """Return the next message with a typed payload, or None after the time limit."""
         message = super().receive(timeout_s)
-        return None if message is None else self._reader.typed(message)
+        return None if message is None else self._reader.convert(message)
 
     def _receive_for_listen(self, timeout_s: float | None) -> Message | None:
         return self.receive(timeout_s)
 
     def _poll_first(self) -> Message | None:
         message = super()._poll_first()
-        return None if message is None else self._reader.typed(message)
+        return None if message is None else self._reader.convert(message)
 
 
 def _empty_payload() -> object:

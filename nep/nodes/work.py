@@ -290,7 +290,7 @@ class Work:
         return [each[1] for each in self.callbacks if not each[1].is_closed]
 
     @property
-    def until_next_timer_s(self) -> float:
+    def next_timer_delay_s(self) -> float:
         """Seconds until the first timer is due; infinite without timers."""
         return next_due(self.timers) - self.clock()
 
@@ -316,7 +316,7 @@ class Work:
                 if self._run_until(self.clock() + left):
                     continue
                 if self.timers:
-                    left = min(left, self.until_next_timer_s)
+                    left = min(left, self.next_timer_delay_s)
                 if left > 0.0:
                     self._wait(left)
             self.check_not_forked()

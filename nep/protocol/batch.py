@@ -20,19 +20,19 @@ from nep.protocol.wire import BATCH, Header, Parts, pack_header, split
 __all__ = [
     "BATCH",
     "BATCH_FORM_FLAG",
-    "BATCH_MAX",
+    "MAX_BATCH_MESSAGES",
     "BatchEntry",
-    "batch_part",
     "check_batch",
-    "entries",
+    "encode_batch",
+    "parse_entries",
     "read_parts",
     "table_struct",
-    "unknown_codec",
+    "unknown_codec_error",
 ]
 
 BATCH_FORM_FLAG = BATCH << 16
 """Flag `BATCH`, shifted to its position in the result of `form_of`."""
-BATCH_MAX = 256
+MAX_BATCH_MESSAGES = 256
 """Maximum number of messages in a batch; larger batches are rejected."""
 _COUNT = struct.Struct("<I")
 
@@ -59,7 +59,7 @@ def table_struct(count: int) -> struct.Struct:
     return struct.Struct(f"<I{count}I{count}Q")
 
 
-def batch_part(
+def encode_batch(
     topic: bytes,
     form: int,
     seq: int,
@@ -84,13 +84,13 @@ def batch_part(
     return b"".join((topic, header, table, *payloads))
 
 
-def entries(body: bytes) -> list[BatchEntry]:
+def parse_entries(body: bytes) -> list[BatchEntry]:
     """Parse the table of a batch's body. Raises `WireError`."""
     count = _COUNT.unpack_from(body)[0] if len(body) >= _COUNT.size else 0
-    if not 1 <= count <= BATCH_MAX:
+    if not 1 <= count <= MAX_BATCH_MESSAGES:
         raise WireError(
             _("a batch must have 1 to {most} messages, but this one has {count}").format(
-                most=BATCH_MAX, count=count
+                most=MAX_BATCH_MESSAGES, count=count
             ),
             len(body),
             code="batch-count",
@@ -133,7 +133,7 @@ def read_parts(parts: Sequence[bytes | memoryview]) -> list[Parts]:
     one = split(parts)
     found = [one] if not one.header.flags & BATCH else _split_batch(one)
     if codec_by_number(one.header.codec) is None:
-        raise unknown_codec(one.header.codec)
+        raise unknown_codec_error(one.header.codec)
     return found
 
 
@@ -150,11 +150,11 @@ def _split_batch(one: Parts) -> list[Parts]:
             ),
             payload=body[each.begin : each.end],
         )
-        for each in entries(body)
+        for each in parse_entries(body)
     ]
 
 
-def unknown_codec(number: int) -> WireError:
+def unknown_codec_error(number: int) -> WireError:
     """Return the error for a message with an unknown codec number."""
     return WireError(
         _("unknown codec {codec}; update nep").format(codec=number),

@@ -7,11 +7,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
-from nep.messages.clocks import UNCERTAINTY_MAX_NS, drift_ns, is_clock
+from nep.messages.clocks import MAX_UNCERTAINTY_NS, drift_ns, is_plausible_clock
 
 _MAX_SAMPLES = 8
 """Maximum number of stored samples; the sample with the shortest round trip determines the offset."""
-_STEP_NS = 50_000
+_MIN_STEP_NS = 50_000
 _SLEW_DIVISOR = 2_000
 """Reciprocal of the fastest clock slew. A larger change (plus `_STEP_NS`) is treated as a step."""
 
@@ -27,7 +27,7 @@ class Moment(NamedTuple):
 
     wall_ns: int
     steady_ns: int
-    slack_ns: int
+    uncertainty_ns: int
 
 
 class _Sample(NamedTuple):
@@ -94,15 +94,15 @@ class ClockSamples:
         now = now or self.now()
         taken_ns = now.steady_ns - sent.steady_ns
         away_ns = taken_ns - (answered_ns - received_ns)
-        is_possible = answered_ns >= received_ns and away_ns >= -now.slack_ns - sent.slack_ns
+        is_possible = answered_ns >= received_ns and away_ns >= -now.uncertainty_ns - sent.uncertainty_ns
         if not is_possible or not self._is_consistent(sent, now):
             return False
         offset_ns = (received_ns - sent.wall_ns + answered_ns - now.wall_ns) // 2
-        uncertainty_ns = max(0, away_ns) // 2 + self._resolution_ns + now.slack_ns + sent.slack_ns
-        if not is_clock(offset_ns, uncertainty_ns):
+        uncertainty_ns = max(0, away_ns) // 2 + self._resolution_ns + now.uncertainty_ns + sent.uncertainty_ns
+        if not is_plausible_clock(offset_ns, uncertainty_ns):
             return False
         sample = _Sample(offset_ns, uncertainty_ns, now.steady_ns)
-        best = self._best(now.steady_ns)
+        best = self._best_sample(now.steady_ns)
         if best is not None:
             apart_ns = abs(offset_ns - best.offset_ns)
             if apart_ns > uncertainty_ns + best.uncertainty_at(now.steady_ns):
@@ -113,8 +113,8 @@ class ClockSamples:
     def offset(self, now: Moment | None = None) -> tuple[int, int] | None:
         """Return the offset to add to this computer's time, and its uncertainty, in ns; None if unknown."""
         now = now or self.now()
-        best = self._best(now.steady_ns)
-        if best is None or best.uncertainty_at(now.steady_ns) > UNCERTAINTY_MAX_NS:
+        best = self._best_sample(now.steady_ns)
+        if best is None or best.uncertainty_at(now.steady_ns) > MAX_UNCERTAINTY_NS:
             return None
         return best.offset_ns, best.uncertainty_at(now.steady_ns)
 
@@ -122,13 +122,13 @@ class ClockSamples:
         """Discard all samples, because another master may have another clock."""
         self._samples.clear()
 
-    def _best(self, steady_ns: int) -> _Sample | None:
+    def _best_sample(self, steady_ns: int) -> _Sample | None:
         return min(self._samples, key=lambda each: each.uncertainty_at(steady_ns), default=None)
 
     def _is_consistent(self, then: Moment, now: Moment) -> bool:
         # True if both clocks have advanced equally.
         by_steady = now.steady_ns - then.steady_ns
-        allowed = _STEP_NS + then.slack_ns + now.slack_ns + 2 * self._resolution_ns
+        allowed = _MIN_STEP_NS + then.uncertainty_ns + now.uncertainty_ns + 2 * self._resolution_ns
         return abs(now.wall_ns - then.wall_ns - by_steady) <= allowed + max(0, by_steady) // _SLEW_DIVISOR
 
     def _on_step(self) -> None:

@@ -23,11 +23,11 @@ from nep.i18n import _, lazy
 from nep.messages.packing import clamp_int, pack_saturated, unpack, unpack_bounded, unpack_first
 from nep.protocol.graph_view import NodeInfo, TopicInfo
 from nep.protocol.requests import (
-    Added,
+    AddedReply,
     AddPublisher,
     AddSubscriber,
-    Done,
-    Found,
+    DoneReply,
+    FoundReply,
     GraphReply,
     Join,
     Leave,
@@ -38,11 +38,11 @@ from nep.protocol.requests import (
     PublisherRemoved,
     Push,
     QueryGraph,
-    Refused,
+    RejectedReply,
     RemovePublisher,
     RemoveSubscriber,
     Renew,
-    Renewed,
+    RenewedReply,
     Reply,
     ReportMissing,
     Request,
@@ -65,27 +65,27 @@ _REQUESTS: Mapping[str, type[Request]] = {
     "ping": Ping,
 }
 _REPLIES: Mapping[str, type[Reply | Push]] = {
-    "done": Done,
-    "added": Added,
-    "found": Found,
-    "renewed": Renewed,
+    "done": DoneReply,
+    "added": AddedReply,
+    "found": FoundReply,
+    "renewed": RenewedReply,
     "seen": GraphReply,
-    "refused": Refused,
+    "refused": RejectedReply,
     "publisher+": PublisherAdded,
     "publisher-": PublisherRemoved,
     "probe": Probe,
 }
 _REQUEST_NAMES = {kind: name for name, kind in _REQUESTS.items()}
 _REPLY_NAMES = {kind: name for name, kind in _REPLIES.items()}
-_MISSING_FIELD = lazy("'{field}' is missing")
-_WRONG_TYPE = lazy("'{field}' must be '{wanted}', not '{given}'")
-_NOT_A_LIST = lazy("'{field}' must be a list, not '{given}'")
-_NOT_A_MAP = lazy("'{field}' must be a map, not '{given}'")
+_MISSING_FIELD_MESSAGE = lazy("'{field}' is missing")
+_WRONG_TYPE_MESSAGE = lazy("'{field}' must be '{wanted}', not '{given}'")
+_NOT_A_LIST_MESSAGE = lazy("'{field}' must be a list, not '{given}'")
+_NOT_A_MAP_MESSAGE = lazy("'{field}' must be a map, not '{given}'")
 _LARGE_BODY_BYTES = 50_000
 _SMALL_BODY_BYTES = 4096
 _MAX_LISTS, _MAX_LIST_LENGTH = 50_000, 20_000
 """Maximum number and length of lists and maps in a request. A joining node has at most 5,000 records."""
-_VIEW_PREFIX = b"\x83\xa2is\xa4seen\xa2re"
+_GRAPH_REPLY_PREFIX = b"\x83\xa2is\xa4seen\xa2re"
 """First bytes of a graph reply that `ReplyEncoder` has encoded."""
 
 
@@ -201,10 +201,10 @@ def call_of_graph_reply(body: bytes) -> int | None:
 
     Decoding a graph of thousands of topics takes 0.1 s.
     """
-    if not body.startswith(_VIEW_PREFIX):
+    if not body.startswith(_GRAPH_REPLY_PREFIX):
         return None
     try:
-        number = unpack_first(body[len(_VIEW_PREFIX) : len(_VIEW_PREFIX) + 9])
+        number = unpack_first(body[len(_GRAPH_REPLY_PREFIX) : len(_GRAPH_REPLY_PREFIX) + 9])
     except ValueError:
         return None
     return number if isinstance(number, int) and number > 0 else None
@@ -295,7 +295,7 @@ def read(kind: type[T], value: object) -> T:
         return cast("T", _reader(hint)(value))
     except _MismatchError as mismatch:
         where = ".".join((kind.__name__, *reversed(mismatch.path)))
-        code = "field-missing" if mismatch.words == _MISSING_FIELD else "field-type"
+        code = "field-missing" if mismatch.words == _MISSING_FIELD_MESSAGE else "field-type"
         raise WireError(_(mismatch.words).format(field=where, **mismatch.values), code=code) from None
 
 
@@ -347,7 +347,7 @@ def _plain_reader(hint: type) -> Reader:
         if hint is float and isinstance(value, int) and not isinstance(value, bool):
             return float(value)
         if not isinstance(value, hint) or (hint is int and isinstance(value, bool)):
-            raise _MismatchError(_WRONG_TYPE, given=type(value).__name__, wanted=hint.__name__)
+            raise _MismatchError(_WRONG_TYPE_MESSAGE, given=type(value).__name__, wanted=hint.__name__)
         return value
 
     return parse
@@ -356,7 +356,7 @@ def _plain_reader(hint: type) -> Reader:
 def _tuple_reader(item: Reader) -> Reader:
     def parse(value: object) -> object:
         if not isinstance(value, list | tuple):
-            raise _MismatchError(_NOT_A_LIST, given=type(value).__name__)
+            raise _MismatchError(_NOT_A_LIST_MESSAGE, given=type(value).__name__)
         return tuple([item(each) for each in value])
 
     return parse
@@ -365,7 +365,7 @@ def _tuple_reader(item: Reader) -> Reader:
 def _mapping_reader(key: Reader, item: Reader) -> Reader:
     def parse(value: object) -> object:
         if not isinstance(value, Mapping):
-            raise _MismatchError(_NOT_A_MAP, given=type(value).__name__)
+            raise _MismatchError(_NOT_A_MAP_MESSAGE, given=type(value).__name__)
         return {key(name): item(each) for name, each in value.items()}
 
     return parse
@@ -390,12 +390,12 @@ def _dataclass_reader(kind: type) -> Reader:
         if fast_value is not None:
             return fast_value
         if not isinstance(value, Mapping):
-            raise _MismatchError(_NOT_A_MAP, given=type(value).__name__)
+            raise _MismatchError(_NOT_A_MAP_MESSAGE, given=type(value).__name__)
         found: dict[str, object] = {}
         for name, usual, reader, field in readers:
             item = value.get(name, MISSING)
             if item is MISSING:
-                found[name] = _default(field)
+                found[name] = _default_value(field)
             elif type(item) is usual:
                 found[name] = item
             else:
@@ -448,11 +448,11 @@ def _plain_types(hint: Any) -> frozenset[type]:  # noqa: ANN401 - a type hint is
     return frozenset()
 
 
-def _default(field: Field[Any]) -> object:
+def _default_value(field: Field[Any]) -> object:
     if field.default is not MISSING:
         return field.default
     if field.default_factory is not MISSING:
         return field.default_factory()
-    mismatch = _MismatchError(_MISSING_FIELD)
+    mismatch = _MismatchError(_MISSING_FIELD_MESSAGE)
     mismatch.path.append(field.name)
     raise mismatch

@@ -17,16 +17,16 @@ from hashlib import sha256
 
 from nep.protocol.graph_view import Alert, GraphView
 
-COUNT_MAX = 2**63 - 1
+MAX_COUNT = 2**63 - 1
 """Maximum value of counters; every language and encoding can represent it."""
 
-RENEW_S = 1.0
+RENEW_INTERVAL_S = 1.0
 """Default interval of renewals in seconds. The master may request another interval."""
 
 
-def as_count(value: int) -> int:
+def clamp_count(value: int) -> int:
     """Clamp a received counter to 0 … `COUNT_MAX`."""
-    return value if 0 <= value <= COUNT_MAX else 0 if value < 0 else COUNT_MAX
+    return value if 0 <= value <= MAX_COUNT else 0 if value < 0 else MAX_COUNT
 
 
 @dataclass(frozen=True)
@@ -103,12 +103,12 @@ class SubscriberRecord:
     pattern: bool = False
 
 
-def node_id_from(key: str) -> str:
+def derive_node_id(key: str) -> str:
     """Return the node id derived from a key: 16 hexadecimal digits."""
     return sha256(key.encode("utf-8", "replace")).hexdigest()[:16]
 
 
-def id_from(key: str, number: int) -> int:
+def derive_id(key: str, number: int) -> int:
     """Return the id of a publisher or subscriber.
 
     Args:
@@ -127,9 +127,9 @@ def is_proven(node: NodeRecord, record: PublisherRecord | SubscriberRecord | Non
         record: Record of a publisher or subscriber, whose id must also be derived from the key; or
             None.
     """
-    if not node.key or node_id_from(node.key) != node.id:
+    if not node.key or derive_node_id(node.key) != node.id:
         return False
-    return record is None or (record.number > 0 and id_from(node.key, record.number) == record.id)
+    return record is None or (record.number > 0 and derive_id(node.key, record.number) == record.id)
 
 
 @dataclass(frozen=True)
@@ -376,12 +376,12 @@ class _MasterMessage:
 
 
 @dataclass(frozen=True)
-class Done(_MasterMessage):
+class DoneReply(_MasterMessage):
     """Reply to an executed request that has no result, such as a ping."""
 
 
 @dataclass(frozen=True)
-class Added(_MasterMessage):
+class AddedReply(_MasterMessage):
     """Reply to a registered publisher.
 
     Attributes:
@@ -397,7 +397,7 @@ class Added(_MasterMessage):
 
 
 @dataclass(frozen=True)
-class Found(_MasterMessage):
+class FoundReply(_MasterMessage):
     """Reply to a registered subscriber or a joined node.
 
     Attributes:
@@ -420,7 +420,7 @@ class TopicPublishers:
 
 
 @dataclass(frozen=True)
-class Renewed(_MasterMessage):
+class RenewedReply(_MasterMessage):
     """Reply to a renewal.
 
     Attributes:
@@ -442,7 +442,7 @@ class Renewed(_MasterMessage):
     topics: tuple[TopicPublishers, ...] = ()
     last_seqs: Mapping[int, int] = field(default_factory=dict)
     hosts: tuple[str, ...] = ()
-    next_s: float = RENEW_S
+    next_s: float = RENEW_INTERVAL_S
     times: tuple[int, ...] = ()
     clocks: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
@@ -455,7 +455,7 @@ class GraphReply(_MasterMessage):
 
 
 @dataclass(frozen=True)
-class Refused(_MasterMessage):
+class RejectedReply(_MasterMessage):
     """Reply to a rejected request.
 
     Attributes:
@@ -468,7 +468,7 @@ class Refused(_MasterMessage):
     code: str = ""
 
 
-Reply = Done | Added | Found | Renewed | GraphReply | Refused
+Reply = DoneReply | AddedReply | FoundReply | RenewedReply | GraphReply | RejectedReply
 
 
 # ---- pushes

@@ -32,13 +32,13 @@ SERVICE_TYPE = "service"
 """Message type and codec under which the master lists servers and clients."""
 ORIGINAL_CODEC = "original"
 """Codec of servers with `ORIGINAL` framing: programs of the original NEP that the gateway registers."""
-PAYLOAD_MAX_BYTES = 64 * 2**20
+MAX_PAYLOAD_BYTES = 64 * 2**20
 """Maximum size of a call or reply in bytes; a peer that sends more is disconnected."""
 
 _VERSION = 1
 _HEADER = struct.Struct("<BBHIQ")  # version, kind, codec, timeout_ms, number
 HEADER_BYTES = _HEADER.size
-_TIMEOUT_MAX_MS = 2**32 - 1
+_MAX_TIMEOUT_MS = 2**32 - 1
 _JSON_CODEC = 1
 _MAX_CLASS_LENGTH, _MAX_REASON_LENGTH = 100, 2000
 _ERROR_PREFIX = b'{"nep_error":'
@@ -48,9 +48,9 @@ class CallKind(IntEnum):
     """Kind of a service frame. `REFUSED` is the reply to a call that the server did not execute."""
 
     CALL = 1
-    ANSWER = 2
+    REPLY = 2
     ERROR = 3
-    REFUSED = 4
+    REJECTED = 4
 
 
 class Reply(NamedTuple):
@@ -124,14 +124,14 @@ class Framing(Protocol):
         """Parse a reply. Raises `WireError`."""
 
 
-class _Native:
+class _NativeFraming:
     is_in_order = False
 
     def call(
         self, number: int, codec: int, timeout_s: float | None, data: bytes | memoryview
     ) -> list[bytes | memoryview]:
         # 0 means no limit, so shorter limits are rounded up to 1 ms
-        limit_ms = 0 if timeout_s is None else max(1, min(_TIMEOUT_MAX_MS, round(timeout_s * 1000)))
+        limit_ms = 0 if timeout_s is None else max(1, min(_MAX_TIMEOUT_MS, round(timeout_s * 1000)))
         return [_HEADER.pack(_VERSION, CallKind.CALL, codec, limit_ms, number), data]
 
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
@@ -145,7 +145,7 @@ class _Native:
 
     def read_reply(self, parts: Sequence[bytes | memoryview]) -> ReceivedReply:
         kind, codec, _limit, number, data = _read_frame(parts)
-        if kind not in {CallKind.ANSWER, CallKind.ERROR, CallKind.REFUSED}:
+        if kind not in {CallKind.REPLY, CallKind.ERROR, CallKind.REJECTED}:
             raise WireError(_("not a service reply"), code="call-kind")
         return ReceivedReply(number, Reply(CallKind(kind), data, codec))
 
@@ -163,7 +163,7 @@ def _read_frame(parts: Sequence[bytes | memoryview]) -> tuple[int, int, int, int
     return kind, codec, limit_ms, number, parts[1]
 
 
-class _Original:
+class _OriginalFraming:
     is_in_order = True
 
     def call(
@@ -186,7 +186,7 @@ class _Original:
         data = _single_part(parts)
         is_failure = bytes(data[: len(_ERROR_PREFIX)]) == _ERROR_PREFIX
         name, _reason = read_error_reply(data) if is_failure else ("", "")
-        kind = CallKind.ANSWER if not is_failure else CallKind.ERROR if name else CallKind.REFUSED
+        kind = CallKind.REPLY if not is_failure else CallKind.ERROR if name else CallKind.REJECTED
         return ReceivedReply(None, Reply(kind, data))
 
 
@@ -198,9 +198,9 @@ def _single_part(parts: Sequence[bytes | memoryview]) -> bytes | memoryview:
     return parts[1]
 
 
-NATIVE: Framing = _Native()
+NATIVE: Framing = _NativeFraming()
 """Framing with a header and a payload."""
-ORIGINAL: Framing = _Original()
+ORIGINAL: Framing = _OriginalFraming()
 """Framing of the original NEP's `client` and `server`: JSON over REQ and REP."""
 
 
@@ -213,11 +213,14 @@ def error_reply(kind: CallKind, name: str, reason: str) -> Reply:
         reason: Message of the exception.
     """
     # lone surrogates become "?"
-    content = {"nep_error": _bounded(name, _MAX_CLASS_LENGTH), "reason": _bounded(reason, _MAX_REASON_LENGTH)}
+    content = {
+        "nep_error": _bounded_text(name, _MAX_CLASS_LENGTH),
+        "reason": _bounded_text(reason, _MAX_REASON_LENGTH),
+    }
     return Reply(kind, orjson.dumps(content))
 
 
-def _bounded(text: str, most: int) -> str:
+def _bounded_text(text: str, most: int) -> str:
     return shortened(text, most).encode("utf-8", "replace").decode()
 
 

@@ -17,15 +17,15 @@ from typing import NamedTuple
 
 from nep.errors import BadNameError, BadTopicError, WireError
 from nep.i18n import _
-from nep.messages.nesting import packed_is_too_deep, too_deep_reason
+from nep.messages.nesting import is_packed_too_deep, too_deep_reason
 from nep.messages.packing import pack, unpack
 from nep.text import first_control
 
 VERSION = 1
 HEADER_BYTES = 32
-TOPIC_MAX_BYTES = 200
-NODE_NAME_MAX_BYTES = 200
-SUBSCRIPTION_MAX_BYTES = 4096
+MAX_TOPIC_BYTES = 200
+MAX_NODE_NAME_BYTES = 200
+MAX_SUBSCRIPTION_BYTES = 4096
 """Maximum size of a subscription in bytes; a peer that sends more is disconnected.
 
 libzmq needs 40 bytes of memory for each byte of a subscription.
@@ -52,7 +52,7 @@ HELLO_ACKNOWLEDGES = b"\xffhello2/"
 """Prefix of a hello filter, level 2: the subscriber also acknowledges echoes with the last message read."""
 HELLO_BATCHES = b"\xffhello3/"
 """Prefix of a hello filter, level 3: the subscriber also reads batches (`nep.protocol.batch`)."""
-_HELLOS = (HELLO_BATCHES, HELLO_ACKNOWLEDGES, HELLO_ONE_PART, HELLO)
+_HELLO_PREFIXES = (HELLO_BATCHES, HELLO_ACKNOWLEDGES, HELLO_ONE_PART, HELLO)
 ACKNOWLEDGEMENT = b"\xffread/"
 """Prefix of the filter that acknowledges an echo.
 
@@ -64,11 +64,11 @@ ACCEPTANCE = b"\xffshares/"
 The filter is removed immediately after it was set.
 """
 
-_HEX = re.compile(rb"[0-9a-fA-F]{16}")
+_ID_PATTERN = re.compile(rb"[0-9a-fA-F]{16}")
 """Pattern of an id; stricter than `int`, which accepts signs and underscores."""
 _HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, size, seq, stamp_ns, publisher
 _FAST_HEADER = struct.Struct("<IIQQQ")  # the first three fields in one
-SIZE_MAX = 2**32 - 1
+MAX_SIZE = 2**32 - 1
 
 
 class Header(NamedTuple):
@@ -97,7 +97,7 @@ class Header(NamedTuple):
         )
 
 
-def form_of(codec: int, flags: int) -> int:
+def encode_form(codec: int, flags: int) -> int:
     """Return the first four bytes of a header (version, codec, flags) as a number.
 
     The number is the same for most messages of a publisher, so back ends compute it in advance.
@@ -127,10 +127,10 @@ def check_topic(topic: str) -> str:
         size = len(topic.encode("utf-8"))
     except UnicodeEncodeError:
         raise BadTopicError(ascii(topic)[1:-1], _("not valid Unicode text")) from None
-    if not 1 <= size <= TOPIC_MAX_BYTES:
+    if not 1 <= size <= MAX_TOPIC_BYTES:
         raise BadTopicError(
             topic,
-            _("the name is {size} bytes; 1 to {most} are allowed").format(size=size, most=TOPIC_MAX_BYTES),
+            _("the name is {size} bytes; 1 to {most} are allowed").format(size=size, most=MAX_TOPIC_BYTES),
         )
     for letter in topic:
         if letter.isspace() or letter == "{":
@@ -152,11 +152,11 @@ def check_node_name(name: str) -> str:
     if control := first_control(name):
         raise BadNameError(name, _("the character '{control}' isn't allowed").format(control=control))
     size = len(name.encode("utf-8"))
-    if not 1 <= size <= NODE_NAME_MAX_BYTES:
+    if not 1 <= size <= MAX_NODE_NAME_BYTES:
         raise BadNameError(
             name,
             _("the name is {size} bytes; 1 to {most} are allowed").format(
-                size=size, most=NODE_NAME_MAX_BYTES
+                size=size, most=MAX_NODE_NAME_BYTES
             ),
         )
     return name
@@ -180,9 +180,9 @@ class Hello(NamedTuple):
 
     subscriber: int
     topic: str
-    one_part: bool
+    reads_one_part: bool
     acknowledges: bool = False
-    batches: bool = False
+    reads_batches: bool = False
 
 
 class Acknowledgement(NamedTuple):
@@ -235,14 +235,14 @@ def hello_part(
 
 def parse_hello(part: bytes) -> Hello | None:
     """Parse a hello filter; return None for anything else."""
-    begin = next((each for each in _HELLOS if part.startswith(each)), None)
+    begin = next((each for each in _HELLO_PREFIXES if part.startswith(each)), None)
     if begin is None:
         return None
     digits, slash, topic = part[len(begin) :].partition(b"/")
     try:
-        if not _HEX.fullmatch(digits) or not slash:
+        if not _ID_PATTERN.fullmatch(digits) or not slash:
             return None
-        rank = _HELLOS.index(begin)
+        rank = _HELLO_PREFIXES.index(begin)
         return Hello(int(digits, 16), topic.decode("utf-8"), rank <= 2, rank <= 1, rank == 0)
     except ValueError:
         return None
@@ -272,7 +272,7 @@ def parse_acceptance(part: bytes) -> OfferAcceptance | None:
 
 def _numbers_after(begin: bytes, part: bytes, count: int) -> list[int] | None:
     words = part[len(begin) :].split(b"/")
-    if not part.startswith(begin) or len(words) != count or not all(map(_HEX.fullmatch, words)):
+    if not part.startswith(begin) or len(words) != count or not all(map(_ID_PATTERN.fullmatch, words)):
         return None
     return [int(each, 16) for each in words]
 
@@ -315,7 +315,7 @@ def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
     except ValueError as error:
         reason = _("the extension isn't valid msgpack: {error}").format(error=error)
         raise WireError(reason, len(part), code="extension") from error
-    if packed_is_too_deep(part, value):
+    if is_packed_too_deep(part, value):
         raise WireError(too_deep_reason(), len(part), code="extension")
     if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
         raise WireError(_("the extension isn't a map with string keys"), len(part), code="extension")
@@ -367,12 +367,12 @@ def split(parts: Sequence[bytes | memoryview]) -> Parts:
     if not parts:
         raise WireError(_("a message must have 3 or 4 parts, but this one has none"), code="part-count")
     first, *rest = split_single_part(bytes(parts[0])) if len(parts) == 1 else parts
-    topic = _topic_in(bytes(first))
-    header, payload, extension = split_rest(rest, is_one_part=len(parts) == 1)
+    topic = _parse_topic(bytes(first))
+    header, payload, extension = parse_remaining_parts(rest, is_one_part=len(parts) == 1)
     return Parts(topic, header, payload, extension)
 
 
-def split_rest(
+def parse_remaining_parts(
     rest: Sequence[bytes | memoryview], *, is_one_part: bool = False
 ) -> tuple[Header, bytes | memoryview, Mapping[str, object]]:
     """Parse the parts after the first: header, payload and extension. Raises `WireError`.
@@ -409,7 +409,7 @@ def split_rest(
     return header, rest[1], read_extension(rest[2]) if header.flags & EXTENSION else {}
 
 
-def _topic_in(part: bytes) -> str:
+def _parse_topic(part: bytes) -> str:
     try:
         if part[-1:] != b"\0":
             raise WireError(_("the topic doesn't end with a zero byte"), len(part), code="topic-end")

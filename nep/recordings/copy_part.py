@@ -13,7 +13,7 @@ import orjson
 
 from nep.errors import RecordingError
 from nep.i18n import _
-from nep.recordings.formats.channels import ChannelDecoder, encoding_of, own_channel
+from nep.recordings.formats.channels import ChannelDecoder, encoding_of, recorder_channel
 from nep.recordings.formats.figures import TopicCounter, changed
 from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
 from nep.recordings.formats.records import RawMessage
@@ -23,7 +23,7 @@ _MAX_ENTRIES = 100_000
 _COPIED_ROLES = frozenset({"notes", "runs", "alarms", "alerts"})
 _FLUSH_INTERVAL_NS = 500_000_000
 _STATS_INTERVAL_NS = 1_000_000_000
-_OWN_METADATA = frozenset({"nep.recording", "nep.figures"})
+_RECORDER_METADATA = frozenset({"nep.recording", "nep.figures"})
 
 
 def copy_part(
@@ -46,9 +46,9 @@ def copy_part(
         RecordingError: There are too many channels.
         OSError: The file can't be written.
     """
-    writer = FileWriter(path, is_new=False, profile=recording.facts.profile)
+    writer = FileWriter(path, is_new=False, profile=recording.info.profile)
     try:
-        copy = _Copy(recording, writer, topics, copied)
+        copy = _PartCopier(recording, writer, topics, copied)
         for raw in recording.file.read_raw(*span, copy.channels):
             copy.add(raw)
         copy.finish()
@@ -58,7 +58,7 @@ def copy_part(
     return copy.count
 
 
-class _Copy:
+class _PartCopier:
     def __init__(
         self, recording: Recording, writer: FileWriter, topics: Collection[str], copied: Callable[[], object]
     ) -> None:
@@ -67,14 +67,14 @@ class _Copy:
         self.count = 0
         self._roles: dict[int, str] = {}
         self._numbers: dict[int, int] = {}
-        for channel, definition in recording.facts.channels.items():
+        for channel, definition in recording.info.channels.items():
             role = dict(definition.metadata).get("nep.role")
             if role in _COPIED_ROLES:
                 self._roles[channel] = role
             elif role is None and definition.topic in topics:
                 self._numbers[channel] = self._channel_number(channel)
         self.channels = frozenset((*self._roles, *self._numbers))
-        writer.define(dict.fromkeys(self._numbers.values()))
+        writer.write_channels(dict.fromkeys(self._numbers.values()))
         self._figures = _StatsCounter(recording) if recording.stats() else None
         self._last_entries: dict[tuple[str, str], object] = {}
         self._entry_count = 0
@@ -82,7 +82,7 @@ class _Copy:
         self._last_ns = 0
 
     def _channel_number(self, channel: int) -> int:
-        number = self._writer.table.number(self._recording.facts.channels[channel])
+        number = self._writer.table.number(self._recording.info.channels[channel])
         if number is None:
             raise RecordingError(str(self._path), _("the recording has too many channels"))
         return number
@@ -125,7 +125,7 @@ class _Copy:
 
     def _write_stats(self, at_ns: int, *, is_final: bool = False) -> None:
         record = None if self._figures is None else self._figures.record(at_ns, is_final=is_final)
-        number = None if record is None else self._writer.table.number(own_channel("figures"))
+        number = None if record is None else self._writer.table.number(recorder_channel("figures"))
         if record is not None and number is not None:
             self._writer.add(number, (at_ns, at_ns), 0, b"", record)
 
@@ -143,8 +143,8 @@ class _Copy:
             writer.add_metadata("nep.recording", words)
         if self._figures is not None:
             writer.add_metadata("nep.figures", self._figures.to_plain())
-        for name, values in recording.facts.metadata:
-            if name not in _OWN_METADATA:
+        for name, values in recording.info.metadata:
+            if name not in _RECORDER_METADATA:
                 writer.add_metadata(name, values)
         writer.finish()
 
@@ -153,7 +153,7 @@ class _StatsCounter:
     """Counter of the lost and late messages within the part."""
 
     def __init__(self, recording: Recording) -> None:
-        self._decoders = {number: ChannelDecoder(each) for number, each in recording.facts.channels.items()}
+        self._decoders = {number: ChannelDecoder(each) for number, each in recording.info.channels.items()}
         self._counters: dict[str, TopicCounter] = {}
         self._next_ns: int | None = None
 

@@ -20,7 +20,7 @@ from nep.errors import DecodeError, RecordingError, RecordingsUnavailableError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.recordings.copy_part import copy_part
-from nep.recordings.film import Container, VideoFile, available_container, frame_of
+from nep.recordings.film import Container, VideoFile, available_container, decode_frame
 from nep.recordings.formats.destination import disk_error
 from nep.recordings.reader import RecordedMessage, Recording
 from nep.system.replace_file import replace_file
@@ -105,7 +105,7 @@ def export(
     """
     if kind not in FORMATS:
         raise ValueError(_("unknown format '{kind}'").format(kind=kind))
-    topics, counted = _suitable_topics(recording, kind, part, progress)
+    topics, counted = _exportable_topics(recording, kind, part, progress)
     if kind == "mcap":
         return [_write_mcap(recording, folder, replace(part, topics=topics), counted)]
     make: Callable[[_Source, Path, float], int]
@@ -150,7 +150,7 @@ def can_export(kind: str, codec: str) -> bool:
     return kind == "mcap" or codec in {"json", "msgpack", "string"}
 
 
-def _suitable_topics(
+def _exportable_topics(
     recording: Recording, kind: str, part: Part, progress: Progress | None
 ) -> tuple[list[str], _Progress]:
     # Suitable topics that have messages. Raises `RecordingError`.
@@ -248,14 +248,14 @@ class _Source:
             except (DecodeError, RecursionError):
                 self.unreadable += 1
                 continue
-            row = _times(each)
+            row = _time_columns(each)
             for name, value in values.items():
-                column = _encodable(name) if name not in row else f"payload.{name}"
-                row[column] = _encodable(value) if isinstance(value, str) else value
+                column = _escape_surrogates(name) if name not in row else f"payload.{name}"
+                row[column] = _escape_surrogates(value) if isinstance(value, str) else value
             yield row
 
 
-def _times(each: RecordedMessage) -> dict[str, object]:
+def _time_columns(each: RecordedMessage) -> dict[str, object]:
     message = each.message
     return {
         "time_ns": each.log_ns,
@@ -267,7 +267,7 @@ def _times(each: RecordedMessage) -> dict[str, object]:
     }
 
 
-def _encodable(text: str) -> str:
+def _escape_surrogates(text: str) -> str:
     # JSON may contain lone surrogates, which can't be encoded.
     return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode("utf-8")
 
@@ -475,7 +475,7 @@ def _write_video(source: _Source, path: Path, fps: float, container: Container) 
     count = 0
     try:
         for each in source.messages():
-            frame = frame_of(opencv, each.message)
+            frame = decode_frame(opencv, each.message)
             if frame is None:
                 source.unreadable += 1
                 continue

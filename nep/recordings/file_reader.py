@@ -41,14 +41,14 @@ _MAX_EXACT_CHUNKS = 200
 """Maximum number of chunks, some minutes long, that `densities` counts exactly with message indexes."""
 _MAX_COUNTED_CHUNKS = 10_000
 """Maximum number of chunks that are counted. For more chunks, the statistics in the file are used."""
-_MAX_HELD_BYTES = 64_000_000
+_MAX_OVERLAP_BYTES = 64_000_000
 """Maximum size in bytes of overlapping chunks in memory; if it is exceeded, messages are not fully sorted."""
 _LARGE_CHUNK_BYTES = 8_000_000
 """Chunk size above which messages are copied, so that a single message doesn't retain the whole chunk."""
 
 
 @dataclass(frozen=True)
-class FileFacts:
+class FileInfo:
     """Properties of an open recording file.
 
     Attributes:
@@ -82,7 +82,7 @@ class RawFile(Protocol):
     """Interface to a recording file that is open in this or another process. Thread-safe."""
 
     @property
-    def facts(self) -> FileFacts:
+    def info(self) -> FileInfo:
         """Properties of the file."""
 
     @property
@@ -209,7 +209,7 @@ class FileReader:
             self._latest_ends = array("Q")
             self._in_chunks: dict[int, array[int]] = {}
             self._index_chunks()
-            self._facts = self._read_facts()
+            self._facts = self._read_info()
         except OSError as error:
             self._file.close()
             raise disk_error(self.path, error) from error
@@ -227,7 +227,7 @@ class FileReader:
                     self._in_chunks[channel] = array("L")
                 self._in_chunks[channel].append(number)
 
-    def _read_facts(self) -> FileFacts:
+    def _read_info(self) -> FileInfo:
         index, compressions = self._index, dict[str, int]()
         for chunk in self._chunks:
             name = "-" if chunk.is_run else chunk.compression
@@ -238,7 +238,7 @@ class FileReader:
             for at in range(len(self._chunks)):
                 for channel, count in self._chunk_counts(at).items():
                     counts[channel] = counts.get(channel, 0) + count
-        return FileFacts(
+        return FileInfo(
             index.definitions.channels,
             counts,
             self._starts[0] if self._chunks else 0,
@@ -253,7 +253,7 @@ class FileReader:
         )
 
     @property
-    def facts(self) -> FileFacts:
+    def info(self) -> FileInfo:
         """Properties of the file."""
         return self._facts
 
@@ -292,7 +292,7 @@ class FileReader:
             following = numbers[at + 1] if at + 1 < len(numbers) else None
             limit = 2**64 if following is None else self._starts[following]
             held += self._chunk_size(number)
-            if following is None or held + self._chunk_size(following) > _MAX_HELD_BYTES:
+            if following is None or held + self._chunk_size(following) > _MAX_OVERLAP_BYTES:
                 limit = 2**64
             until = 0 if pending else bisect_left(messages, limit, key=_log_ns)
             yield from messages[:until]

@@ -19,7 +19,7 @@ from nep.system.replace_file import replace_file
 
 MAX_DURATION_S = 86_400.0
 """Maximum duration in seconds, because an image from another day would cause millions of frames."""
-_TRIAL_SIZE_PX = (64, 48)
+_TEST_FRAME_SIZE_PX = (64, 48)
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def available_container(opencv: Any, folder: Path) -> Container:  # noqa: ANN401
     with tempfile.TemporaryDirectory(prefix=".film-", dir=folder) as trial:
         for container in CONTAINERS:
             writer = container.new_writer(
-                opencv, Path(trial) / f"trial{container.suffix}", 30.0, _TRIAL_SIZE_PX
+                opencv, Path(trial) / f"trial{container.suffix}", 30.0, _TEST_FRAME_SIZE_PX
             )
             is_open = writer.isOpened()
             writer.release()
@@ -76,7 +76,7 @@ def available_container(opencv: Any, folder: Path) -> Container:  # noqa: ANN401
     raise RecordingError(str(folder), _("OpenCV can't write videos on this computer"))
 
 
-def frame_of(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
+def decode_frame(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
     """Convert the image of a message to a BGR array with 8 bits per channel.
 
     Returns None if the image can't be decoded.

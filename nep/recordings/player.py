@@ -24,8 +24,8 @@ from nep.programs.robots.moving import (
     DESCRIPTION_TYPE,
     MovingTopics,
     RobotControls,
-    described_name,
     parse_controls,
+    robot_name_of,
 )
 from nep.recordings.reader import RecordedMessage, Recording
 
@@ -54,7 +54,7 @@ burst.
 _MAX_BATCH = 2_000
 _MAX_WAIT_S = 0.05
 _SPEED_WINDOW_S = 1.0
-_MAX_KINDS = 10_000
+_MAX_CACHED_KINDS = 10_000
 _COMMAND_TYPES = frozenset({COMMAND_TYPE, "geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
 """Message types of commands to a robot or a ROS base (docs/robots.md)."""
 _MAX_DESCRIPTIONS = 10_000
@@ -78,7 +78,7 @@ class PlayerStatus:
     is_playing: bool
     is_at_end: bool
     speed: float
-    true_speed: float | None
+    measured_speed: float | None
     loop: tuple[int, int] | None
     is_looping: bool
 
@@ -165,7 +165,7 @@ class Playback:
         # The state at `shown_ns` becomes due at once, later messages at their time.
         self._position_ns, self._shown_ns = at_ns, shown_ns
         newest = self._recording.newest(shown_ns, self._topics)
-        self._jump = [self._rename(each.message) for each in sorted(newest.values(), key=_log_ns)]
+        self._jump = [self._rename_topic(each.message) for each in sorted(newest.values(), key=_log_ns)]
         self._read_from(shown_ns + 1)
         self._set_anchor()
 
@@ -193,7 +193,7 @@ class Playback:
             return ()
         self._read_from(self._from_ns)
         newest = self._recording.newest(self._from_ns - 1, new) if new else {}
-        return [self._rename(each.message) for each in sorted(newest.values(), key=_log_ns)]
+        return [self._rename_topic(each.message) for each in sorted(newest.values(), key=_log_ns)]
 
     @property
     def speed(self) -> float:
@@ -256,7 +256,7 @@ class Playback:
             self._is_playing,
             self._is_at_end(),
             self._speed,
-            self._true_speed(),
+            self._measured_speed(),
             self._loop,
             self._is_looping,
         )
@@ -268,7 +268,7 @@ class Playback:
             return DueMessages(messages, is_jump=True, wait_s=0.0 if self._is_playing else None)
         if not self._is_playing:
             return DueMessages((), is_jump=False, wait_s=None)
-        target = min(self._target(), self._last_ns())
+        target = min(self._target_ns(), self._last_ns())
         due = self._pop_due(target)
         if len(due) >= _MAX_BATCH and self._next is not None and self._next.log_ns <= target:
             self._position_ns = due[-1].log_ns
@@ -278,7 +278,7 @@ class Playback:
         self._record_progress()
         if self._position_ns >= self._last_ns():
             self._handle_end()
-        messages = [self._rename(each.message) for each in due]
+        messages = [self._rename_topic(each.message) for each in due]
         return DueMessages(messages, False, self._wait_s(), [each.log_ns for each in due])
 
     def messages_at_start(self, topics: Collection[str]) -> Sequence[Message]:
@@ -294,9 +294,9 @@ class Playback:
         if self._position_ns != first_ns or self._from_ns != first_ns + 1:
             return ()
         messages = self._recording.read(first_ns, first_ns + 1, topics)
-        return [self._rename(each.message) for each in messages]
+        return [self._rename_topic(each.message) for each in messages]
 
-    def _target(self) -> int:
+    def _target_ns(self) -> int:
         now = self._clock()
         started, from_ns = self._anchor
         target = from_ns + int((now - started) * self._speed * 1e9)
@@ -360,20 +360,20 @@ class Playback:
         while len(self._progress) > 2 and self._progress[0][0] < now - _SPEED_WINDOW_S:
             self._progress.popleft()
 
-    def _true_speed(self) -> float | None:
+    def _measured_speed(self) -> float | None:
         if len(self._progress) < 2:
             return None
         (started, from_ns), (now, to_ns) = self._progress[0], self._progress[-1]
         return (to_ns - from_ns) / 1e9 / (now - started) if now > started else None
 
-    def _rename(self, message: Message) -> Message:
+    def _rename_topic(self, message: Message) -> Message:
         # Applies `remap`.
         new = self._remap.get(message.topic)
         if new is None:
             return message
         known = self._kinds.get(id(message.kind))
         if known is None:
-            if len(self._kinds) >= _MAX_KINDS:
+            if len(self._kinds) >= _MAX_CACHED_KINDS:
                 self._kinds.clear()
             known = self._kinds[id(message.kind)] = (message.kind, message.kind._replace(topic=new))
         copy = new_message(Message)
@@ -396,7 +396,7 @@ def moving_topics(recording: Recording) -> MovingTopics:
     robots = dict[RobotControls, None]()
     for _at, message in recording.read(topics=described) if described else ():
         with suppress(NepError):
-            found = parse_controls(message.payload, described_name(message.topic))
+            found = parse_controls(message.payload, robot_name_of(message.topic))
             if found is not None and len(robots) < _MAX_DESCRIPTIONS:
                 robots[found] = None
     typed = (each.name for each in recording.topics.values() if each.msg_type in _COMMAND_TYPES)

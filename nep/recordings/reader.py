@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import orjson
 
 from nep.messages.message import Message
-from nep.recordings.file_reader import CACHE_BYTES, FileFacts, FileReader, RawFile
+from nep.recordings.file_reader import CACHE_BYTES, FileInfo, FileReader, RawFile
 from nep.recordings.formats.channels import ChannelDecoder, ChannelDefinition, Role
 from nep.recordings.formats.figures import TopicStats, parse_stats
 from nep.recordings.formats.index import CorruptRange
@@ -96,27 +96,27 @@ class Recording:
         self.file: RawFile = (
             FileReader(path, cache_bytes=cache_bytes, progress=progress) if file is None else file
         )
-        self.facts: FileFacts = self.file.facts
-        self.is_complete = self.facts.is_complete
-        self._decoders = _Decoders(self.facts.channels)
-        self.start_ns, self.end_ns = self.facts.start_ns, self.facts.end_ns
+        self.info: FileInfo = self.file.info
+        self.is_complete = self.info.is_complete
+        self._decoders = _Decoders(self.info.channels)
+        self.start_ns, self.end_ns = self.info.start_ns, self.info.end_ns
         self._roles = {
             number: role
-            for number, each in self.facts.channels.items()
+            for number, each in self.info.channels.items()
             if (role := dict(each.metadata).get("nep.role")) is not None
         }
         self.topics: Mapping[str, RecordedTopic] = self._topics()
         self._channels_of: dict[str, list[int]] = {}
-        for number, each in self.facts.channels.items():
+        for number, each in self.info.channels.items():
             if number not in self._roles:
                 self._channels_of.setdefault(each.topic, []).append(number)
 
     def _topics(self) -> dict[str, RecordedTopic]:
         topics: dict[str, RecordedTopic] = {}
-        for number, definition in self.facts.channels.items():
+        for number, definition in self.info.channels.items():
             if number in self._roles:
                 continue
-            count, decoder = self.facts.counts.get(number, 0), self._decoders[number]
+            count, decoder = self.info.counts.get(number, 0), self._decoders[number]
             known = topics.get(definition.topic)
             if known is not None and (known.message_count or not count):
                 publishers = tuple(dict.fromkeys((*known.publishers, decoder.publisher)))
@@ -156,7 +156,7 @@ class Recording:
     @property
     def size_bytes(self) -> int:
         """Size of the intact part of the file in bytes."""
-        return self.facts.size_bytes
+        return self.info.size_bytes
 
     @property
     def corruption(self) -> Sequence[CorruptRange]:
@@ -175,7 +175,7 @@ class Recording:
         The keys are "note", "end", "started_ns" and "ended_ns", as far as known.
         """
         metadata: dict[str, str] = {}
-        for name, values in self.facts.metadata:
+        for name, values in self.info.metadata:
             if name == "nep.recording":
                 metadata.update(values)
         return metadata
@@ -187,7 +187,7 @@ class Recording:
         the recorder writes once a second.
         """
         totals: dict[str, TopicStats] = {}
-        for name, values in self.facts.metadata:
+        for name, values in self.info.metadata:
             if name == "nep.figures":
                 for topic, text in values.items():
                     known = parse_stats(text)
@@ -310,7 +310,7 @@ class Recording:
         """
         times: dict[str, int] = {}
         for channel, log_ns in self.file.newest_times(at_ns, self._channels(topics)).items():
-            topic = self.facts.channels[channel].topic
+            topic = self.info.channels[channel].topic
             times[topic] = max(log_ns, times.get(topic, 0))
         return times
 
@@ -341,7 +341,7 @@ class Recording:
         if buckets < 1 or end_ns <= start_ns:
             return result
         for channel, counts in self.file.densities(start_ns, end_ns, buckets, self._channels(topics)).items():
-            topic = self.facts.channels[channel].topic
+            topic = self.info.channels[channel].topic
             known = result.get(topic)
             result[topic] = list(counts) if known is None else list(map(sum, zip(known, counts, strict=True)))
         return result

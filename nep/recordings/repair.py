@@ -35,9 +35,9 @@ from nep.recordings.formats.records import (
     ChunkInfo,
     Opcode,
     RawMessage,
-    chunk_head,
     messages_in,
     pack_message_index,
+    read_chunk_head,
     read_message_index,
     read_record,
 )
@@ -75,7 +75,7 @@ class RepairReport:
     discarded_bytes: int
     lost_s: float
     duration_s: float
-    damaged_range_count: int
+    corrupt_range_count: int
 
     @property
     def is_complete(self) -> bool:
@@ -90,7 +90,7 @@ class _Counts:
     discarded_bytes: int = 0
     is_unknown: bool = False
     """True if the number of lost messages is unknown."""
-    damaged_range_count: int = 0
+    corrupt_range_count: int = 0
     last_ns: int = 0
     """Time of the end of the recording in ns since 1970, as far as known."""
     stats: dict[str, object] = field(default_factory=dict)
@@ -153,7 +153,7 @@ def repair(
         counts.discarded_bytes,
         max(0, counts.last_ns - last_ns) / 1e9,
         (last_ns - first_ns) / 1e9,
-        counts.damaged_range_count,
+        counts.corrupt_range_count,
     )
 
 
@@ -192,12 +192,12 @@ class _Repair:
         self._size = file.seek(0, io.SEEK_END)
         self._search_budget = open_budget(path, self._size)
         file.seek(0)
-        if file.read(len(MAGIC)) != MAGIC and not self._find_chunk(0):
+        if file.read(len(MAGIC)) != MAGIC and not self._has_chunk_after(0):
             raise RecordingError(str(path), _("not an MCAP file"))
         self._definitions = self._known_definitions(path)
         self._table = ChannelTable(self._definitions.channels)
         self._counts = _Counts()
-        self._damaged_chunk: ChunkHead | None = None
+        self._corrupt_chunk: ChunkHead | None = None
         self._others = RecordCounter(path)
         self.writer = FileWriter(target, self._table, is_new=False)
 
@@ -290,8 +290,8 @@ class _Repair:
 
     def _copy_chunk_at(self, place: RecordLocation) -> bool:
         self._file.seek(place.offset)
-        head = chunk_head(self._file.read(CHUNK_HEAD_BYTES), place.length)
-        self._damaged_chunk = None
+        head = read_chunk_head(self._file.read(CHUNK_HEAD_BYTES), place.length)
+        self._corrupt_chunk = None
         if head is None:
             return False
         self._file.seek(place.offset)
@@ -301,8 +301,8 @@ class _Repair:
         except ValueError:
             if not self._is_record_at(place.offset + HEAD_BYTES + place.length):
                 return False
-            self._damaged_chunk = head
-            self._counts.damaged_range_count += 1
+            self._corrupt_chunk = head
+            self._counts.corrupt_range_count += 1
             self._counts.is_unknown = True  # until its message indexes are read
             self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
             self._discard_bytes(HEAD_BYTES + place.length)
@@ -375,7 +375,7 @@ class _Repair:
 
     def _count_lost(self, place: RecordLocation) -> None:
         # The index of a damaged chunk has the number of its lost messages.
-        if self._damaged_chunk is None:
+        if self._corrupt_chunk is None:
             return
         with suppress(ValueError):
             channel, entries = read_message_index(self._read_content(place))
@@ -392,7 +392,7 @@ class _Repair:
     def _skip_corruption(self, offset: int) -> int:
         # Returns the offset to continue at. Keeps whole messages of a chunk truncated by the end of the file.
         found = next(self._complete_chunks(offset + 1), None)
-        self._counts.damaged_range_count += 1
+        self._counts.corrupt_range_count += 1
         self._counts.is_unknown = True
         if found is None:
             copied = self._copy_truncated_chunk(offset)
@@ -401,7 +401,7 @@ class _Repair:
         self._discard_bytes(found - offset)
         return found
 
-    def _find_chunk(self, offset: int) -> bool:
+    def _has_chunk_after(self, offset: int) -> bool:
         return next(self._complete_chunks(offset), None) is not None
 
     def _complete_chunks(self, offset: int) -> Iterator[int]:
@@ -425,7 +425,7 @@ class _Repair:
 
     def _is_complete_chunk(self, offset: int, length: int) -> bool:
         self._file.seek(offset)
-        head = chunk_head(self._file.read(CHUNK_HEAD_BYTES), length)
+        head = read_chunk_head(self._file.read(CHUNK_HEAD_BYTES), length)
         if head is None or not head.crc:
             return False
         self._search_budget.spend(head.data_bytes + min(head.uncompressed_bytes, _WINDOW_BYTES))
@@ -443,7 +443,7 @@ class _Repair:
         if len(begin) < HEAD_BYTES or begin[0] != Opcode.CHUNK:
             return 0
         _opcode, length = RECORD_HEAD.unpack_from(begin)
-        head = chunk_head(begin, length)
+        head = read_chunk_head(begin, length)
         if head is None or offset + HEAD_BYTES + length <= self._size:
             return 0
         self._file.seek(offset)

@@ -32,8 +32,8 @@ from nep.recordings.formats.records import (
     ChunkInfo,
     Opcode,
     RawMessage,
-    chunk_head,
     messages_in,
+    read_chunk_head,
 )
 from nep.recordings.writer import LogClock, RecordingWriter
 
@@ -364,7 +364,7 @@ def _copy_chunk(file: BinaryIO, chunk: ChunkInfo, writer: FileWriter, figures: _
     record = memoryview(file.read(chunk.length))
     if len(record) != chunk.length or record[0] != Opcode.CHUNK:
         return False
-    head = chunk_head(record, chunk.length - HEAD_BYTES)
+    head = read_chunk_head(record, chunk.length - HEAD_BYTES)
     indexes = dict(_split_indexes(file.read(chunk.index_bytes)))
     if head is None or head.start_ns != chunk.start_ns or indexes.keys() != set(chunk.channels):
         return False

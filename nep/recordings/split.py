@@ -6,7 +6,7 @@ from pathlib import Path
 
 from nep.errors import RecordingError
 from nep.i18n import _
-from nep.recordings.formats.destination import DEFAULT_LIMITS, OneFile, WriterLimits, disk_error
+from nep.recordings.formats.destination import DEFAULT_LIMITS, SingleFile, WriterLimits, disk_error
 from nep.recordings.formats.mcap_file import ChannelTable, FileWriter
 
 MIN_PART_BYTES = 100_000
@@ -37,7 +37,7 @@ class SplitFiles:
         """Files created so far."""
         self._part = self._new_file()
 
-    def _new_file(self) -> OneFile:
+    def _new_file(self) -> SingleFile:
         path = part_path(self._path, len(self.paths) + 1)
         try:
             file = FileWriter(path, self._table)
@@ -46,7 +46,7 @@ class SplitFiles:
         except OSError as error:
             raise disk_error(path, error) from error
         self.paths.append(path)
-        return OneFile(file, self._limits.min_free_bytes)
+        return SingleFile(file, self._limits.min_free_bytes)
 
     @property
     def file(self) -> FileWriter:

@@ -28,9 +28,15 @@ from nep.recordings.formats.channels import (
     Role,
     definition_of,
     encoding_of,
-    own_channel,
+    recorder_channel,
 )
-from nep.recordings.formats.destination import DEFAULT_LIMITS, Destination, OneFile, WriterLimits, disk_error
+from nep.recordings.formats.destination import (
+    DEFAULT_LIMITS,
+    Destination,
+    SingleFile,
+    WriterLimits,
+    disk_error,
+)
 from nep.recordings.formats.figures import MAX_TOPICS, TopicCounter, TopicStats, changed
 from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
 
@@ -185,7 +191,7 @@ class RecordingWriter:
         if isinstance(path, str | os.PathLike):
             whole = Path(path)
             try:
-                self._destination: Destination = OneFile(FileWriter(whole), limits.min_free_bytes)
+                self._destination: Destination = SingleFile(FileWriter(whole), limits.min_free_bytes)
             except FileExistsError:
                 raise RecordingError(str(whole), _("the file already exists; choose another name")) from None
             except OSError as error:
@@ -395,7 +401,7 @@ class RecordingWriter:
     def _write_batch(self, batch: Sequence[tuple[int, Sequence[Message]] | _Entry]) -> None:
         for number, part in enumerate(batch):
             if isinstance(part, _Entry):
-                self._write_own_entry(part.role, part.text)
+                self._write_recorder_entry(part.role, part.text)
                 size, count = len(part.text), 1
             else:
                 now, messages = part
@@ -471,11 +477,11 @@ class RecordingWriter:
         encoding = encoding_of(message, log_ns, is_self_contained=True)
         return table.number(definition_of(message, encoding)), encoding
 
-    def _write_own_entry(self, role: Role, text: bytes) -> None:
+    def _write_recorder_entry(self, role: Role, text: bytes) -> None:
         self._own_sequence += 1
         now = self._last_ns = max(self._last_ns, self._clock())
         file = self._destination.file
-        number = file.table.number(own_channel(role))
+        number = file.table.number(recorder_channel(role))
         if number is not None:
             self._own_numbers.add(number)
             file.add(number, (now, now), self._own_sequence & 0xFFFFFFFF, b"", text)
@@ -518,7 +524,7 @@ class RecordingWriter:
         with self._lock:
             self._figures = {**self._figures, **figures}
         plain = {topic: each.to_plain() for topic, each in self._part.stats_of_part(figures).items()}
-        self._write_own_entry("figures", orjson.dumps({"topics": plain, "is_final": all_of_them}))
+        self._write_recorder_entry("figures", orjson.dumps({"topics": plain, "is_final": all_of_them}))
 
     # ---- finishing
 

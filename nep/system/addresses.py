@@ -28,11 +28,11 @@ _logger = logging.getLogger("nep")
 MASTER_VARIABLE = "NEP_MASTER"
 DEFAULT_MASTER = "127.0.0.1:7780"
 _DEFAULT_PORT = 7780
-_HOST = re.compile(r"[\w.-]+|\*", re.ASCII)
+_HOST_PATTERN = re.compile(r"[\w.-]+|\*", re.ASCII)
 _NUMERIC_HOST = re.compile(r"[\d.]+", re.ASCII)
-_PORT = re.compile(r"\d{1,5}", re.ASCII)
-_OCTET = re.compile(r"0*\d{1,3}", re.ASCII)
-_ENDPOINT = re.compile(r"tcp://[\w.-]{1,253}:(\d{1,5})|ipc://@nep-(\d{1,5})", re.ASCII)
+_PORT_PATTERN = re.compile(r"\d{1,5}", re.ASCII)
+_OCTET_PATTERN = re.compile(r"0*\d{1,3}", re.ASCII)
+_ENDPOINT_PATTERN = re.compile(r"tcp://[\w.-]{1,253}:(\d{1,5})|ipc://@nep-(\d{1,5})", re.ASCII)
 
 ANY_HOST = "0.0.0.0"  # noqa: S104 - bound only at a user's request
 """IPv4 address that stands for all interfaces of a computer."""
@@ -60,7 +60,7 @@ def master_address(address: str | None = None) -> str:
     host, colon, port = chosen.rpartition(":")
     if not colon:
         chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)
-    if not _HOST.fullmatch(host) or not _is_valid_host(host) or not _is_port(port):
+    if not _HOST_PATTERN.fullmatch(host) or not _is_valid_host(host) or not _is_port(port):
         raise NepError(
             _("'{chosen}' isn't a valid address of a master; use an address such as '{example}'").format(
                 chosen=quotable(chosen), example=DEFAULT_MASTER
@@ -87,7 +87,7 @@ def check_host(host: object) -> str:
                 host=quotable(host)
             )
         )
-    if not isinstance(host, str) or not _HOST.fullmatch(host) or not _is_valid_host(host):
+    if not isinstance(host, str) or not _HOST_PATTERN.fullmatch(host) or not _is_valid_host(host):
         raise NepError(
             _(
                 "'{host}' isn't a valid computer address; use an IP address such as '127.0.0.1', or the "
@@ -108,19 +108,21 @@ def _is_ipv6(address: str) -> bool:
 
 
 def _is_port(word: str) -> bool:
-    return _PORT.fullmatch(word) is not None and int(word) <= 65535
+    return _PORT_PATTERN.fullmatch(word) is not None and int(word) <= 65535
 
 
 def _is_valid_host(host: str) -> bool:
     if not _NUMERIC_HOST.fullmatch(host):
         return True
     numbers = host.split(".")
-    return len(numbers) == 4 and all(_OCTET.fullmatch(each) and int(each[-3:]) < 256 for each in numbers)
+    return len(numbers) == 4 and all(
+        _OCTET_PATTERN.fullmatch(each) and int(each[-3:]) < 256 for each in numbers
+    )
 
 
 def is_endpoint(endpoint: str) -> bool:
     """Return True if the text is a valid endpoint of a publisher: tcp://HOST:PORT or ipc://@nep-PORT."""
-    found = _ENDPOINT.fullmatch(endpoint)
+    found = _ENDPOINT_PATTERN.fullmatch(endpoint)
     return found is not None and 0 < int(found[1] or found[2]) < 65536
 
 
@@ -225,7 +227,7 @@ def resolve_address(address: str) -> str:
         ) from error
 
 
-class MasterName:
+class MasterNameResolver:
     """Resolver of the master's host name in a background thread.
 
     Resolution can take half a minute, and libzmq would resolve again in its I/O thread at each connection

@@ -28,7 +28,7 @@ class ForkAware(Protocol):
         """Mark the object as closed in a child process, without taking a lock or touching a ZeroMQ socket."""
 
 
-_watched: WeakSet[ForkAware] = WeakSet()
+_fork_aware_objects: WeakSet[ForkAware] = WeakSet()
 _handlers: list[Callable[[], None]] = []
 _inherited_endpoints: set[str] = set()
 _DESCRIPTOR_FOLDER = "/proc/self/fd" if sys.platform == "linux" else "/dev/fd"
@@ -37,7 +37,7 @@ _ANY_HOSTS = frozenset({"*", "0.0.0.0"})  # noqa: S104 - nothing is bound
 
 def watch(owner: ForkAware) -> None:
     """Register an object whose `forked` is called in every child process. Only a weak reference is stored."""
-    _watched.add(owner)
+    _fork_aware_objects.add(owner)
 
 
 def close_in_child(*endpoints: str) -> None:
@@ -58,8 +58,8 @@ def call_in_child(call: Callable[[], None]) -> None:
 
 
 def _notify_owners() -> None:
-    owners = list(_watched)
-    _watched.clear()
+    owners = list(_fork_aware_objects)
+    _fork_aware_objects.clear()
     for tell in (*(owner.forked for owner in owners), *_handlers):
         with contextlib.suppress(Exception):  # a failure must not prevent the others
             tell()

@@ -23,7 +23,7 @@ else:
 _logger = logging.getLogger("nep.system.plugins")
 
 
-class Named(Protocol):
+class Plugin(Protocol):
     """Plug-in: an object with a name."""
 
     @property
@@ -31,7 +31,7 @@ class Named(Protocol):
         """Name of the plug-in."""
 
 
-T = TypeVar("T", bound=Named)
+T = TypeVar("T", bound=Plugin)
 
 
 def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:

@@ -15,24 +15,24 @@ from app.blocks.model.workspace import parse_workspace
 from app.blocks.runtime import values
 from app.blocks.runtime.errors import BehaviourError, explain
 from app.blocks.runtime.robot_handle import activity_text
-from app.blocks.runtime.triggers import Hat, ThresholdTrigger, change_detector, event_matches
+from app.blocks.runtime.triggers import ScriptTrigger, ThresholdTrigger, change_detector, event_matches
 from tests.blocks.samples import robot
 
 
 @given(st.lists(st.text(), min_size=1, max_size=8))
 def test_names_are_valid_python_identifiers_and_unique(words):
     names = PythonNames(frozenset({"taken"}))
-    made = [names.new(word, "thing") for word in words]
+    made = [names.new_name(word, "thing") for word in words]
     assert len(set(made)) == len(made)
     assert all(name.isidentifier() and not keyword.iskeyword(name) and name != "taken" for name in made)
 
 
 def test_python_names_are_derived_from_block_text():
     names = PythonNames(frozenset())
-    assert names.new("when started", "x") == "when_started"
-    assert names.new("When started!", "x") == "when_started_2"
-    assert names.new("123", "thing") == "thing_123"
-    assert names.new("???", "thing") == "thing"
+    assert names.new_name("when started", "x") == "when_started"
+    assert names.new_name("When started!", "x") == "when_started_2"
+    assert names.new_name("123", "thing") == "thing_123"
+    assert names.new_name("???", "thing") == "thing"
 
 
 def test_number_field_reads_and_validates_values():
@@ -111,11 +111,11 @@ def test_exceptions_are_explained():
 
 
 def test_event_block_keeps_newest_events_and_counts_dropped_ones():
-    hat = Hat("x", most=3)
+    hat = ScriptTrigger("x", most=3)
     for number in range(5):
         hat.enqueue((number,))
     assert hat.dropped == 2
-    lone = Hat("x", most=1)
+    lone = ScriptTrigger("x", most=1)
     lone.enqueue(())
     lone.enqueue(())
     assert lone.dropped == 0  # a second touch while the script runs is one more run, not a loss

@@ -23,7 +23,7 @@ class WireRobot:
         self.changed = threading.Condition()
         self._node = nep.node(name, master=master)
         topics = self.described.topics
-        self._answer = self._node.new_pub(topics.answer, "robot/answer")
+        self._answer = self._node.new_pub(topics.reply, "robot/answer")
         self._description = self._node.new_pub(topics.description, "robot/description", latched=True)
         self._description.publish(dict(self.described.source))
         self._sensors = {

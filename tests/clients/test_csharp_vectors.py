@@ -238,7 +238,7 @@ def test_image_shapes_match_those_of_python(wire: MonoProgram, order: str) -> No
         turned_jpeg = jpeg[:2] + bad.segment(0xE1, told) + jpeg[2:]
         turned_png = png[:33] + bad.chunk(b"eXIf", told[6:]) + png[33:]
         for file in (turned_jpeg, turned_png):
-            assert json.loads(wire.ask(f"image {file.hex()}")) == image_codec.picture_info(file)
+            assert json.loads(wire.ask(f"image {file.hex()}")) == image_codec.image_info(file)
     for end in range(20, len(turned_jpeg), 7):
         cut = json.loads(wire.ask(f"image {turned_jpeg[:end].hex()}"))
         assert "error" in cut or cut["encoding"] == "jpeg"

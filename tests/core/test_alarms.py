@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.alarms import FILE, MAX_AGE_S
+from app.core.alarms import FILE_NAME, MAX_MESSAGE_AGE_S
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
@@ -131,7 +131,7 @@ def test_alarms_and_their_history_survive_a_restart(tmp_path: Path) -> None:
     first.alarms.create(AlarmCondition("below", "/distance", "", 1))  # ... or which value
     first.alarms.snooze(kept.id, 4e9)
     first.close()
-    assert [rule.id for rule in read_alarms(tmp_path / FILE).rules] == [kept.id]
+    assert [rule.id for rule in read_alarms(tmp_path / FILE_NAME).rules] == [kept.id]
     second = at_rest(tmp_path)
     assert [(rule.id, rule.snoozed_until_s) for rule in second.alarms.rules] == [(kept.id, 4e9)]
     assert [each.id for each in second.alerts.active if each.id.startswith("alarms:")] == []
@@ -155,7 +155,7 @@ def test_number_of_alarms_is_limited_to_the_file_capacity(tmp_path: Path, monkey
     assert all(each.id != "alarms:most" for each in session.alerts.active)
     session.alarms.restore()
     session.close()
-    assert len(read_alarms(tmp_path / FILE).rules) == 5
+    assert len(read_alarms(tmp_path / FILE_NAME).rules) == 5
 
 
 def test_active_alarm_is_shown_even_if_its_history_record_was_evicted(tmp_path: Path) -> None:
@@ -174,7 +174,7 @@ def test_active_alarm_is_shown_even_if_its_history_record_was_evicted(tmp_path: 
 
 @pytest.mark.parametrize("data", [b"{oops", b"\xff", b"[]", b""])
 def test_damaged_file_is_backed_up_and_reported(tmp_path: Path, data: bytes) -> None:
-    (tmp_path / FILE).write_bytes(data)
+    (tmp_path / FILE_NAME).write_bytes(data)
     session = at_rest(tmp_path)
     assert session.alarms.rules == ()
     assert (tmp_path / "alarms.damaged.json").read_bytes() == data
@@ -182,13 +182,13 @@ def test_damaged_file_is_backed_up_and_reported(tmp_path: Path, data: bytes) -> 
     assert "alarms.damaged.json" in said.detail
     session.alarms.create(BELOW)
     session.close()
-    assert len(read_alarms(tmp_path / FILE).rules) == 1
+    assert len(read_alarms(tmp_path / FILE_NAME).rules) == 1
 
 
 def test_invalid_alarm_in_the_file_does_not_disable_the_others(tmp_path: Path) -> None:
     text = json.loads(encode_alarms([AlarmRule("good", BELOW)]))
     text["alarms"].append({"when": {"topic": "/t", "is": "sielnt"}})
-    (tmp_path / FILE).write_text(json.dumps(text), encoding="utf-8")
+    (tmp_path / FILE_NAME).write_text(json.dumps(text), encoding="utf-8")
     session = at_rest(tmp_path)
     assert [rule.id for rule in session.alarms.rules] == ["good"]
     assert json.loads((tmp_path / "alarms.damaged.json").read_text(encoding="utf-8")) == text
@@ -197,11 +197,11 @@ def test_invalid_alarm_in_the_file_does_not_disable_the_others(tmp_path: Path) -
 
 def test_file_of_a_newer_version_is_not_modified(tmp_path: Path) -> None:
     data = b'{"format": 2, "alarms": [], "more": true}'
-    (tmp_path / FILE).write_bytes(data)
+    (tmp_path / FILE_NAME).write_bytes(data)
     session = at_rest(tmp_path)
     session.alarms.create(BELOW)
     session.close()
-    assert (tmp_path / FILE).read_bytes() == data
+    assert (tmp_path / FILE_NAME).read_bytes() == data
     assert not (tmp_path / "alarms.damaged.json").exists()
 
 
@@ -212,7 +212,7 @@ def test_alarm_message_expires_if_no_master_is_found_in_time(tmp_path: Path) -> 
     session.source.submit = lambda _what, job: jobs.append(job)  # type: ignore[method-assign]
     told: list[tuple[bool, str]] = []
     session.alarms._submit_command(None, AlarmAction("send", "/cmd", 1), lambda *said: told.append(said))  # type: ignore[arg-type]
-    now[0] += MAX_AGE_S + 1
+    now[0] += MAX_MESSAGE_AGE_S + 1
     jobs[0](None)
     assert told == [(False, "no master was running")]
     session.close()

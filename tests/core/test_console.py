@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import orjson
 
-from app.core.console import TEXT_LIMIT, Console
+from app.core.console import MAX_TEXT_LENGTH, Console
 from nep.messages.message import Message
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
 
@@ -20,8 +20,8 @@ def test_console_keeps_the_newest_records_in_order() -> None:
 
 def test_long_text_is_truncated_and_shows_its_length() -> None:
     console = Console()
-    console.add("info", "test", "x" * (TEXT_LIMIT + 10))
-    assert console.records[0].text.endswith(f"… ({TEXT_LIMIT + 10} characters)")
+    console.add("info", "test", "x" * (MAX_TEXT_LENGTH + 10))
+    assert console.records[0].text.endswith(f"… ({MAX_TEXT_LENGTH + 10} characters)")
 
 
 def test_clear_removes_all_records() -> None:
@@ -89,12 +89,12 @@ def test_malformed_log_messages_are_shown_as_one_record_or_reported_as_alerts() 
     console.add_messages([
         Message(LOG_TOPIC, b"{oops", "json", LOG_TYPE),
         Message(LOG_TOPIC, b'"only words"', "json", LOG_TYPE),
-        record(level="critical", text="x" * (TEXT_LIMIT + 1), node="a", name="a"),
+        record(level="critical", text="x" * (MAX_TEXT_LENGTH + 1), node="a", name="a"),
     ])  # fmt: skip
     words, long = console.records
     assert (words.text, words.origin, words.stamp_s) == ("only words", "unknown sender", 5.0)
     assert (long.level, long.logger) == ("critical", "")
-    assert long.text.endswith(f"… ({TEXT_LIMIT + 1} characters)")
+    assert long.text.endswith(f"… ({MAX_TEXT_LENGTH + 1} characters)")
 
 
 def test_full_ring_of_unread_records_keeps_the_newest() -> None:

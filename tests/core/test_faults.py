@@ -15,7 +15,7 @@ import nep
 from app.core import faults
 from app.core.faults import FaultAlerts, LogFile, RepeatFilter, error_text
 from app.core.network.source import GraphReceived, JobFailed, LiveSource, MasterFound
-from app.core.robots.stop.report import StopDone, StopReport
+from app.core.robots.stop.report import StopCompleted, StopReport
 from app.core.run.runner import RunnerEvent
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -186,9 +186,9 @@ def test_event_handler_that_raises_does_not_block_other_events(
     session: Session, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     stopped: list[object] = []
-    monkeypatch.setattr(session.runs, "on_runner", raising)
+    monkeypatch.setattr(session.runs, "on_runner_event", raising)
     monkeypatch.setattr(session.runs, "on_stop", stopped.append)
-    done = StopDone(1, StopReport((), 0.0))
+    done = StopCompleted(1, StopReport((), 0.0))
     for _ in range(29):
         for event in (RunnerEvent("running", 1), done, MasterFound(ADDRESS)):
             session._mailbox.post_event(event)
@@ -236,7 +236,7 @@ def test_stop_and_messages_are_processed_when_part_of_a_tick_raises(
         session._mailbox.post("/log", [message])
         session._mailbox.post("/faces", [message])
         session._mailbox.post_event(RunnerEvent("running", 1))
-        session._mailbox.post_event(StopDone(1, StopReport((), 0.0)))
+        session._mailbox.post_event(StopCompleted(1, StopReport((), 0.0)))
         session.tick()
     assert len(stopped) == 2
     if place != "topics.add":

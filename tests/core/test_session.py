@@ -14,7 +14,7 @@ import pytest
 
 import nep
 from app.core.network.source import JobFailed
-from app.core.session import MONITORING_FAILED, Session
+from app.core.session import MONITORING_FAILED_MESSAGE, Session
 from app.errors import RobotInputError, UnknownRobotError
 from app.robots.description.description import thing_description
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
@@ -106,7 +106,7 @@ def test_virtual_robot_connects_runs_an_action_and_stops(session: Session) -> No
     tick_until(session, lambda: session.fleet.connected)
     link = session.fleet.link("Pepper")
     assert link is not None
-    assert link.virtual
+    assert link.is_virtual
     tick_until(session, lambda: link.chip_text == "virtual, ready")
     with session.fleet.watch_sensors("Pepper"):
         tick_until(session, lambda: "distance" in link.values and link.drawing is not None)
@@ -308,7 +308,7 @@ def _number(value: float) -> dict[str, object]:
 
 
 def test_failed_network_job_is_reported_in_one_sentence(session: Session) -> None:
-    session._on_event(JobFailed(MONITORING_FAILED, "the master has gone"), 0.0)
+    session._on_event(JobFailed(MONITORING_FAILED_MESSAGE, "the master has gone"), 0.0)
     session._on_event(JobFailed("", "nobody asked"), 0.0)
     texts = [record.text for record in session.console.records]
     assert "can't monitor the robots: the master has gone" in texts

@@ -106,7 +106,7 @@ if IS_THERE:  # they are no needs of the library's own
             path.write_bytes(data)
             settings = Settings(Path(folder))
             assert isinstance(settings.get("theme", ""), str)
-            assert all(isinstance(each.opened_s, float) for each in settings.all_recent)
+            assert all(isinstance(each.opened_s, float) for each in settings.all_recent_files)
             settings.set("theme", "light")
             assert Settings(Path(folder)).get("theme", "") == "light"
 

@@ -8,7 +8,7 @@ import orjson
 
 from nep.cli import topic_patterns
 from nep.cli.publish import parse_payload as payload_of
-from nep.cli.values import format_payload, json_of
+from nep.cli.values import encode_json, format_payload
 from nep.errors import EncodeError, NepError, WrongTypeError
 from nep.messages.codecs import CODECS
 from nep.messages.fields import MISSING, leaf_paths, parse_path, value_at
@@ -84,7 +84,7 @@ def patterns_of_topics(data: bytes) -> None:
 )
 def values_on_a_terminal(data: bytes) -> None:
     value = value_of(data)
-    for made in (json_of(value), json_of(value, indent=True)):
+    for made in (encode_json(value), encode_json(value, indent=True)):
         json.loads(made)
     for whole in (False, True):
         shown = format_payload(value, whole=whole)

@@ -10,7 +10,13 @@ from pathlib import Path
 from nep.errors import NepError
 from nep.programs.bridges.configuration import configuration_from_arguments
 from nep.programs.bridges.toml_file import EXAMPLE, parse_configuration
-from nep.programs.gateway.framing import FrameError, Shape, has_replaced_nan, shield_csharp, shield_javascript
+from nep.programs.gateway.framing import (
+    FrameError,
+    FrameFormat,
+    escape_for_csharp,
+    escape_for_javascript,
+    has_replaced_nan,
+)
 from nep.programs.gateway.portmap import PortMap, Registration, TopicLine
 from nep.programs.gateway.requests import (
     PORT_B,
@@ -63,7 +69,9 @@ def frames() -> Iterator[bytes]:
 
 
 SHAPES = tuple(
-    Shape("t", framing, codec) for framing in ("prefixed", "bare") for codec in ("json", "string", "image")
+    FrameFormat("t", framing, codec)
+    for framing in ("prefixed", "bare")
+    for codec in ("json", "string", "image")
 )
 
 
@@ -93,12 +101,12 @@ def shield(data: bytes) -> None:
         value = json.loads(data)
     except (ValueError, RecursionError):
         value = None
-        shield_csharp(shield_javascript(data, "t"))
+        escape_for_csharp(escape_for_javascript(data, "t"))
     if value is None:
         return
-    for shielded in (shield_javascript(data, "t"), shield_csharp(data)):
+    for shielded in (escape_for_javascript(data, "t"), escape_for_csharp(data)):
         assert repr(json.loads(shielded)) == repr(value)
-    assert not {*b" \n\t\r"} & {*shield_csharp(data)}
+    assert not {*b" \n\t\r"} & {*escape_for_csharp(data)}
 
 
 def files() -> Iterator[bytes]:

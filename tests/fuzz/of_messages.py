@@ -108,7 +108,7 @@ PNG_WORDS = (b"IHDR", b"IDAT", b"IEND", b"PLTE", b"tRNS", b"acTL", b"fdAT", b"\x
 
 @TARGETS.add(DecodeError, seeds=pictures, words=(*JPEG_WORDS, *PNG_WORDS))
 def picture_files(data: bytes) -> None:
-    info = image_codec.picture_info(data)
+    info = image_codec.image_info(data)
     found = parse_header(data)
     assert info == found.extension
     assert 1 <= found.orientation <= 8

@@ -9,7 +9,12 @@ from collections.abc import Iterator
 from functools import cache
 
 from nep.backends.connection import parse_port, validate_mode
-from nep.backends.nanomsg.endpoints import endpoint, parse_endpoint, split_message, subscriber_topic_part
+from nep.backends.nanomsg.endpoints import (
+    format_endpoint,
+    parse_endpoint,
+    split_message,
+    subscriber_topic_part,
+)
 from nep.backends.ros import carried, definition
 from nep.backends.ros.address import ros_master_address
 from nep.backends.ros2.names import (
@@ -274,19 +279,21 @@ def messages_of_nanomsg(data: bytes) -> None:
     for is_alone in (False, True):
         rest = split_message(data, b"t\0", is_alone=is_alone)
         if len(rest) > 1:
-            wire.split_rest(rest)
+            wire.parse_remaining_parts(rest)
         else:
             wire.read_header(rest[0])
     assert subscriber_topic_part(7, "t").endswith(b"\0")
 
 
-@TARGETS.add(seeds=lambda: [endpoint("127.0.0.1", 5, 6).encode()], words=(b"nanomsg://", b":65536/", b"/0"))
+@TARGETS.add(
+    seeds=lambda: [format_endpoint("127.0.0.1", 5, 6).encode()], words=(b"nanomsg://", b":65536/", b"/0")
+)
 def endpoints_of_nanomsg(data: bytes) -> None:
     text = text_of(data)
     found = parse_endpoint(text)
     if found is not None:
         messages, hellos = (each.rpartition(":") for each in found)
-        assert endpoint(messages[0], int(messages[2]), int(hellos[2])) == text or "0" in text
+        assert format_endpoint(messages[0], int(messages[2]), int(hellos[2])) == text or "0" in text
 
 
 def tokens() -> Iterator[bytes]:

@@ -11,17 +11,17 @@ from urllib.parse import unquote
 from nep.errors import NepError
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
-from nep.programs.web.access import Access, AuthCheck
+from nep.programs.web.access import Access, AuthVerifier
 from nep.programs.web.foxglove import protocol as foxglove
 from nep.programs.web.limits import MAX_MESSAGE_BYTES
 from nep.programs.web.messages import operations as op
 from nep.programs.web.messages.fragments import FragmentBuffer
 from nep.programs.web.messages.payloads import from_ros, nep_type_of, ros_type_of
-from nep.programs.web.messages.png import text_as_png, text_in_png
+from nep.programs.web.messages.png import decode_png, encode_png
 from nep.programs.web.outgoing import EncodingOptions, publish_frames
 from nep.programs.web.served_pages import PageRequest, respond
 from nep.programs.web.server import node_name
-from nep.programs.web.visitors import MAX_SHOWN_LENGTH, client_name, page_title
+from nep.programs.web.visitors import MAX_DISPLAYED_LENGTH, client_name, page_title
 from nep.protocol.wire import check_node_name
 from nep.text import first_control
 from tests.fuzz.target import Targets, check_sentence, text_of
@@ -44,7 +44,7 @@ def operations() -> Iterator[bytes]:
         {"op": "call_service", "service": "/s#1", "args": [], "timeout": 1e308},
         {"op": "service_response", "id": "c", "service": "/s", "values": {}, "result": False},
         {"op": "fragment", "id": "f", "data": '{"op":"status"}', "num": 0, "total": 1},
-        {"op": "png", "data": text_as_png(b'{"op":"set_level","level":"info"}')},
+        {"op": "png", "data": encode_png(b'{"op":"set_level","level":"info"}')},
         {"op": "auth", "mac": "m", "client": "c", "dest": "d", "rand": "r", "t": 1, "level": "l", "end": 2},
     ):
         yield json.dumps(fields).encode()
@@ -61,11 +61,11 @@ def operations_of_pages(data: bytes) -> None:
             whole = buffer.add(operation)
             if whole is None:
                 return
-            inner = text_in_png(whole) if isinstance(operation, op.Png) else whole.encode("utf-8", "replace")
+            inner = decode_png(whole) if isinstance(operation, op.Png) else whole.encode("utf-8", "replace")
             assert len(inner) <= MAX_MESSAGE_BYTES
             operation = op.parse(inner)
     if isinstance(operation, op.Auth):
-        assert not AuthCheck("token", lambda: 1.0).verify(operation)
+        assert not AuthVerifier("token", lambda: 1.0).verify(operation)
     if isinstance(operation, op.Publish):
         for ros_type in TYPES:
             try:
@@ -83,13 +83,13 @@ def operations_of_pages(data: bytes) -> None:
 def origins_of_pages(data: bytes) -> None:
     text = text_of(data)
     access = Access({"http://192.168.1.5"}, "a-long-token")
-    refusal = access.origin_refusal(text)
+    refusal = access.origin_rejection_reason(text)
     if refusal:
         check_sentence(NepError(refusal))
     assert refusal or "localhost" in text.lower() or "127." in text or "::" in text or "192.168.1.5" in text
     assert access.check_token("/?" + text, text) is not True or "a-long-token" in text
     for name in (client_name(text), page_title(text, text, text)):
-        assert len(name) <= MAX_SHOWN_LENGTH
+        assert len(name) <= MAX_DISPLAYED_LENGTH
         assert not first_control(name)
     if not refusal:
         check_node_name(node_name(text, "127.0.0.1:5"))

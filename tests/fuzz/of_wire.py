@@ -11,15 +11,15 @@ from nep.backends.zeromq.services.tcp_stream import TcpStream
 from nep.backends.zeromq.shared.payloads import SharedSources
 from nep.errors import BadTopicError, NepError, WireError
 from nep.masters.graph import Graph
-from nep.masters.leases import encode_renewed, read_renewal
+from nep.masters.leases import encode_renewed, parse_renewal
 from nep.masters.registry import check_request
 from nep.protocol import batch, encoding, service_wire, topic_pattern, wire
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
     AddPublisher,
     AddSubscriber,
-    Done,
-    Found,
+    DoneReply,
+    FoundReply,
     GraphReply,
     Join,
     Listen,
@@ -28,21 +28,23 @@ from nep.protocol.requests import (
     PublisherCount,
     PublisherRecord,
     QueryGraph,
-    Refused,
+    RejectedReply,
     RemotePublisher,
     Renew,
     SubscriberCount,
     SubscriberRecord,
-    id_from,
-    node_id_from,
+    derive_id,
+    derive_node_id,
 )
 from tests.fuzz.target import SEPARATOR, Targets, check_sentence, joined, parts_of, text_of
 
 TARGETS = Targets()
 HEADER = wire.Header(3, wire.LATCHED, 5, 6, 7, 4)
-NODE = NodeRecord(node_id_from("key"), "näme", "host", 42, key="key")
-PUBLISHER = PublisherRecord(id_from("key", 1), "/topic", "json", "json", ("tcp://127.0.0.1:5000",), number=1)
-SUBSCRIBER = SubscriberRecord(id_from("key", 2), "/topic", "json")
+NODE = NodeRecord(derive_node_id("key"), "näme", "host", 42, key="key")
+PUBLISHER = PublisherRecord(
+    derive_id("key", 1), "/topic", "json", "json", ("tcp://127.0.0.1:5000",), number=1
+)
+SUBSCRIBER = SubscriberRecord(derive_id("key", 2), "/topic", "json")
 
 
 def messages() -> Iterator[bytes]:
@@ -76,9 +78,9 @@ def filters(data: bytes) -> None:
         made = wire.hello_part(
             hello.subscriber,
             hello.topic,
-            one_part=hello.one_part,
+            one_part=hello.reads_one_part,
             tells=hello.acknowledges,
-            batches=hello.batches,
+            batches=hello.reads_batches,
         )
         assert made.lower() == data.lower()
     read = wire.parse_acknowledgement(data)
@@ -92,14 +94,14 @@ def filters(data: bytes) -> None:
 
 def batches() -> Iterator[bytes]:
     for payloads in ([b"one"], [b"", b"two", b"three"], [b"x"] * 256):
-        part = batch.batch_part(b"t\0", wire.form_of(3, 0), 1, 7, [*range(len(payloads))], payloads)
+        part = batch.encode_batch(b"t\0", wire.encode_form(3, 0), 1, 7, [*range(len(payloads))], payloads)
         yield part[2 + wire.HEADER_BYTES :]
 
 
 @TARGETS.add(WireError, seeds=batches)
 def batch_entries(data: bytes) -> None:
-    found = batch.entries(data)
-    assert 1 <= len(found) <= batch.BATCH_MAX
+    found = batch.parse_entries(data)
+    assert 1 <= len(found) <= batch.MAX_BATCH_MESSAGES
     assert sum(each.end - each.begin for each in found) <= len(data)
     assert found[-1].end == len(data)
 
@@ -108,7 +110,7 @@ def calls() -> Iterator[bytes]:
     native = service_wire.NATIVE
     yield joined(native.call(7, 1, 2.5, b'{"a":1}'))
     yield joined(native.call(2**64 - 1, 4, None, b""))
-    for kind in (service_wire.CallKind.ERROR, service_wire.CallKind.REFUSED):
+    for kind in (service_wire.CallKind.ERROR, service_wire.CallKind.REJECTED):
         failed = service_wire.error_reply(kind, "ValueError", "no \ud800")
         yield joined(native.reply(9, failed))
         yield joined(service_wire.ORIGINAL.reply(9, failed))
@@ -159,7 +161,7 @@ def tcp_stream(data: bytes) -> None:
         theirs.close()
         stream = TcpStream(ours)
         pairs = []
-        while stream.read() or not stream.is_over:
+        while stream.read() or not stream.has_ended:
             while (pair := stream.next()) is not None:
                 pairs.append(pair)
         while (pair := stream.next()) is not None:
@@ -218,7 +220,7 @@ def requests_of_nodes(data: bytes) -> None:
 
 @TARGETS.add(seeds=requests, words=WORDS)
 def renewals(data: bytes) -> None:
-    raw = read_renewal(data)
+    raw = parse_renewal(data)
     if raw is not None:
         assert raw.call >= 0
         encode_renewed(raw.call, raw.epoch, raw.revision, {1: 2}, ("127.0.0.1",), 3.0)
@@ -244,9 +246,9 @@ def a_master(data: bytes) -> None:
 
 
 def answers() -> Iterator[bytes]:
-    yield encoding.encode_reply(Done(1, 2), 1)
-    yield encoding.encode_reply(Refused(1, 2, "no"), 2)
-    yield encoding.encode_reply(Found(1, 2, (RemotePublisher(PUBLISHER, NODE.id, "näme"),)), 3)
+    yield encoding.encode_reply(DoneReply(1, 2), 1)
+    yield encoding.encode_reply(RejectedReply(1, 2, "no"), 2)
+    yield encoding.encode_reply(FoundReply(1, 2, (RemotePublisher(PUBLISHER, NODE.id, "näme"),)), 3)
     yield encoding.encode_reply(GraphReply(1, 2, GraphView(1, 2, {}, {}, ())), 4)
     yield encode_renewed(1, 2, 3, {4: 5}, ("127.0.0.1",), 2.0)
 

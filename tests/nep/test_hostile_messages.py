@@ -91,7 +91,7 @@ def test_log_command_shows_every_hostile_record_and_the_next_valid_record(master
             record = LogRecord.from_plain(message.payload, message.stamp_ns)
         except nep.DecodeError:
             continue
-        log_command._show(record)
+        log_command._show_record(record)
         assert len(record.text) < 10_000
     assert capfd.readouterr().out
 

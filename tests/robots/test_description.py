@@ -45,7 +45,7 @@ def test_shipped_thing_models_and_their_descriptions_are_valid(path):
 def test_description_has_topics_derived_from_the_robot_name():
     robot = parse(thing_description(model("pepper"), "Miss Pepper"))
     assert robot.topics.command == "/Miss_Pepper/command"
-    assert robot.topics.answer == "/Miss_Pepper/answer"
+    assert robot.topics.reply == "/Miss_Pepper/answer"
     assert robot.topics.state == "/Miss_Pepper/state"
     assert robot.sensor("camera").topic == "/Miss_Pepper/camera"
     assert robot.sensor("camera").is_image

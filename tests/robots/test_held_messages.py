@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import nep
-from app.robots.held_messages import HeldMessages
+from app.robots.held_messages import PendingMessages
 
 
 def message(publisher: int, seq: int = 1) -> nep.Message:
@@ -11,7 +11,7 @@ def message(publisher: int, seq: int = 1) -> nep.Message:
 
 
 def test_full_queue_of_a_publisher_evicts_only_messages_of_that_publisher() -> None:
-    held = HeldMessages(per_publisher=2)
+    held = PendingMessages(per_publisher=2)
     held.add(message(1))
     for seq in range(1000):
         held.add(message(2, seq))
@@ -20,7 +20,7 @@ def test_full_queue_of_a_publisher_evicts_only_messages_of_that_publisher() -> N
 
 
 def test_publishers_beyond_the_limit_do_not_evict_earlier_publishers() -> None:
-    held = HeldMessages(publishers=8)
+    held = PendingMessages(publishers=8)
     for publisher in range(1000):
         held.add(message(publisher))
     assert [each.publisher for each in held.pop_all()] == list(range(8))

@@ -127,7 +127,7 @@ class Person:
 
     @property
     def target(self):
-        return self.view.web.keyboard()
+        return self.view.web.keyboard_target()
 
     def click(self, selector: str, dx: float = 14, dy: float = 14) -> None:
         box = self.box(selector)

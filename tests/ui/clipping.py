@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.ui.widgets import Button, Chip, ElidedLabel, StatusItem
-from app.ui.widgets.table.cells import PADDING, TableHeader, head_font
+from app.ui.widgets.table.cells import PADDING, TableHeader, header_font
 
 SLACK = 1.5
 LONGER = 0.35
@@ -115,7 +115,7 @@ def _heads(head: TableHeader) -> Iterator[str]:
 
 def head_needs(head: TableHeader, words: str) -> float:
     """How wide a column is whose head is not shortened."""
-    return QFontMetricsF(head_font(head._theme)).horizontalAdvance(words) + 2 * PADDING
+    return QFontMetricsF(header_font(head._theme)).horizontalAdvance(words) + 2 * PADDING
 
 
 def _label(label: QLabel, said: str) -> Iterator[str]:

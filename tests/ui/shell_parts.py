@@ -156,7 +156,7 @@ def robots_in(*states: str, run: str = "ready", silent: str | None = None) -> fa
     for link, state in zip(links, states, strict=True):
         link.is_stopping, link.is_connected = state == "stopping", state != "away"
         if state == "silent":
-            link.silent, link.is_unresponsive = silent, silent is None
+            link.silence_reason, link.is_unresponsive = silent, silent is None
         elif state == "not stopped":
             link.stop_problem = f"{link.name} may still move: a joint is stuck"
         elif state == "busy":

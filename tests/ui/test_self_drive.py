@@ -57,7 +57,7 @@ def test_unmet_tour_condition_is_reported(
     qtbot, window: MainWindow, commands: Commands, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     steps = [
-        Step("a robot", lambda: None, lambda: False, within_s=0.2),
+        Step("a robot", lambda: None, lambda: False, timeout_s=0.2),
         Step("never", lambda: None, lambda: True),
     ]
     driver = drive(qtbot, window, commands, tmp_path, steps)

@@ -90,7 +90,7 @@ def test_test_page_shows_topics_and_publishes(browser: Browser, server: WebServe
     browser.wait("document.getElementById('state').dataset.state === 'off'")
     browser.evaluate("document.getElementById('again').click()")
     browser.wait("document.getElementById('state').textContent === WORDS.refused")
-    assert {each.kind for each in server.refusals} == {"token"}
+    assert {each.kind for each in server.rejections} == {"token"}
 
 
 def test_starter_page_shows_messages_and_publishes(

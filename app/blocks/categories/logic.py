@@ -6,7 +6,7 @@ from app.blocks.model.block import Block
 from app.blocks.model.category import Category
 from app.blocks.model.fields import ChoiceField, ValueInput
 
-_COMPARE = {
+_COMPARISON_TEMPLATES = {
     "==": "%A == %B",
     "!=": "%A != %B",
     "<": "%A < %B",
@@ -38,7 +38,7 @@ CATEGORY = Category(
             style="values",
             icon="",
             tooltip="Compares two values.",
-            python=_COMPARE,
+            python=_COMPARISON_TEMPLATES,
             arguments=(
                 ValueInput("A", None, 10),
                 ValueInput("B", None, 20),

@@ -46,10 +46,10 @@ def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
         known: All robots; the drop-down of the robot's blocks offers the robots of the same model.
     """
     alike = [other.name for other in known if other.model == robot.model] or [robot.name]
-    blocks = [_action(robot, action, alike) for action in robot.actions]
-    blocks += [_sensor(robot, sensor, alike) for sensor in robot.sensors if _has_block(sensor)]
-    blocks += [_event(robot, event, alike) for event in robot.events if event.text]
-    return (*blocks, *_change_hats(robot, alike))
+    blocks = [_action_block(robot, action, alike) for action in robot.actions]
+    blocks += [_sensor_block(robot, sensor, alike) for sensor in robot.sensors if _has_block(sensor)]
+    blocks += [_event_block(robot, event, alike) for event in robot.events if event.text]
+    return (*blocks, *_change_event_blocks(robot, alike))
 
 
 def robot_groups(robot: Robot, known: Sequence[Robot]) -> tuple[Group, ...]:
@@ -85,7 +85,7 @@ def _has_block(sensor: Sensor) -> bool:
     )
 
 
-def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
+def _action_block(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
     parts = BlockTemplate(action.text, [parameter.name for parameter in action.parameters])
     arguments = [robot_field(robot.model, alike)]
     inputs = [
@@ -94,7 +94,7 @@ def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
         if parameter.name in parts.shown
     ]
     returns = _result_field(robot, action)
-    called = [action.name, action.title, *_types(robot, "actions", action.name)]
+    called = [action.name, action.title, *_semantic_types(robot, "actions", action.name)]
     called += [parameter.name for parameter in action.parameters]
     found = action_search_words(called, action.uses)
     do = "robot(%ROBOT).do(%X_NAME, **%X_INPUT)"
@@ -123,10 +123,12 @@ def _tooltip(robot: Robot, action: Action) -> str:
     return _("{what_it_does} The next block waits until it is done.").format(what_it_does=document)
 
 
-def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
+def _sensor_block(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
     parts = BlockTemplate(sensor.text, [])
     robots = robot_field(robot.model, alike)
-    found = sensor_search_words((sensor.name, sensor.title, *_types(robot, "properties", sensor.name)))
+    found = sensor_search_words(
+        (sensor.name, sensor.title, *_semantic_types(robot, "properties", sensor.name))
+    )
     if sensor.kind == "object":
         fields = tuple((field.title or field.name, field.name) for field in sensor.fields)
         return Block(
@@ -161,7 +163,7 @@ def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
     )
 
 
-def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
+def _event_block(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
     parts = BlockTemplate(event.text, list(event.filters))
     fields = {field.name: field for field in event.fields}
     filters = [
@@ -169,7 +171,7 @@ def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
         for name in event.filters
         if name in parts.shown
     ]
-    found = sensor_search_words((event.name, event.title, *_types(robot, "events", event.name)))
+    found = sensor_search_words((event.name, event.title, *_semantic_types(robot, "events", event.name)))
     return Block(
         type=block_type_of(robot.model, "when", event.name),
         text=parts.text,
@@ -187,7 +189,7 @@ def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
     )
 
 
-def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
+def _change_event_blocks(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
     told = [sensor for sensor in robot.sensors if _has_block(sensor) and sensor.kind in _SIMPLE_KINDS]
     numbers = [sensor for sensor in told if sensor.kind in _NUMBER_KINDS]
     hats = []
@@ -250,7 +252,7 @@ def _member(robot: Robot, kind: str, name: str) -> Mapping[str, object]:
     return member if isinstance(member, Mapping) else {}
 
 
-def _types(robot: Robot, kind: str, name: str) -> tuple[str, ...]:
+def _semantic_types(robot: Robot, kind: str, name: str) -> tuple[str, ...]:
     told = _member(robot, kind, name).get("@type")
     return (told,) if isinstance(told, str) else names(told)
 

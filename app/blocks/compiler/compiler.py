@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from app.blocks.compiler.conflicts import ConflictFinder
 from app.blocks.compiler.loose_ends import NameUsage
-from app.blocks.compiler.lowering import END, Function, Lowering
+from app.blocks.compiler.lowering import END_BLOCK, Function, Lowering
 from app.blocks.compiler.problems import ProblemCollector
 from app.blocks.compiler.render import render_instrumented, render_source
 from app.blocks.model.block import Block
@@ -44,7 +44,7 @@ COMMANDS = frozenset(
 )  # fmt: skip
 """Names of the functions that a program can call (`app.blocks.commands`); variables can't have such names."""
 
-RESERVED = COMMANDS | {"step", "value", "number", "called", "message", "_"}
+RESERVED_NAMES = COMMANDS | {"step", "value", "number", "called", "message", "_"}
 
 
 class _UsedResources:
@@ -127,7 +127,7 @@ class _Compiler:
     def __init__(self, catalogue: Catalogue, workspace: Workspace, name: str) -> None:
         self._catalogue = catalogue
         self._name = name
-        self._names = PythonNames(RESERVED)
+        self._names = PythonNames(RESERVED_NAMES)
         self._shaping = Lowering(workspace, catalogue, self._names)
         self._workspace = workspace = self._shaping.workspace
         self._function: Function | None = None  # the function being compiled
@@ -220,7 +220,7 @@ class _Compiler:
             {"BODY": self._statements(script[1:])},
         )
         if isinstance(function, ast.FunctionDef):
-            function.name = self._names.new(self._store_block_text(first), "script")
+            function.name = self._names.new_name(self._store_block_text(first), "script")
             self._declare_globals(function)
         self._marks[function] = first.id
         return function
@@ -239,7 +239,7 @@ class _Compiler:
         self._store_block_text(placed)
         body = self._statements(placed.inputs.get("BODY", ()) if placed.enabled else ())
         if function.has_result:
-            body += self._statement(replace(placed, type=f"{END}:{placed.id}"))
+            body += self._statement(replace(placed, type=f"{END_BLOCK}:{placed.id}"))
         (made,) = statements("def script():\n    %BODY", {}, {"BODY": body})
         if isinstance(made, ast.FunctionDef):
             made.name = function.python_name
@@ -277,7 +277,9 @@ class _Compiler:
         self._store_block_text(placed)
         missing = self._problems.report_empty_slot(placed, block)
         if missing is not None:
-            return self._mark(statements("fail(%SENTENCE)", {"SENTENCE": literal(missing)}), placed)
+            return self._record_block_id(
+                statements("fail(%SENTENCE)", {"SENTENCE": literal(missing)}), placed
+            )
         try:
             expressions = self._expressions(placed, block)
         except _SkippedBlock:
@@ -297,7 +299,7 @@ class _Compiler:
         if block.calls_function and isinstance(made[0], ast.Expr):
             self._marks[made[0].value] = placed.id
             self._calls.add(placed.id)
-        return self._mark(made, placed)
+        return self._record_block_id(made, placed)
 
     def _record_moved_robots(self, placed: PlacedBlock, block: Block) -> None:
         topics = [argument.name for argument in block.arguments if isinstance(argument, TopicField)]
@@ -312,7 +314,7 @@ class _Compiler:
             return True
         return self._function is not None and self._function.has_result == (block.needs_function == "result")
 
-    def _mark(self, made: list[ast.stmt], placed: PlacedBlock) -> list[ast.stmt]:
+    def _record_block_id(self, made: list[ast.stmt], placed: PlacedBlock) -> list[ast.stmt]:
         self._marks[made[0]] = placed.id
         return made
 
@@ -383,7 +385,7 @@ class _Compiler:
         if id not in self._variables:
             is_nameless = id in self._workspace.nameless_variables
             words = id if is_nameless else self._workspace.variables.get(id, id)
-            self._variables[id] = self._names.new(words, "variable")
+            self._variables[id] = self._names.new_name(words, "variable")
         return self._variables[id]
 
     # ---- block look-up

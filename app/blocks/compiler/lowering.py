@@ -21,7 +21,7 @@ from nep.i18n import _
 
 PLAIN, RESULT = "functions_define", "functions_define_result"
 CALL, CALL_RESULT = "functions_call", "functions_result"
-END = "functions_end"
+END_BLOCK = "functions_end"
 _HAS_RESULT = {PLAIN: False, RESULT: True}
 
 
@@ -60,7 +60,7 @@ class Lowering:
         self._by_id: dict[str, Function] = {}
         for script in workspace.scripts:
             if script[0].type in _HAS_RESULT and script[0].enabled:
-                self._by_id[script[0].id] = _function(script[0], names)
+                self._by_id[script[0].id] = _parse_function(script[0], names)
         self._by_name = {function.name: function for function in reversed(self._by_id.values())}
         scripts = tuple(tuple(map(self._lower, script)) for script in workspace.scripts)
         shown = {each.id: each.name for function in self._by_id.values() for each in function.inputs}
@@ -143,7 +143,7 @@ class Lowering:
         kept = tuple(argument for argument in block.arguments if f"%{argument.name}" in text)
         if placed.type == RESULT:
             result = tuple(argument for argument in kept if argument.name == "RESULT")
-            self._catalogue.blocks[f"{END}:{placed.id}"] = replace(
+            self._catalogue.blocks[f"{END_BLOCK}:{placed.id}"] = replace(
                 block, shape="statement", text="return %RESULT", python="return %RESULT", arguments=result
             )
         return self._register_type(
@@ -179,11 +179,11 @@ class Lowering:
         return replace(placed, type=block.type)
 
 
-def _function(placed: PlacedBlock, names: PythonNames) -> Function:
+def _parse_function(placed: PlacedBlock, names: PythonNames) -> Function:
     inputs = inputs_of(placed.extra_state)
     name = function_name(placed)
-    python = names.new(name, "function")
-    parameters = {each.id: names.new(each.name, "input") for each in inputs}
+    python = names.new_name(name, "function")
+    parameters = {each.id: names.new_name(each.name, "input") for each in inputs}
     return Function(placed, name, python, parameters, inputs, _HAS_RESULT[placed.type])
 
 

@@ -23,7 +23,7 @@ _SLOT_TYPE_NAMES = {
     "List": lazy("a list"),
     None: lazy("a value"),
 }
-_LITERALS = {"values_number": "NUMBER", "values_text": "TEXT"}
+_LITERAL_FIELDS = {"values_number": "NUMBER", "values_text": "TEXT"}
 _RESOURCE_NAMES = {
     "head": lazy("the head"),
     "arms": lazy("the arms"),
@@ -425,13 +425,13 @@ def _literal_value(placed: PlacedBlock, block: Block, name: str) -> object:
         except FieldError:
             return None
     inner = placed.inputs.get(name, ())
-    if not inner or inner[0].type not in _LITERALS:
+    if not inner or inner[0].type not in _LITERAL_FIELDS:
         return None
     return _literal_block_value(inner[0])
 
 
 def _literal_block_value(placed: PlacedBlock) -> object:
-    name = _LITERALS[placed.type]
+    name = _LITERAL_FIELDS[placed.type]
     saved = placed.fields.get(name)
     if name == "TEXT":
         return TextField(name).read(saved)

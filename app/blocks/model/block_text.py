@@ -19,7 +19,7 @@ from app.blocks.model.workspace import PlacedBlock
 from nep.i18n import _
 
 _PLACEHOLDER = re.compile(r"%([A-Z][A-Z0-9_]*)")
-_JAPANESE = re.compile(r"[\u3040-\u30ff\u4e00-\u9fff]")
+_JAPANESE_CHARACTER = re.compile(r"[\u3040-\u30ff\u4e00-\u9fff]")
 _MAX_LENGTH = 80
 
 
@@ -72,7 +72,7 @@ def label(placed: PlacedBlock, block: Block) -> str:
     if block.robot is not None and block.robot.kind == "action":
         return block.robot.title
     pieces = _PLACEHOLDER.split(block.text)  # words, argument, words, argument, …, words
-    found, is_verb_last = "", bool(_JAPANESE.search(block.text))
+    found, is_verb_last = "", bool(_JAPANESE_CHARACTER.search(block.text))
     for number, piece in enumerate(pieces):
         argument = block.argument(piece) if number % 2 else None
         if isinstance(argument, (ValueInput, StatementInput)):

@@ -152,7 +152,7 @@ class NumberField(Field):
         Raises:
             FieldError: The value is not a number or is outside the limits.
         """
-        number = _number(self.value if saved is None else saved)
+        number = _parse_number(self.value if saved is None else saved)
         if self.minimum is not None and number < self.minimum:
             raise FieldError(_("needs a number of at least {minimum:g}").format(minimum=self.minimum))
         if self.maximum is not None and number > self.maximum:
@@ -368,7 +368,7 @@ def _option_key(value: object) -> str:
     return str(value)
 
 
-def _number(saved: object) -> int | float:
+def _parse_number(saved: object) -> int | float:
     if isinstance(saved, bool) or not isinstance(saved, (int, float, str)):
         raise FieldError(_("needs a number"))
     try:

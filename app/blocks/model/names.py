@@ -44,7 +44,7 @@ class PythonNames:
     def __init__(self, taken: frozenset[str]) -> None:
         self._unique = UniqueTexts("_", {*taken, *keyword.kwlist, *keyword.softkwlist, *dir(builtins)})
 
-    def new(self, words: str, otherwise: str) -> str:
+    def new_name(self, words: str, otherwise: str) -> str:
         """Return a new name derived from a text, such as ``when_started_2``.
 
         Args:

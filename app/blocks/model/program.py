@@ -111,39 +111,39 @@ class Program:
             source="",
             runnable=str(saved["runnable"]),
             lines={},
-            robots=_texts(saved["robots"]),
-            sensors=_pairs(saved["sensors"]),
-            events=_pairs(saved["events"]),
-            publishes=_texts(saved["publishes"]),
-            listens=_texts(saved["listens"]),
-            moves=_texts(saved.get("moves", ())),
-            readings=_string_map(saved["readings"]),
-            labels=_string_map(saved["labels"]),
-            variables=_variables(saved.get("variables", ())),
-            breakpoints=_texts(saved.get("breakpoints", ())),
+            robots=_parse_texts(saved["robots"]),
+            sensors=_parse_pairs(saved["sensors"]),
+            events=_parse_pairs(saved["events"]),
+            publishes=_parse_texts(saved["publishes"]),
+            listens=_parse_texts(saved["listens"]),
+            moves=_parse_texts(saved.get("moves", ())),
+            readings=_parse_string_map(saved["readings"]),
+            labels=_parse_string_map(saved["labels"]),
+            variables=_parse_variables(saved.get("variables", ())),
+            breakpoints=_parse_texts(saved.get("breakpoints", ())),
             shows_value=saved.get("shows_value") is True,
         )
 
 
-def _texts(saved: object) -> tuple[str, ...]:
+def _parse_texts(saved: object) -> tuple[str, ...]:
     if not isinstance(saved, (list, tuple)):
         raise TypeError("not a list")
     return tuple(str(item) for item in saved)
 
 
-def _variables(saved: object) -> tuple[Variable, ...]:
+def _parse_variables(saved: object) -> tuple[Variable, ...]:
     if not isinstance(saved, (list, tuple)):
         raise TypeError("not a list")
     return tuple(Variable(str(each["id"]), str(each["name"]), str(each["python"])) for each in saved)
 
 
-def _pairs(saved: object) -> tuple[tuple[str, str], ...]:
+def _parse_pairs(saved: object) -> tuple[tuple[str, str], ...]:
     if not isinstance(saved, (list, tuple)):
         raise TypeError("not a list")
     return tuple((str(first), str(second)) for first, second in saved)
 
 
-def _string_map(saved: object) -> dict[str, str]:
+def _parse_string_map(saved: object) -> dict[str, str]:
     if not isinstance(saved, Mapping):
         raise TypeError("not a table")
     return {str(key): str(value) for key, value in saved.items()}

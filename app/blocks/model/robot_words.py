@@ -23,21 +23,21 @@ class _Ability(NamedTuple):
     search_words: str
 
 
-def _ability(names: str, words: str) -> _Ability:
+def _make_ability(names: str, words: str) -> _Ability:
     return _Ability(frozenset(names.split()), words)
 
 
 # Translators: other words that people may type to find a block that does this, with commas between.
 # Write what people say in your language; it need not be a translation, and may be shorter or longer.
 _ACTION_ABILITIES: Mapping[str, _Ability] = {
-    "say": _ability(
+    "say": _make_ability(
         "say speak talk tell speech speaking",
         plazy(
             "words to find what a robot does: say",
             "say, talk, speak, tell, voice, speech, greet, hello, print, announce",
         ),
     ),
-    "move": _ability(
+    "move": _make_ability(
         "move walk drive go forward forwards backward backwards step steps run travel",
         plazy(
             "words to find what a robot does: move",
@@ -45,126 +45,126 @@ _ACTION_ABILITIES: Mapping[str, _Ability] = {
             "travel",
         ),
     ),
-    "turn": _ability(
+    "turn": _make_ability(
         "turn rotate spin steer",
         plazy(
             "words to find what a robot does: turn",
             "turn, rotate, spin, left, right, degrees, angle, around, steer, direction",
         ),
     ),
-    "go to": _ability(
+    "go to": _make_ability(
         "to toward towards navigate approach",
         plazy(
             "words to find what a robot does: go to",
             "go to, navigate, position, place, target, approach, destination, come",
         ),
     ),
-    "look": _ability(
+    "look": _make_ability(
         "look gaze",
         plazy(
             "words to find what a robot does: look",
             "look, watch, gaze, see, face, eyes",
         ),
     ),
-    "head": _ability(
+    "head": _make_ability(
         "head neck",
         plazy(
             "words to find what a robot does: head",
             "head, nod, tilt, neck, look up, look down",
         ),
     ),
-    "arms": _ability(
+    "arms": _make_ability(
         "wave arm arms hand hands gesture",
         plazy(
             "words to find what a robot does: arms",
             "wave, hand, arm, greet, hello, goodbye, bye, gesture, raise",
         ),
     ),
-    "grip": _ability(
+    "grip": _make_ability(
         "open close grip grab gripper claw hold pick release",
         plazy(
             "words to find what a robot does: grip",
             "open, close, grab, grip, hold, pick up, release, let go, gripper, claw",
         ),
     ),
-    "posture": _ability(
+    "posture": _make_ability(
         "stand sit posture pose crouch lie rest",
         plazy(
             "words to find what a robot does: posture",
             "stand, sit, posture, pose, rest, get up, straight, upright, lie down",
         ),
     ),
-    "dance": _ability(
+    "dance": _make_ability(
         "dance animation animate choreography mode",
         plazy(
             "words to find what a robot does: dance",
             "dance, animation, gesture, move, perform, show",
         ),
     ),
-    "follow": _ability(
+    "follow": _make_ability(
         "follow track chase",
         plazy(
             "words to find what a robot does: follow",
             "follow, track, chase, come along, watch",
         ),
     ),
-    "emotion": _ability(
+    "emotion": _make_ability(
         "emotion emotions feeling mood face smile expression",
         plazy(
             "words to find what a robot does: emotion",
             "emotion, feeling, mood, smile, happy, sad, angry, face, expression",
         ),
     ),
-    "light": _ability(
+    "light": _make_ability(
         "light lights led leds lamp colour color blink",
         plazy(
             "words to find what a robot does: light",
             "light, led, lamp, colour, color, shine, glow, blink, eyes, rgb, red, green, blue",
         ),
     ),
-    "sound": _ability(
+    "sound": _make_ability(
         "sound sounds volume music play audio beep song tone",
         plazy(
             "words to find what a robot does: sound",
             "sound, noise, music, audio, beep, tone, volume, loud, quiet, song, play",
         ),
     ),
-    "language": _ability(
+    "language": _make_ability(
         "language",
         plazy(
             "words to find what a robot does: language",
             "language, translate, English, Spanish, accent",
         ),
     ),
-    "photo": _ability(
+    "photo": _make_ability(
         "photo picture camera snapshot",
         plazy(
             "words to find what a robot does: photo",
             "photo, picture, camera, snapshot, image, take a picture",
         ),
     ),
-    "show": _ability(
+    "show": _make_ability(
         "display screen tablet image video page url",
         plazy(
             "words to find what a robot does: show",
             "show, display, screen, tablet, picture, image, video, web page",
         ),
     ),
-    "stop": _ability(
+    "stop": _make_ability(
         "stop halt brake",
         plazy(
             "words to find what a robot does: stop",
             "stop, halt, stand still, brake, freeze, end",
         ),
     ),
-    "wait": _ability(
+    "wait": _make_ability(
         "wait sleep pause",
         plazy(
             "words to find what a robot does: wait",
             "wait, sleep, pause, delay, seconds",
         ),
     ),
-    "listen": _ability(
+    "listen": _make_ability(
         "listen hear hears heard word words speech",
         plazy(
             "words to find what a robot does: listen",
@@ -173,21 +173,21 @@ _ACTION_ABILITIES: Mapping[str, _Ability] = {
     ),
 }
 _SENSOR_ABILITIES: Mapping[str, _Ability] = {
-    "listen": _ability(
+    "listen": _make_ability(
         "listen hear hears heard word words speech",
         plazy(
             "words to find what a robot tells: listen",
             "listen, hear, microphone, voice, speech recognition, understand, spoken, word, told",
         ),
     ),
-    "battery": _ability(
+    "battery": _make_ability(
         "battery charge power",
         plazy(
             "words to find what a robot tells: battery",
             "battery, charge, power, energy, level, percent",
         ),
     ),
-    "distance": _ability(
+    "distance": _make_ability(
         "distance sonar range ultrasonic ultrasound laser lidar proximity obstacle",
         plazy(
             "words to find what a robot tells: distance",
@@ -195,63 +195,63 @@ _SENSOR_ABILITIES: Mapping[str, _Ability] = {
             "infrared, centimetres, metres",
         ),
     ),
-    "touch": _ability(
+    "touch": _make_ability(
         "touch touched touches bumper bump bumped pressed tactile button released hit collision contact",
         plazy(
             "words to find what a robot tells: touch",
             "touch, touching, press, button, bump, bumper, hit, crash, collision, tactile, contact, tap, pat",
         ),
     ),
-    "face": _ability(
+    "face": _make_ability(
         "face faces person people human",
         plazy(
             "words to find what a robot tells: face",
             "face, person, people, somebody, see, detect, recognize, recognise, camera, vision",
         ),
     ),
-    "ball": _ability(
+    "ball": _make_ability(
         "ball balls marker markers object objects colour color seen sees",
         plazy(
             "words to find what a robot tells: ball",
             "ball, thing, object, marker, colour, color, see, detect, find, camera, vision",
         ),
     ),
-    "position": _ability(
+    "position": _make_ability(
         "pose position location odometry heading x y",
         plazy(
             "words to find what a robot tells: position",
             "position, place, where, location, coordinates, x, y, heading, direction",
         ),
     ),
-    "temperature": _ability(
+    "temperature": _make_ability(
         "temperature heat",
         plazy(
             "words to find what a robot tells: temperature",
             "temperature, warm, cold, heat, degrees, thermometer",
         ),
     ),
-    "brightness": _ability(
+    "brightness": _make_ability(
         "light brightness lux",
         plazy(
             "words to find what a robot tells: brightness",
             "light, brightness, dark, bright, lux",
         ),
     ),
-    "loudness": _ability(
+    "loudness": _make_ability(
         "sound loudness noise volume",
         plazy(
             "words to find what a robot tells: loudness",
             "sound, loudness, noise, volume, microphone, clap",
         ),
     ),
-    "tilt": _ability(
+    "tilt": _make_ability(
         "tilt gyro gyroscope accelerometer acceleration imu compass",
         plazy(
             "words to find what a robot tells: tilt",
             "tilt, gyro, gyroscope, acceleration, shake, compass, angle",
         ),
     ),
-    "line": _ability(
+    "line": _make_ability(
         "line ground floor",
         plazy(
             "words to find what a robot tells: line",

@@ -62,7 +62,7 @@ def statements(
         KeyError: A placeholder has no value.
     """
     filled: list[ast.stmt] = []
-    filler = _Filler(expressions, bodies or {}, keywords or {})
+    filler = _PlaceholderFiller(expressions, bodies or {}, keywords or {})
     for statement in _parse_template(text).body:
         made = filler.visit(_copy_node(statement))
         filled.extend(made if isinstance(made, list) else [made])
@@ -112,7 +112,7 @@ def _placeholder_name(node: ast.AST | None) -> str | None:
     return None
 
 
-class _Filler(ast.NodeTransformer):
+class _PlaceholderFiller(ast.NodeTransformer):
     def __init__(
         self,
         expressions: Mapping[str, ast.expr],

@@ -145,7 +145,7 @@ class Run:
         self._robots: tuple[Robot, ...] = tuple(
             robot for robot in everybody if robot.name in self._program.robots
         )
-        self._owners = _string_map(order.get("owners"))
+        self._owners = _parse_string_map(order.get("owners"))
         self._guard = PublishGuard(guarded_topics(everybody), self._program.moves)
         self._id = str(order.get("id") or f"program-{uuid.uuid4().hex[:8]}")
         self._master = None if order.get("master") is None else str(order["master"])
@@ -208,7 +208,7 @@ class Run:
         if isinstance(topics, Mapping):
             self._guard.set_topics({str(topic): tuple(map(str, names)) for topic, names in topics.items()})
         if self._network is not None:
-            self._network.update_owners(_string_map(order.get("owners")))
+            self._network.update_owners(_parse_string_map(order.get("owners")))
 
     def stop(self) -> None:
         """Stop the scripts and make `run` return without waiting for the robots' replies.
@@ -324,7 +324,7 @@ class Run:
             self._out.send("warning", block=each.block, sentence=each.message, count=each.count)
 
 
-def _string_map(told: object) -> dict[str, str]:
+def _parse_string_map(told: object) -> dict[str, str]:
     return {str(key): str(value) for key, value in told.items()} if isinstance(told, Mapping) else {}
 
 
@@ -390,7 +390,7 @@ if __name__ == "__main__":
     # Ctrl+C in a terminal also reaches this process; the runner decides what happens.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     enable_crash_trace()
-    code = main()
+    exit_code = main()
     # Scripts may hang in blocking calls; don't wait for them.
     sys.stderr.flush()
-    os._exit(code)
+    os._exit(exit_code)

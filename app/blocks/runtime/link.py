@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 FINAL_STATES = ("succeeded", "failed", "canceled")
-STATES = ("accepted", "running", *FINAL_STATES)
+REPLY_STATES = ("accepted", "running", *FINAL_STATES)
 
 
 @dataclass

@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from typing import Protocol
 
-from app.blocks.runtime.link import FINAL_STATES, STATES, RobotCall
+from app.blocks.runtime.link import FINAL_STATES, REPLY_STATES, RobotCall
 from app.blocks.runtime.motions import Motions
 from app.blocks.runtime.publishing import PublishGuard
 from app.robots import rize
 from app.robots.description.description import Robot
 from app.robots.heartbeat import Heartbeat
-from app.robots.held_messages import HeldMessages
+from app.robots.held_messages import PendingMessages
 from app.robots.identity import (
     Senders,
     first_announcer,
@@ -34,7 +34,7 @@ from nep.text import bounded_str
 
 LOOKUP_INTERVAL_S = 0.2
 """Minimum interval in seconds between graph queries that look up unknown publishers."""
-MAX_HELD_PER_PUBLISHER = 32
+MAX_PENDING_PER_PUBLISHER = 32
 
 Callback = Callable[[object], None]
 _log = logging.getLogger(__name__)
@@ -134,7 +134,7 @@ class Network:
         self._senders = Senders()
         self._view = GraphView(0, 0)
         self._answers_lock = threading.Lock()  # serializes the handling of answers
-        self._unknown = HeldMessages(per_publisher=MAX_HELD_PER_PUBLISHER)
+        self._unknown = PendingMessages(per_publisher=MAX_PENDING_PER_PUBLISHER)
         self._lookup_requested = threading.Event()
         self._lookup_thread: threading.Thread | None = None
         self._stop_errors: dict[str, str] = {}
@@ -169,20 +169,20 @@ class Network:
         for name, part in parts:
             self._subscribe(self._topic(name, part))
         for topic in publishes:
-            self._publisher(topic)
+            self._get_publisher(topic)
         for topic in listens:
             self._subscribe(topic)
         with suppress(NepError):  # the master is down: owners are resolved later
-            self._lookup()
+            self._look_up_senders()
         for robot in self._robots.values():
             if robot.dialect != "rize":
                 self._alive.start(robot.name, self._publishers[robot.topics.command].publish)
 
     def _open_robot(self, robot: Robot) -> None:
-        self._publisher(robot.topics.command, "json" if robot.dialect == "rize" else "robot/command")
+        self._get_publisher(robot.topics.command, "json" if robot.dialect == "rize" else "robot/command")
         type_ = "json" if robot.dialect == "rize" else "robot/answer"
         with self._lock:
-            topic = robot.topics.answer
+            topic = robot.topics.reply
             if topic not in self._subscribed:
                 self._subscribed.add(topic)
                 self._node.new_sub(topic, type_, sink=self._receive_replies)
@@ -223,14 +223,14 @@ class Network:
         if described.dialect == "rize":
             self._send(described, rize.to_command(described, action, input, call.id))
         else:
-            self._send(described, self._command(call.id, "invoke", action, input))
+            self._send(described, self._make_command(call.id, "invoke", action, input))
         return call
 
     def cancel(self, call: RobotCall) -> None:
         """Cancel a command. Has no effect for robots of RIZE, which don't support it."""
         described = self._robots[call.robot]
         if described.dialect != "rize":
-            self._send(described, self._command(call.id, "cancel", call.action))
+            self._send(described, self._make_command(call.id, "cancel", call.action))
 
     def sensor(self, robot: str, name: str) -> object:
         """Return the newest value of a sensor; None if no value has been received yet."""
@@ -252,7 +252,7 @@ class Network:
             BehaviourError: The message would move a robot that the program is not allowed to move.
         """
         self.guard.check(topic)
-        self._publisher(topic).publish(payload)
+        self._get_publisher(topic).publish(payload)
 
     def on_sensor(self, robot: str, name: str, callback: Callback) -> None:
         """Call `callback` with each value of a sensor."""
@@ -297,7 +297,7 @@ class Network:
         with self._arrived:
             self._own_stops.add(id)
             self._stops[id] = (robot.name, self._stop_nodes(robot))
-        self._send(robot, self._command(id, "stop", robot.safe_stop.action))
+        self._send(robot, self._make_command(id, "stop", robot.safe_stop.action))
 
     def stop_robots(self, timeout_s: float) -> tuple[str, ...]:
         """Stop all robots and wait for their confirmations. Robots of RIZE are skipped.
@@ -311,7 +311,7 @@ class Network:
         self._ending = True
         if timeout_s:
             with suppress(NepError):
-                self._lookup()
+                self._look_up_senders()
         for robot in self._robots.values():
             if robot.dialect == "rize":
                 continue
@@ -333,7 +333,7 @@ class Network:
     def _stop_nodes(self, robot: Robot) -> set[str]:
         # The robot's own node, and others that answer its commands, must answer a stop.
         heard = set(subscriber_nodes(self._view, robot.topics.command))
-        others = heard & set(publisher_nodes(self._view, robot.topics.answer))
+        others = heard & set(publisher_nodes(self._view, robot.topics.reply))
         owner = self._owners.get(robot.name)
         return {owner or "", *others}
 
@@ -346,7 +346,7 @@ class Network:
             raise KeyError(name)
         return found.topic
 
-    def _publisher(self, topic: str, msg_type: str = "json") -> ProgramPublisher:
+    def _get_publisher(self, topic: str, msg_type: str = "json") -> ProgramPublisher:
         with self._lock:
             if topic not in self._publishers:
                 self._publishers[topic] = self._node.new_pub(topic, msg_type, batch=False)
@@ -359,11 +359,11 @@ class Network:
             self._subscribed.add(topic)
         self._node.new_sub(topic, sink=self._receive_messages)
 
-    def _lookup(self) -> None:
+    def _look_up_senders(self) -> None:
         # Queries the graph and resolves senders. Never call it in the node's own thread, which it would
         # block.
         view = self._node.graph()
-        topics = {robot.topics.answer for robot in self._robots.values()} | self._robot_of.keys()
+        topics = {robot.topics.reply for robot in self._robots.values()} | self._robot_of.keys()
         with self._answers_lock:
             self._view = view
             self._senders.update(view, topics)
@@ -390,7 +390,7 @@ class Network:
         while self._lookup_requested.wait() and not self._closed.is_set():
             self._lookup_requested.clear()
             with self._errors, suppress(NepError):
-                self._lookup()
+                self._look_up_senders()
             self._closed.wait(LOOKUP_INTERVAL_S)
 
     def _is_from_robot(self, message: Message) -> bool:
@@ -431,8 +431,7 @@ class Network:
         # Call with `_answers_lock` held. The sender must be known before an answer is used.
         node = self._senders.node_of(message)
         native = any(
-            robot.dialect != "rize" and robot.topics.answer == message.topic
-            for robot in self._robots.values()
+            robot.dialect != "rize" and robot.topics.reply == message.topic for robot in self._robots.values()
         )
         if native and (node is None or self._unknown.has_messages_of(message.publisher)):
             self._unknown.add(message)
@@ -448,7 +447,7 @@ class Network:
         # True for a robot's node, and for a node that must answer a stop.
         with self._arrived:
             must_answer = any(node in waiting for _name, waiting in self._stops.values())
-        return must_answer or any(self._is_own(robot, topic, node) for robot in self._robots.values())
+        return must_answer or any(self._is_own_reply(robot, topic, node) for robot in self._robots.values())
 
     def _apply_reply(self, topic: str, payload: Mapping[str, object], node: str) -> None:
         # Answers to a stop count from all nodes that must answer, others from the robot's own node only.
@@ -457,7 +456,7 @@ class Network:
             return
         if answer.get("op") == "stop":
             self._record_stop_reply(topic, answer, node)
-        if not any(self._is_own(robot, topic, node) for robot in self._robots.values()):
+        if not any(self._is_own_reply(robot, topic, node) for robot in self._robots.values()):
             return
         self._record_heartbeat(topic)
         if answer.get("op") == "stop":
@@ -467,7 +466,7 @@ class Network:
         if call is None or call.done or answer.get("op") not in (None, "invoke"):
             return
         state = bounded_str(answer.get("state"))
-        if self._robots[call.robot].topics.answer != topic or state not in STATES:
+        if self._robots[call.robot].topics.reply != topic or state not in REPLY_STATES:
             return  # another robot's answer, or an invalid state
         output = answer.get("output")
         call.output = output if isinstance(output, Mapping) else {}
@@ -482,23 +481,23 @@ class Network:
             self._calls.pop(call.id, None)
             self._motions.record_final_reply(call)
 
-    def _is_own(self, robot: Robot, topic: str, node: str) -> bool:
-        if robot.topics.answer != topic:
+    def _is_own_reply(self, robot: Robot, topic: str, node: str) -> bool:
+        if robot.topics.reply != topic:
             return False
         return robot.dialect == "rize" or self._owners.get(robot.name) == node
 
     def _record_heartbeat(self, topic: str) -> None:
         now = time.monotonic()
         for call in list(self._calls.values()):
-            if self._robots[call.robot].topics.answer == topic:
+            if self._robots[call.robot].topics.reply == topic:
                 call.last_reply_s = now
 
     def _record_stop_reply(self, topic: str, answer: Mapping[str, object], node: str) -> None:
         if answer.get("state") not in ("succeeded", "failed"):
             return
         id = bounded_str(answer.get("id"))
-        robots = [robot.name for robot in self._robots.values() if robot.topics.answer == topic]
-        own = [robot.name for robot in self._robots.values() if self._is_own(robot, topic, node)]
+        robots = [robot.name for robot in self._robots.values() if robot.topics.reply == topic]
+        own = [robot.name for robot in self._robots.values() if self._is_own_reply(robot, topic, node)]
         with self._arrived:
             ours = id in self._own_stops  # also for duplicate answers
             name, waiting = self._stops.get(id, ("", set()))
@@ -515,7 +514,7 @@ class Network:
             for name in own:
                 self._stopped_outside(name)
 
-    def _command(
+    def _make_command(
         self, id: str, op: str, action: str = "", input: Mapping[str, object] | None = None
     ) -> dict[str, object]:
         return {"id": id, "op": op, "from": self._program, "action": action, "input": dict(input or {})}

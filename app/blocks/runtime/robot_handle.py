@@ -300,7 +300,7 @@ class RobotHandle:
         action = robot.action(name)
         if action is None:
             raise BehaviourError(_("{name} can't “{name_2}”.").format(name=self._name, name_2=name))
-        input = {key: _converted_input(action, key, value) for key, value in given.items()}
+        input = {key: _convert_input(action, key, value) for key, value in given.items()}
         wrong = action.check(action.complete(input))
         if wrong:
             raise BehaviourError(_("{name} can't do this: {wrong}.").format(name=self._name, wrong=wrong[0]))
@@ -384,10 +384,10 @@ class RobotHandle:
             self._cancel_for_pause(call)
 
     def _silence_error(self, robot: Robot, call: RobotCall) -> str | None:
-        if robot.beat_s is None:
+        if robot.heartbeat_interval_s is None:
             return None
         silence = time.monotonic() - call.last_reply_s
-        if silence <= max(MIN_SILENCE_S, BEATS_MISSED * robot.beat_s):
+        if silence <= max(MIN_SILENCE_S, BEATS_MISSED * robot.heartbeat_interval_s):
             return None
         return _("{name} stopped responding. {check}").format(name=self._name, check=_check_hint(robot))
 
@@ -429,7 +429,7 @@ def activity_text(robot: Robot, action: Action, input: Mapping[str, object]) -> 
     return " ".join(_PLACEHOLDER.sub(replacement, action.says or action.text).split())
 
 
-def _converted_input(action: Action, name: str, value: object) -> object:
+def _convert_input(action: Action, name: str, value: object) -> object:
     parameter = action.parameter(name)
     if parameter is None:
         return value
@@ -482,7 +482,7 @@ def remaining_input(action: Action, input: Mapping[str, object], call: RobotCall
     name = remainder_parameter(action, input)
     if name is None:
         return dict(input)
-    left, whole = _number(call.feedback.get(REMAINING_FIELD)), _number(input[name])
+    left, whole = _float_or_zero(call.feedback.get(REMAINING_FIELD)), _float_or_zero(input[name])
     if abs(left) <= abs(whole) / 1000:
         return None
     return {**input, name: math.copysign(min(abs(left), abs(whole)), whole)}
@@ -514,5 +514,5 @@ def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def _number(value: object) -> float:
+def _float_or_zero(value: object) -> float:
     return finite_float(value) or 0.0

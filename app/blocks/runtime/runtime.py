@@ -20,7 +20,7 @@ from app.blocks.runtime.pure import calculation, clock, lists, texts
 from app.blocks.runtime.questions import QuestionCallback, Questions
 from app.blocks.runtime.robot_handle import Replacements, RobotHandle, StatusText
 from app.blocks.runtime.scheduler import EndScript, Scheduler, StopProgram
-from app.blocks.runtime.triggers import Hat, ThresholdTrigger, change_detector, event_matches
+from app.blocks.runtime.triggers import ScriptTrigger, ThresholdTrigger, change_detector, event_matches
 from app.blocks.runtime.variables import short_text
 from app.robots.description.description import Robot
 from nep.i18n import _, lazy, translate
@@ -51,7 +51,7 @@ def stop_script() -> None:
     raise EndScript
 
 
-class Calls:
+class CallStack:
     """Call stack of user-defined functions: limits the depth, and restores the current block after a call."""
 
     def __init__(self, scheduler: Scheduler) -> None:
@@ -117,7 +117,7 @@ class Runtime:
         self._link: ProgramLink | None = None
         self._robots: Mapping[str, Robot] = {}
         self._starts: list[Script] = []
-        self._hats: list[tuple[Hat, Script]] = []
+        self._hats: list[tuple[ScriptTrigger, Script]] = []
         self._subscriptions: list[Callable[[ProgramLink], None]] = []
         self._count_lock = threading.Lock()
         self._running = 0
@@ -125,7 +125,7 @@ class Runtime:
         self.scheduler = Scheduler()
         self.status_text = StatusText(self.scheduler.block, readings or {})
         self.replacements = Replacements()
-        self._calls = Calls(self.scheduler)
+        self._calls = CallStack(self.scheduler)
         self.questions = Questions(self.scheduler, asked)
         self._broadcasts = Broadcasts(self.scheduler, self._add_running, self._remove_running)
         self.finished = threading.Event()
@@ -182,7 +182,7 @@ class Runtime:
             self.scheduler.start_run()
             script()
 
-    def _run_for_events(self, hat: Hat, script: Script) -> None:
+    def _run_for_events(self, hat: ScriptTrigger, script: Script) -> None:
         while True:
             arguments = hat.next(self.scheduler)
             with suppress(EndScript):
@@ -384,7 +384,7 @@ class Runtime:
     def on_message(self, topic: str) -> Decorator:
         """Return a decorator for scripts that run for each message on a topic and take its payload."""
 
-        def prepare(hat: Hat, link: ProgramLink) -> None:
+        def prepare(hat: ScriptTrigger, link: ProgramLink) -> None:
             link.on_message(topic, lambda payload: hat.enqueue((payload,)))
 
         return self._hat_decorator(
@@ -407,7 +407,9 @@ class Runtime:
         """Return a decorator for scripts that run each time the condition becomes true."""
 
         def decorate(script: Script) -> Script:
-            self._hats.append((Hat(_("when … becomes true"), condition=lambda: _is_true(condition)), script))
+            self._hats.append(
+                (ScriptTrigger(_("when … becomes true"), condition=lambda: _is_true(condition)), script)
+            )
             return script
 
         return decorate
@@ -421,7 +423,7 @@ class Runtime:
             filters: Required values of fields, by name.
         """
 
-        def prepare(hat: Hat, link: ProgramLink) -> None:
+        def prepare(hat: ScriptTrigger, link: ProgramLink) -> None:
             description = self._robots[robot].event(event)
             source = self._robots[robot].source
 
@@ -438,7 +440,7 @@ class Runtime:
     def on_change(self, robot: str, sensor: str) -> Decorator:
         """Return a decorator for scripts that run each time the value of a sensor changes."""
 
-        def prepare(hat: Hat, link: ProgramLink) -> None:
+        def prepare(hat: ScriptTrigger, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, change_detector(lambda: hat.enqueue(())))
 
         return self._hat_decorator(
@@ -451,7 +453,7 @@ class Runtime:
         See `RobotHandle.on_pass` for the arguments.
         """
 
-        def prepare(hat: Hat, link: ProgramLink) -> None:
+        def prepare(hat: ScriptTrigger, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, ThresholdTrigger(side, limit, lambda: hat.enqueue(())))
 
         return self._hat_decorator(
@@ -463,10 +465,10 @@ class Runtime:
         )
 
     def _hat_decorator(
-        self, title: str, prepare: Callable[[Hat, ProgramLink], None], waiting: int
+        self, title: str, prepare: Callable[[ScriptTrigger, ProgramLink], None], waiting: int
     ) -> Decorator:
         def decorate(script: Script) -> Script:
-            hat = Hat(title, most=waiting)
+            hat = ScriptTrigger(title, most=waiting)
             self._hats.append((hat, script))
             self._subscriptions.append(lambda link: prepare(hat, link))
             return script

@@ -9,7 +9,7 @@ from app.blocks.runtime.scheduler import POLL_INTERVAL_S, Scheduler
 from app.robots.description.description import Event
 
 
-class Hat:
+class ScriptTrigger:
     """Trigger of one script: a bounded queue of events, or a condition that becomes true.
 
     Events arrive in the network's thread. If the queue is full, the oldest event is dropped.

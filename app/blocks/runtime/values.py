@@ -34,13 +34,13 @@ def text(value: object) -> str:
         try:
             return json.dumps(value, ensure_ascii=False, default=str)
         except ValueError:  # an integer with too many digits, or a list that contains itself
-            return json.dumps(_json_safe(value, ()), ensure_ascii=False, default=str)
+            return json.dumps(_to_json_safe(value, ()), ensure_ascii=False, default=str)
     if isinstance(value, int) and value.bit_length() > MAX_BITS:
         return f"{Decimal(value):.16e}"
     return str(value)
 
 
-def _json_safe(value: object, around: tuple[int, ...]) -> object:
+def _to_json_safe(value: object, around: tuple[int, ...]) -> object:
     if isinstance(value, int) and value.bit_length() > MAX_BITS:
         return text(value)
     if not isinstance(value, (Mapping, list, tuple)):
@@ -49,8 +49,8 @@ def _json_safe(value: object, around: tuple[int, ...]) -> object:
         return "…"
     inside = (*around, id(value))
     if isinstance(value, Mapping):
-        return {str(_json_safe(key, inside)): _json_safe(each, inside) for key, each in value.items()}
-    return [_json_safe(each, inside) for each in value]
+        return {str(_to_json_safe(key, inside)): _to_json_safe(each, inside) for key, each in value.items()}
+    return [_to_json_safe(each, inside) for each in value]
 
 
 def is_known(value: object) -> bool:

@@ -28,8 +28,8 @@ MAX_STACKS = 100
 """Maximum number of stacks in the backpack."""
 MAX_BYTES = 4_000_000
 """Maximum file size in bytes."""
-FULL = lazy("the backpack can hold at most {most} stacks; remove something first")
-_MIN_DISTANCE_S = 0.001
+FULL_MESSAGE = lazy("the backpack can hold at most {most} stacks; remove something first")
+_MIN_TIME_STEP_S = 0.001
 _SIZE_TOLERANCE_BYTES = 1_000_000  # tolerance for files of other instances when reading
 
 Json = Mapping[str, object]
@@ -64,7 +64,7 @@ class _Content(NamedTuple):
     """
 
     items: tuple[BackpackStack, ...] = ()
-    unknown: tuple[object, ...] = ()
+    unknown_entries: tuple[object, ...] = ()
 
 
 class Backpack:
@@ -110,9 +110,9 @@ class Backpack:
         Raises BackpackError if the backpack is full or can't be written.
         """
         # Newer than all existing stacks, even if the clock was set back.
-        newest = max([self._clock(), *(item.at + len(blocks) * _MIN_DISTANCE_S for item in self.items[:1])])
+        newest = max([self._clock(), *(item.at + len(blocks) * _MIN_TIME_STEP_S for item in self.items[:1])])
         items = [
-            BackpackStack(uuid4().hex, newest - place * _MIN_DISTANCE_S, each)
+            BackpackStack(uuid4().hex, newest - place * _MIN_TIME_STEP_S, each)
             for place, each in enumerate(blocks)
         ]
         self.restore(items)
@@ -124,7 +124,7 @@ class Backpack:
         Raises BackpackError if the backpack is full or can't be written.
         """
         ids = {item.id for item in items}
-        self._change(lambda found: (*(item for item in found if item.id not in ids), *items))
+        self._update_items(lambda found: (*(item for item in found if item.id not in ids), *items))
 
     def remove(self, ids: Sequence[str]) -> list[BackpackStack]:
         """Remove the stacks with these ids; return the removed stacks. Raises BackpackError."""
@@ -134,7 +134,7 @@ class Backpack:
             gone.extend(item for item in found if item.id in ids)
             return tuple(item for item in found if item.id not in ids)
 
-        self._change(filter_stacks)
+        self._update_items(filter_stacks)
         return gone
 
     def empty(self) -> list[BackpackStack]:
@@ -143,10 +143,10 @@ class Backpack:
 
     # -- file ------------------------------------------------------------------------------------------------
 
-    def _change(self, change: Callable[[tuple[BackpackStack, ...]], tuple[BackpackStack, ...]]) -> None:
+    def _update_items(self, change: Callable[[tuple[BackpackStack, ...]], tuple[BackpackStack, ...]]) -> None:
         with locked(self.path):
             found = self._read()
-            now = _Content(_sorted(change(found.items)), found.unknown)
+            now = _Content(_sort_newest_first(change(found.items)), found.unknown_entries)
             if _ids(now) != _ids(found):
                 self._write(now, grows=len(now.items) > len(found.items))
             self._apply(now)
@@ -166,7 +166,7 @@ class Backpack:
             )
         whole = {
             "backpack": VERSION,
-            "items": [*(item.to_json() for item in found.items), *found.unknown],
+            "items": [*(item.to_json() for item in found.items), *found.unknown_entries],
         }
         data = deep_json.dumps(whole, ascii=True).encode()
         if grows and len(data) > MAX_BYTES:
@@ -217,7 +217,7 @@ class Backpack:
                     len(unknown),
                 ).format(count=len(unknown), path=self.path)
             )
-        return _Content(_sorted(item for _entry, item in parsed if item is not None), unknown)
+        return _Content(_sort_newest_first(item for _entry, item in parsed if item is not None), unknown)
 
     def _switch_to_own_file(self) -> _Content:
         # The file of a newer Studio stays unchanged; a file of this version is used in addition.
@@ -266,7 +266,7 @@ def _is_newer(version: object) -> bool:
     return isinstance(version, int) and not isinstance(version, bool) and version > VERSION
 
 
-def _sorted(items: Iterable[BackpackStack]) -> tuple[BackpackStack, ...]:
+def _sort_newest_first(items: Iterable[BackpackStack]) -> tuple[BackpackStack, ...]:
     return tuple(sorted(items, key=lambda item: (-item.at, item.id)))
 
 

@@ -35,13 +35,13 @@ from app.errors import DescriptionError, DocumentError
 from app.robots.description.description import Robot, parse
 from nep.i18n import _, lazy
 
-UNNAMED = lazy("New behaviour")
+DEFAULT_NAME = lazy("New behaviour")
 
 INLINE_COMPILE_S = 0.02
 """Compile time in seconds up to which a behaviour is compiled in the main thread."""
 Key = tuple[int, int, int]
 
-_keys = itertools.count(1)
+_key_numbers = itertools.count(1)
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,9 @@ class Document:
         self._clock = clock
         self._timer = time.perf_counter
         self._journal = journal()
-        self.key = f"behaviour-{next(_keys)}"
+        self.key = f"behaviour-{next(_key_numbers)}"
         self.path: Path | None = None
-        self.name = _(UNNAMED)
+        self.name = _(DEFAULT_NAME)
         self.others: Mapping[str, object] = {}
         self._json = WorkspaceJson.from_blocks({})
         self.robots: dict[str, Mapping[str, object]] = {}
@@ -130,7 +130,7 @@ class Document:
 
     def new(self, name: str = "") -> None:
         """Replace the content with an empty behaviour."""
-        self._replace(BehaviourFile(name or _(UNNAMED), {}, {}), None)
+        self._replace(BehaviourFile(name or _(DEFAULT_NAME), {}, {}), None)
 
     def open(self, path: Path) -> None:
         """Open a file. If DocumentError is raised, the current content is unchanged."""
@@ -228,7 +228,7 @@ class Document:
         self.fixes += 1
         return True
 
-    def use_robot(self, missing: str, robot: Robot) -> bool:
+    def replace_missing_robot(self, missing: str, robot: Robot) -> bool:
         """Replace a missing robot in all blocks with another robot.
 
         Returns:
@@ -335,7 +335,7 @@ class Document:
             self._compile_s = self._timer() - began
         return self._compiled[1]
 
-    def trial_program(self, stack: Stack) -> Program | None:
+    def compile_trial(self, stack: Stack) -> Program | None:
         """Compile a single stack of blocks as a program; return None if the stack no longer exists."""
         workspace = deep_json.run_deep(lambda: stack.workspace(self.workspace))
         if workspace is None:

@@ -37,7 +37,7 @@ def translated(example: BehaviourFile, translate_text: TranslateText = translate
     """
     names: dict[str, str] = {}
 
-    def label(english: str) -> str:
+    def translate_label(english: str) -> str:
         # English where two names would be equal.
         if english not in names:
             translation = translate_text(LABEL, english)
@@ -45,7 +45,7 @@ def translated(example: BehaviourFile, translate_text: TranslateText = translate
             names[english] = english if is_taken else translation
         return names[english]
 
-    workspace = _translate_value(example.workspace, translate_text, label)
+    workspace = _translate_value(example.workspace, translate_text, translate_label)
     others = dict(example.unknown_fields)
     if isinstance(about := others.get("description"), str):
         others["description"] = translate_text(ABOUT, about)
@@ -79,19 +79,19 @@ def _translate_value(value: object, say: TranslateText, label: Callable[[str], s
         fields["TEXT"] = say(TEXT, str(fields["TEXT"]))
     if str(kind).startswith("functions_define") and isinstance(fields, dict):
         fields["NAME"] = label(str(fields["NAME"]))
-    for note in _dicts(result.get("workspaceComments")):
+    for note in _nested_dicts(result.get("workspaceComments")):
         note["text"] = say(NOTE, str(note.get("text", "")))
-    for variable in _dicts(result.get("variables")):
+    for variable in _nested_dicts(result.get("variables")):
         variable["name"] = label(str(variable["name"]))
     state = result.get("extraState")
     if isinstance(state, dict):
-        for named in (state, *_dicts(state.get("inputs"))):
+        for named in (state, *_nested_dicts(state.get("inputs"))):
             if "name" in named:
                 named["name"] = label(str(named["name"]))
     return result
 
 
-def _dicts(value: object) -> list[dict[str, object]]:
+def _nested_dicts(value: object) -> list[dict[str, object]]:
     return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
 
 

@@ -97,7 +97,7 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
     )
 
 
-def file_bytes(behaviour: BehaviourFile) -> bytes:
+def encode_file(behaviour: BehaviourFile) -> bytes:
     """Return a behaviour in the file format.
 
     Raises RecursionError if a stack has more than about 4000 blocks.
@@ -119,7 +119,7 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
     Raises DocumentError with advice for the user; the existing file is then unchanged.
     """
     try:
-        data = file_bytes(behaviour)
+        data = encode_file(behaviour)
         if len(data) > MAX_BYTES:
             size, most = len(data) / 1e6, MAX_BYTES / 1e6
             template = _("{file} would be {size} MB").format(file=path.name, size=number(size, ".1f"))

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 else:
     psutil = lazy_module("psutil")
 
-FORMAT = 1
+FORMAT_VERSION = 1
 """Format version; increased when older versions of Studio can't read the new format."""
 MAX_JOURNAL_BYTES = 64_000_000
 """Maximum journal size in bytes.
@@ -80,7 +80,7 @@ class Journal:
             others: Unknown fields of the behaviour file, to be preserved.
         """
         entry = {
-            "format": FORMAT,
+            "format": FORMAT_VERSION,
             "pid": os.getpid(),
             "born_s": _process_start_s(os.getpid()),
             "name": name,
@@ -115,13 +115,13 @@ def newer_work_names(folder: Path | None = None) -> list[str]:
     folder = folder if folder is not None else home() / "journal"
     found = []
     for file in folder.glob("*.json") if folder.is_dir() else ():
-        entry = _entry(file)
-        if entry is not None and _format_of(entry) > FORMAT:
+        entry = _read_entry(file)
+        if entry is not None and _format_version(entry) > FORMAT_VERSION:
             found.append(str(entry.get("name") or file.name))
     return sorted(found)
 
 
-def _entry(file: Path) -> dict[str, object] | None:
+def _read_entry(file: Path) -> dict[str, object] | None:
     # None for a malformed journal, or one that is still in use.
     try:
         entry = deep_json.loads(read_regular_file(file, MAX_JOURNAL_BYTES).decode("utf-8", "surrogatepass"))
@@ -132,15 +132,15 @@ def _entry(file: Path) -> dict[str, object] | None:
     return entry
 
 
-def _format_of(entry: Mapping[str, object]) -> int:
+def _format_version(entry: Mapping[str, object]) -> int:
     # 1 for journals from before there were versions.
     found = entry.get("format", 1)
     return found if isinstance(found, int) else 1
 
 
 def _read(file: Path) -> UnsavedWork | None:
-    entry: Any = _entry(file)
-    if entry is None or _format_of(entry) > FORMAT:
+    entry: Any = _read_entry(file)
+    if entry is None or _format_version(entry) > FORMAT_VERSION:
         return None
     try:
         path = entry["path"]

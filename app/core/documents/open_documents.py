@@ -11,14 +11,14 @@ from pathlib import Path
 
 from app.blocks import editor_definitions
 from app.core.documents.background_worker import BackgroundWorker
-from app.core.documents.document import UNNAMED, CompiledProgram, Document
+from app.core.documents.document import DEFAULT_NAME, CompiledProgram, Document
 from app.core.documents.journal import UnsavedWork
 from app.core.documents.titles import unique_titles
 from app.errors import DocumentError
 from app.robots.description.description import Robot
 from nep.i18n import _
 
-MAX_CLOSED = 20
+MAX_CLOSED_TABS = 20
 
 
 class Documents:
@@ -59,7 +59,7 @@ class Documents:
         if self.current.is_blank:
             return self.current
         document = self._new_document()
-        document.new(self._free_name(_(UNNAMED)))
+        document.new(self._free_name(_(DEFAULT_NAME)))
         return self._insert(document)
 
     def open(self, path: Path) -> Document:
@@ -71,11 +71,11 @@ class Documents:
 
     def open_example(self, path: Path) -> Document:
         """Open an example as a new behaviour in a tab. Raises DocumentError."""
-        return self._with_unique_name(self._open_with(lambda document: document.open_example(path)))
+        return self._assign_unique_name(self._open_with(lambda document: document.open_example(path)))
 
     def copy(self, path: Path, name: str) -> Document:
         """Open a file as a new behaviour named ``name`` in a new tab. Raises DocumentError."""
-        return self._with_unique_name(self._open_with(lambda document: document.copy(path, name)))
+        return self._assign_unique_name(self._open_with(lambda document: document.copy(path, name)))
 
     def duplicate(self, document: Document) -> Document:
         """Open a copy of a behaviour in a tab next to it."""
@@ -141,7 +141,7 @@ class Documents:
         place = self._open.index(document)
         if document.path is not None:
             self._closed = [*(each for each in self._closed if each != document.path), document.path]
-            del self._closed[:-MAX_CLOSED]
+            del self._closed[:-MAX_CLOSED_TABS]
         document.close()
         self._compiler.discard(document.key)
         self._open.remove(document)
@@ -256,7 +256,7 @@ class Documents:
             self.show(opened[current])
         return taken
 
-    def arrange(self, kept: Mapping[str, object], recovered: Mapping[str, Document]) -> None:
+    def arrange_tabs(self, kept: Mapping[str, object], recovered: Mapping[str, Document]) -> None:
         """Move recovered work to the positions of its tabs, and show the tab that was current.
 
         Tabs opened since the start are moved to the end.
@@ -317,7 +317,7 @@ class Documents:
         self.revision += 1
         return document
 
-    def _with_unique_name(self, document: Document) -> Document:
+    def _assign_unique_name(self, document: Document) -> Document:
         # A behaviour without a file gets a unique name.
         document.name = self._free_name(document.name, besides=document)
         return document

@@ -10,7 +10,7 @@ from app.core.documents.open_documents import Documents
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
 
-KEY = "tabs"
+SETTING_KEY = "tabs"
 
 
 class SavedTabs:
@@ -34,7 +34,7 @@ class SavedTabs:
             Unsaved work that was not restored, because the user must be asked first.
         """
         self.active = True
-        kept: dict[str, object] = self._settings.get(KEY, {})
+        kept: dict[str, object] = self._settings.get(SETTING_KEY, {})
         self._last_session = kept
         taken = self._documents.restore_tabs(kept, left, ended_well=kept.get("ended_well") is True)
         self.save()
@@ -44,7 +44,7 @@ class SavedTabs:
         """Restore unsaved work into its tabs, and show the tab that was current."""
         newest_last = sorted(left, key=lambda each: each.edited_s)
         recovered = {each.journal.name: self._documents.recover(each) for each in newest_last}
-        self._documents.arrange(self._last_session, recovered)
+        self._documents.arrange_tabs(self._last_session, recovered)
         self.save()
 
     def on_edited(self, document: Document, *, was_blank: bool) -> None:
@@ -75,6 +75,6 @@ class SavedTabs:
             return
         self._kept_revision = self._documents.revision
         try:
-            self._settings.set(KEY, {**self._documents.tabs_state(), "ended_well": ended_well})
+            self._settings.set(SETTING_KEY, {**self._documents.tabs_state(), "ended_well": ended_well})
         except SettingsError as error:
             self._complain(str(error))

@@ -32,14 +32,14 @@ FOLDER_NAME = "earlier"
 MAX_COPIES = 300
 MAX_BYTES = 500_000_000
 MAX_COPIES_PER_FILE = 30
-PROTECTED_COPIES = 10
+MIN_COPIES_PER_FILE = 10
 """Number of newest versions of a file that are never deleted.
 
 Among older versions, the version whose removal leaves the smallest gap in time is deleted first.
 """
 
-_STAMP = "%Y-%m-%d %H.%M.%S"
-_NAME = re.compile(
+_STAMP_FORMAT = "%Y-%m-%d %H.%M.%S"
+_NAME_PATTERN = re.compile(
     r"(?P<stem>.*), before (?P<stamp>\d{4}-\d\d-\d\d \d\d\.\d\d\.\d\d)(?: (?P<mark>[0-9a-f]{8}))?(?: \d+)?"
     + re.escape(SUFFIX)
 )
@@ -100,7 +100,7 @@ def save_version(
         words = _("{file} wasn't saved: its previous version can't be kept ({reason})")
         raise DocumentError(path, words.format(file=path.name, reason=reason)) from error
     with contextlib.suppress(OSError):  # another instance has done this already
-        _thin_out(where, _path_hash(path))
+        _prune_versions(where, _path_hash(path))
         _drop_oldest(where)
     return SavedVersion(path, copy)
 
@@ -127,7 +127,7 @@ class Version:
 def versions_of(path: Path, folder: Path | None = None) -> list[Version]:
     """Return the versions of a file, newest first."""
     mark = _path_hash(path)
-    return [each for each in _newest_first(_versions_folder(folder)) if each.path_hash == mark]
+    return [each for each in _list_versions(_versions_folder(folder)) if each.path_hash == mark]
 
 
 def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
@@ -135,7 +135,7 @@ def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
     mark, stem = _path_hash(path), _safe_stem(path.stem)
     return [
         each
-        for each in _newest_first(_versions_folder(folder))
+        for each in _list_versions(_versions_folder(folder))
         if each.path_hash != mark and each.name == stem
     ]
 
@@ -159,7 +159,7 @@ def free_path(folder: Path, name: str, now_s: float, mark: str = "") -> Path:
         now_s: Current time in seconds since 1970.
         mark: Text appended to the file name, such as a hash of the original path.
     """
-    stamp = time.strftime(_STAMP, time.localtime(now_s))
+    stamp = time.strftime(_STAMP_FORMAT, time.localtime(now_s))
     stem = f"{_safe_stem(name)} {stamp}{mark}"
     path = folder / f"{stem}{SUFFIX}"
     number = 2
@@ -210,38 +210,38 @@ def _path_hash(path: Path) -> str:
     return hashlib.sha256(where.encode("utf-8", "surrogateescape")).hexdigest()[:8]
 
 
-def _newest_first(folder: Path) -> list[Version]:
+def _list_versions(folder: Path) -> list[Version]:
     found = [_parse_version(copy) for copy in folder.glob(f"*{SUFFIX}")] if folder.is_dir() else []
     known = [each for each in found if each is not None]
     return sorted(known, key=lambda each: (each.replaced_s, each.written_s), reverse=True)
 
 
 def _parse_version(copy: Path) -> Version | None:
-    match = _NAME.fullmatch(copy.name)
+    match = _NAME_PATTERN.fullmatch(copy.name)
     if match is None:
         return None
     try:
         written = copy.stat().st_mtime
-        replaced = time.mktime(time.strptime(match["stamp"], _STAMP))
+        replaced = time.mktime(time.strptime(match["stamp"], _STAMP_FORMAT))
     except (OSError, ValueError, OverflowError):
         return None
     return Version(copy, match["stem"], written, replaced, match["mark"] or "")
 
 
-def _thin_out(folder: Path, mark: str) -> None:
+def _prune_versions(folder: Path, mark: str) -> None:
     # Removes the version that leaves the smallest gap.
-    found = [each for each in _newest_first(folder) if each.path_hash == mark]
+    found = [each for each in _list_versions(folder) if each.path_hash == mark]
     while len(found) > MAX_COPIES_PER_FILE:
         gaps = {
             place: found[place - 1].replaced_s - found[place + 1].replaced_s
-            for place in range(PROTECTED_COPIES, len(found) - 1)
+            for place in range(MIN_COPIES_PER_FILE, len(found) - 1)
         }
         found.pop(min(gaps, key=lambda place: gaps[place])).copy.unlink(missing_ok=True)
 
 
 def _drop_oldest(folder: Path) -> None:
     left = MAX_BYTES
-    for number, each in enumerate(_newest_first(folder)):
+    for number, each in enumerate(_list_versions(folder)):
         left -= each.copy.stat().st_size
         if number and (number >= MAX_COPIES or left < 0):
             each.copy.unlink(missing_ok=True)

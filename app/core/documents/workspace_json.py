@@ -12,7 +12,7 @@ from app.core.storage import deep_json
 
 LONG_TEXT_LENGTH = 20_000
 """Text length in characters above which parsing or compiling is too slow for the main thread."""
-EMPTY: Mapping[str, object] = {"blocks": {"languageVersion": 0, "blocks": []}}
+EMPTY_WORKSPACE: Mapping[str, object] = {"blocks": {"languageVersion": 0, "blocks": []}}
 
 
 class WorkspaceJson:

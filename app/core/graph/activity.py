@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping
 
-from app.core.graph.node_graph import INTERNAL_PREFIX, GraphFacts
+from app.core.graph.node_graph import INTERNAL_PREFIX, GraphInput
 from app.core.network.topics import key_of
 from app.core.networks.kinds import find_kind
 
-QUIET_S = 60.0
+QUIET_TIMEOUT_S = 60.0
 CALL_WINDOW_S = 60.0
 MAX_SAMPLES = 61
 """Number of stored samples of the call counts, taken once a second."""
@@ -25,7 +25,7 @@ class QuietNodes:
     def __init__(self) -> None:
         self._counted: dict[str, tuple[int, float]] = {}
 
-    def update(self, facts: GraphFacts, now: float) -> None:
+    def update(self, facts: GraphInput, now: float) -> None:
         """Apply new statistics; ``now`` is monotonic seconds. New nodes count as active."""
         sums = {entry.key: 0 for entry in facts.nodes if entry.gone_s is None}
         unknown = {
@@ -49,7 +49,9 @@ class QuietNodes:
 
     def quiet_keys(self, now: float) -> frozenset[str]:
         """Return the keys of the nodes without a message or call in the last `QUIET_S` seconds."""
-        return frozenset(entry for entry, (_total, since) in self._counted.items() if now - since >= QUIET_S)
+        return frozenset(
+            entry for entry, (_total, since) in self._counted.items() if now - since >= QUIET_TIMEOUT_S
+        )
 
 
 class CallRates:
@@ -58,7 +60,7 @@ class CallRates:
     def __init__(self) -> None:
         self._samples: deque[tuple[float, Mapping[str, int]]] = deque(maxlen=MAX_SAMPLES)
 
-    def update(self, facts: GraphFacts, now: float) -> None:
+    def update(self, facts: GraphInput, now: float) -> None:
         """Apply the call counts at ``now`` (monotonic seconds); at most one sample per second is stored."""
         if not self._samples or now - self._samples[-1][0] >= 1.0:
             self._samples.append((now, {name: info.calls for name, info in facts.services.items()}))
@@ -80,7 +82,7 @@ class CallRates:
         }
 
 
-def _counts(facts: GraphFacts) -> Iterator[tuple[str, int | None]]:
+def _counts(facts: GraphInput) -> Iterator[tuple[str, int | None]]:
     # (key of a node, number of messages or calls); None if not counted. Internal topics are skipped.
     for topic in facts.topics:
         if topic.info is None or topic.name.startswith(INTERNAL_PREFIX):

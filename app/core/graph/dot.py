@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from app.core.graph.node_graph import GraphLine, NodeGraph
 
 
-def dot_of(graph: NodeGraph, group_names: Mapping[str, str], label: Callable[[GraphLine], str]) -> str:
+def format_dot(graph: NodeGraph, group_names: Mapping[str, str], label: Callable[[GraphLine], str]) -> str:
     """Return the graph in the DOT language.
 
     Args:
@@ -21,26 +21,26 @@ def dot_of(graph: NodeGraph, group_names: Mapping[str, str], label: Callable[[Gr
     for node in graph.nodes:
         style = ', style="rounded,dashed"' if node.is_gone or node.is_quiet else ""
         name = group_names.get(node.key, node.name) if node.kind == "group" else node.name
-        inside.setdefault(node.group, []).append(f"{names[node.key]} [label={quoted(name)}{style}];")
+        inside.setdefault(node.group, []).append(f"{names[node.key]} [label={quote(name)}{style}];")
     clusters = [group for group in graph.groups if not group.is_collapsed and group.key in inside]
     for number, group in enumerate(clusters):
         lines += [
             f"  subgraph cluster_{number} {{",
-            f"    label={quoted(group_names.get(group.key, group.name))};",
+            f"    label={quote(group_names.get(group.key, group.name))};",
             *(f"    {each}" for each in inside.pop(group.key)),
             "  }",
         ]
     lines += [f"  {each}" for others in inside.values() for each in others]
     for line in graph.lines:
         style = ", style=dashed" if line.kind == "service" else ""
-        text = quoted(label(line))
+        text = quote(label(line))
         lines += [
             f"  {names[source]} -> {names[target]} [label={text}{style}];" for source, target in line.pairs()
         ]
     return "\n".join([*lines, "}", ""])
 
 
-def quoted(text: str) -> str:
+def quote(text: str) -> str:
     r"""Quote a string for DOT: escape quotes and backslashes, and replace line breaks by ``\n``."""
     kept = text.replace("\\", "\\\\").replace('"', '\\"').replace("\0", "")
     return '"' + "\\n".join(kept.splitlines() or [""]) + '"'

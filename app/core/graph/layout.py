@@ -32,7 +32,7 @@ MAX_SAVED_POSITIONS = 4000
 LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 150.0, 36.0, 40.0, 10.0
 ISOLATED_COLUMNS = 4
 """Number of columns for the nodes of a group that have no lines."""
-FAST_LAYOUT_NODES = 60
+MAX_BALANCED_LAYOUT_NODES = 60
 """Number of boxes above which graphlay runs in its fast mode."""
 MAX_AVOIDING_ROUTES = 400
 """Maximum number of routes that avoid nodes.
@@ -59,7 +59,7 @@ class LayoutSizes:
     header: float = 36.0
     side_margin: float = 18.0
     footer: float = 30.0
-    letter_width: float = 8.0
+    char_width: float = 8.0
 
     def scaled(self, share: float) -> LayoutSizes:
         """Return the sizes multiplied by ``share``, for another text size."""
@@ -69,7 +69,7 @@ class LayoutSizes:
             self.header * share,
             self.side_margin * share,
             self.footer * share,
-            self.letter_width * share,
+            self.char_width * share,
         )
 
 
@@ -91,7 +91,7 @@ class GraphLayout:
     routes: Mapping[RouteKey, tuple[Position, ...]] = field(default_factory=dict)
     saved_positions: Mapping[str, Position] = field(default_factory=dict)
     omitted_routes: int = 0
-    is_plain: bool = False
+    is_fallback: bool = False
 
     def bounds(self, sizes: LayoutSizes) -> Box:
         """Return the bounding rectangle of the layout; its size is 0 if the layout is empty."""
@@ -128,7 +128,7 @@ def arrange(
     kept = {key: place for key, place in known.items() if key not in here}
     for key in [*kept][: max(0, len(kept) - MAX_SAVED_POSITIONS)]:
         del kept[key]
-    straight = {way: _straight(places[way[1]], places[way[2]], sizes) for way in ways}
+    straight = {way: _straight_route(places[way[1]], places[way[2]], sizes) for way in ways}
     groups = _group_boxes(graph, places, sizes)
     return GraphLayout(places, groups, {**straight, **routes}, kept, left_out, is_plain)
 
@@ -140,10 +140,10 @@ def arrange_in_rows(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
     return GraphLayout(
         places,
         _group_boxes(graph, places, sizes),
-        {way: _straight(places[way[1]], places[way[2]], sizes) for way in ways},
+        {way: _straight_route(places[way[1]], places[way[2]], sizes) for way in ways},
         {},
         left_out,
-        is_plain=True,
+        is_fallback=True,
     )
 
 
@@ -167,7 +167,7 @@ def _drawing_order(line: GraphLine) -> tuple[int, tuple[str, ...]]:
 # -- with the library ----------------------------------------------------------------------------------------
 
 
-def _library_options(effort: str, gap: float = NODE_GAP) -> dict[str, Any]:
+def _graphlay_options(effort: str, gap: float = NODE_GAP) -> dict[str, Any]:
     return {
         "direction": "leftright",
         "spacing": {
@@ -193,7 +193,7 @@ def _place_all(
     home = {key: block for block, keys in inside.items() for key in keys}
     within: dict[str, list[RouteKey]] = {}
     between: dict[tuple[str, str], int] = {}
-    effort = "balanced" if len(home) < FAST_LAYOUT_NODES else "fast"
+    effort = "balanced" if len(home) < MAX_BALANCED_LAYOUT_NODES else "fast"
     for way in ways:
         begin, end = home[way[1]], home[way[2]]
         if begin == end:
@@ -227,9 +227,9 @@ def _place_block(
     index = {key: number for number, key in enumerate(keys)}
     layout = graphlay.layout(
         {"nodes": [_request_box(key, sizes.node) for key in keys], "edges": _request_edges(ways, index)},
-        options=_library_options(effort),
+        options=_graphlay_options(effort),
     )
-    return {key: _point(node["center"]) for key, node in zip(keys, layout.nodes, strict=True)}
+    return {key: _parse_point(node["center"]) for key, node in zip(keys, layout.nodes, strict=True)}
 
 
 def _block_box(graph: NodeGraph, block: str, places: Mapping[str, Position], sizes: LayoutSizes) -> Box:
@@ -253,9 +253,9 @@ def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int
     ]
     nodes = [_request_box(block, (box[2], box[3])) for block, box in boxes.items()]
     layout = graphlay.layout(
-        {"nodes": nodes, "edges": edges}, options=_library_options("balanced", GROUP_GAP)
+        {"nodes": nodes, "edges": edges}, options=_graphlay_options("balanced", GROUP_GAP)
     )
-    middles = {block: _point(node["center"]) for block, node in zip(boxes, layout.nodes, strict=True)}
+    middles = {block: _parse_point(node["center"]) for block, node in zip(boxes, layout.nodes, strict=True)}
     wide = layout.bounds["max"]["x"] - layout.bounds["min"]["x"]
     high = layout.bounds["max"]["y"] - layout.bounds["min"]["y"]
     return middles if wide <= WIDEST * high or len(boxes) < 4 else _shelf_positions(boxes, middles)
@@ -288,10 +288,10 @@ def _route_lines(
     ]
     try:
         layout = graphlay.reroute(
-            {"nodes": request, "edges": _request_edges(ways, index)}, options=_library_options("fast")
+            {"nodes": request, "edges": _request_edges(ways, index)}, options=_graphlay_options("fast")
         )
         return {
-            way: tuple(_point(each) for each in edge["points"])
+            way: tuple(_parse_point(each) for each in edge["points"])
             for way, edge in zip(ways, layout.edges, strict=True)
             if len(edge["points"]) > 1
         }
@@ -313,7 +313,7 @@ def _request_edges(ways: Sequence[RouteKey], index: Mapping[str, int]) -> list[d
     ]
 
 
-def _point(told: Mapping[str, float]) -> Position:
+def _parse_point(told: Mapping[str, float]) -> Position:
     return float(told["x"]), float(told["y"])
 
 
@@ -464,7 +464,7 @@ def _overlaps(one: Box, other: Box) -> bool:
     )
 
 
-def _straight(source: Position, target: Position, sizes: LayoutSizes) -> tuple[Position, ...]:
+def _straight_route(source: Position, target: Position, sizes: LayoutSizes) -> tuple[Position, ...]:
     # From the right edge to the left edge; reversed when the target is to the left.
     half = sizes.node[0] / 2
     way = half if source[0] <= target[0] else -half

@@ -24,7 +24,7 @@ class LayoutThread:
 
     def __init__(self, arranged: Arrange | None = None) -> None:
         # `arranged` replaces the layout function, for graphs of any size.
-        self._arrange = arranged if arranged is not None else self._arrange_anywhere
+        self._arrange = arranged if arranged is not None else self._arrange_by_size
         self._process: LayoutProcess | None = None
         self._changed = threading.Condition()
         self._waiting: tuple[NodeGraph, GraphLayout | None, LayoutSizes] | None = None
@@ -87,7 +87,7 @@ class LayoutThread:
                 if layout is not None:
                     self._made = graph, layout
 
-    def _arrange_anywhere(
+    def _arrange_by_size(
         self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes
     ) -> GraphLayout:
         if not is_large(graph):

@@ -39,7 +39,7 @@ WEB_GROUP = "web:"
 
 
 @dataclass(frozen=True, slots=True)
-class GraphFacts:
+class GraphInput:
     """State of all networks from which the drawing is created.
 
     Attributes:
@@ -74,8 +74,8 @@ class GraphOptions:
     shows_services: bool = True
     shows_internal: bool = False
     hides_quiet: bool = True
-    quiet: frozenset[str] = frozenset()
-    quiet_visible_groups: frozenset[str] = frozenset()
+    quiet_nodes: frozenset[str] = frozenset()
+    groups_with_visible_quiet_nodes: frozenset[str] = frozenset()
     starts_collapsed: bool = False
     toggled: frozenset[str] = frozenset()
 
@@ -185,7 +185,7 @@ class NodeGraph:
         return next((line for line in self.lines if topic in line.topics), None)
 
 
-def node_graph(facts: GraphFacts, choices: GraphOptions) -> NodeGraph:
+def node_graph(facts: GraphInput, choices: GraphOptions) -> NodeGraph:
     """Create the drawing from the state of the networks and the options of the user.
 
     The run time is proportional to the number of nodes and topics.
@@ -218,13 +218,13 @@ def node_graph(facts: GraphFacts, choices: GraphOptions) -> NodeGraph:
 
 
 def _is_hidden(node: DrawnNode, choices: GraphOptions) -> bool:
-    return node.is_quiet and choices.hides_quiet and node.group not in choices.quiet_visible_groups
+    return node.is_quiet and choices.hides_quiet and node.group not in choices.groups_with_visible_quiet_nodes
 
 
 # -- nodes and their groups ----------------------------------------------------------------------------------
 
 
-def _boxes(facts: GraphFacts, choices: GraphOptions) -> dict[str, DrawnNode]:
+def _boxes(facts: GraphInput, choices: GraphOptions) -> dict[str, DrawnNode]:
     # By the entry's key; groups are not collapsed yet.
     pictures = {topic.key for topic in facts.topics if topic.codec == "image"}
     drawn: dict[str, DrawnNode] = {}
@@ -241,15 +241,15 @@ def _boxes(facts: GraphFacts, choices: GraphOptions) -> dict[str, DrawnNode]:
             entry,
             entry.key,
             _bridged_network(entry),
-            any(key_of(entry.network, topic) in pictures for topic in entry.publishes),
+            any(key_of(entry.network, topic) in pictures for topic in entry.published_topics),
             entry.gone_s is not None,
-            entry.key in choices.quiet and entry.gone_s is None,
+            entry.key in choices.quiet_nodes and entry.gone_s is None,
             page=page,
         )
     return dict(sorted(drawn.items(), key=lambda item: item[1].key))
 
 
-def _kind_of(entry: NodeEntry, facts: GraphFacts) -> NodeKind:
+def _kind_of(entry: NodeEntry, facts: GraphInput) -> NodeKind:
     if entry.is_bridge:
         return "bridge"
     if entry.is_original:
@@ -284,7 +284,7 @@ def _bridged_network(entry: NodeEntry) -> str:
     return kind.product_name if kind is not None else back_end
 
 
-def _group_of(entry: NodeEntry, facts: GraphFacts, group_by: GroupBy) -> str:
+def _group_of(entry: NodeEntry, facts: GraphInput, group_by: GroupBy) -> str:
     # "host:lab-pc", "network:ros2", "robot:Pepper"; "" for none.
     if group_by == "nothing":
         return ""
@@ -297,11 +297,11 @@ def _group_of(entry: NodeEntry, facts: GraphFacts, group_by: GroupBy) -> str:
 
 
 def _belongs_to(entry: NodeEntry, robot: str) -> bool:
-    return entry.name == robot or any(topic.startswith(f"/{robot}/") for topic in entry.publishes)
+    return entry.name == robot or any(topic.startswith(f"/{robot}/") for topic in entry.published_topics)
 
 
 def _groups(
-    facts: GraphFacts, choices: GraphOptions, boxes: Mapping[str, DrawnNode]
+    facts: GraphInput, choices: GraphOptions, boxes: Mapping[str, DrawnNode]
 ) -> tuple[GraphGroup, ...]:
     # Sorted by key. A group whose nodes are all hidden is collapsed, so that it stays visible.
     members: dict[str, list[DrawnNode]] = {}
@@ -327,7 +327,7 @@ def _host_of(group: str) -> str:
     return group.partition(":")[2]
 
 
-def _icon_of(group: str, nodes: Iterable[DrawnNode], facts: GraphFacts) -> str:
+def _icon_of(group: str, nodes: Iterable[DrawnNode], facts: GraphInput) -> str:
     kind, _colon, name = group.partition(":")
     if kind == "network":
         return "waypoints"
@@ -338,7 +338,7 @@ def _icon_of(group: str, nodes: Iterable[DrawnNode], facts: GraphFacts) -> str:
     return "bot" if name != facts.host and any(node.kind == "robot" for node in nodes) else "monitor"
 
 
-def _addresses(facts: GraphFacts) -> dict[str, str]:
+def _addresses(facts: GraphInput) -> dict[str, str]:
     # By the key of an entry, where its publishers are reachable from other computers.
     found: dict[str, str] = {}
     for topic in facts.topics:
@@ -377,7 +377,7 @@ def _collapsed_box(group: GraphGroup) -> DrawnNode:
 
 # -- lines ---------------------------------------------------------------------------------------------------
 
-_Ends = tuple[tuple[str, ...], tuple[str, ...]]
+_LineEnds = tuple[tuple[str, ...], tuple[str, ...]]
 
 
 def is_drawn(topic: str, choices: GraphOptions) -> bool:
@@ -385,9 +385,9 @@ def is_drawn(topic: str, choices: GraphOptions) -> bool:
     return choices.shows_internal or not topic.startswith(INTERNAL_PREFIX)
 
 
-def _topic_lines(facts: GraphFacts, choices: GraphOptions, place: Mapping[str, str]) -> Iterator[GraphLine]:
+def _topic_lines(facts: GraphInput, choices: GraphOptions, place: Mapping[str, str]) -> Iterator[GraphLine]:
     patterns = _patterns(facts)
-    bundles: dict[_Ends, list[str]] = {}
+    bundles: dict[_LineEnds, list[str]] = {}
     for topic in facts.topics:
         info = topic.info
         if info is None or topic.gone_s is not None or not is_drawn(topic.name, choices):
@@ -403,8 +403,8 @@ def _topic_lines(facts: GraphFacts, choices: GraphOptions, place: Mapping[str, s
     yield from _lines_of("topic", bundles)
 
 
-def _service_lines(facts: GraphFacts, choices: GraphOptions, place: Mapping[str, str]) -> Iterator[GraphLine]:
-    bundles: dict[_Ends, list[str]] = {}
+def _service_lines(facts: GraphInput, choices: GraphOptions, place: Mapping[str, str]) -> Iterator[GraphLine]:
+    bundles: dict[_LineEnds, list[str]] = {}
     for name, info in facts.services.items():
         if is_drawn(name, choices):
             clients = (each.node_id for each in info.clients)
@@ -413,18 +413,18 @@ def _service_lines(facts: GraphFacts, choices: GraphOptions, place: Mapping[str,
     yield from _lines_of("service", bundles)
 
 
-def _patterns(facts: GraphFacts) -> list[tuple[str, str, str]]:
+def _patterns(facts: GraphInput) -> list[tuple[str, str, str]]:
     # (network, pattern, entry) of subscribers of patterns.
     return [
         (entry.network, topic, entry.key)
         for entry in facts.nodes
         if entry.gone_s is None
-        for topic in entry.subscribes
+        for topic in entry.subscribed_topics
         if is_pattern(topic)
     ]
 
 
-def _ends(sources: Iterable[str], targets: Iterable[str], place: Mapping[str, str]) -> _Ends:
+def _ends(sources: Iterable[str], targets: Iterable[str], place: Mapping[str, str]) -> _LineEnds:
     # Boxes that are drawn, each once.
     return _boxes_of(sources, place), _boxes_of(targets, place)
 
@@ -434,12 +434,12 @@ def _boxes_of(entries: Iterable[str], place: Mapping[str, str]) -> tuple[str, ..
     return tuple(found) if len(found) < 2 else tuple(sorted(found))
 
 
-def _add_to_bundle(bundles: dict[_Ends, list[str]], ends: _Ends, name: str) -> None:
+def _add_to_bundle(bundles: dict[_LineEnds, list[str]], ends: _LineEnds, name: str) -> None:
     sources, targets = ends
     if sources and targets and not (len(sources) == 1 and sources == targets):
         bundles.setdefault(ends, []).append(name)
 
 
-def _lines_of(kind: LineKind, bundles: Mapping[_Ends, Collection[str]]) -> Iterator[GraphLine]:
+def _lines_of(kind: LineKind, bundles: Mapping[_LineEnds, Collection[str]]) -> Iterator[GraphLine]:
     for (sources, targets), names in bundles.items():
         yield GraphLine(kind, sources, targets, tuple(sorted(names)))

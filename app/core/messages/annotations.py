@@ -15,7 +15,7 @@ from nep.text import shortened
 MAX_SHAPES = 2000
 MAX_POINTS = 20_000
 MAX_TEXT_LENGTH = 200
-MAX_PIXELS = 1e6
+MAX_COORDINATE_PX = 1e6
 """Maximum coordinate and size in pixels.
 
 Larger shapes are skipped, because graphics libraries don't support them.
@@ -58,10 +58,10 @@ def is_annotation(payload: object) -> bool:
     if not isinstance(payload, Mapping):
         return False
     lists = (payload.get(name) for name in ("circles", "points", "texts"))
-    return any(_is_list(each) for each in lists) or _face_of(payload) is not None or "positions" in payload
+    return any(_is_list(each) for each in lists) or _parse_face(payload) is not None or "positions" in payload
 
 
-def shapes_in(payload: object, width: int, height: int) -> tuple[AnnotationShape, ...]:
+def parse_shapes(payload: object, width: int, height: int) -> tuple[AnnotationShape, ...]:
     """Return the shapes in a decoded message; invalid shapes are skipped.
 
     Args:
@@ -98,7 +98,7 @@ def _all_shapes(payload: Mapping[str, object], frame: _Frame) -> Iterator[Annota
         for item in _items(payload.get(name)):
             if isinstance(item, Mapping) and frame.left > 0:
                 yield from maker(item, frame)
-    face = _face_of(payload)
+    face = _parse_face(payload)
     if face is not None:
         yield from face
 
@@ -144,7 +144,7 @@ def _text(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape
     )
 
 
-def _face_of(payload: Mapping[str, object]) -> tuple[AnnotationShape, ...] | None:
+def _parse_face(payload: Mapping[str, object]) -> tuple[AnnotationShape, ...] | None:
     # The field `center` of `face_positions` is in fact the upper left corner.
     face = payload.get("face")
     if not isinstance(face, Mapping):
@@ -193,4 +193,4 @@ def _number(value: object) -> float | None:
     # None for numbers that a painter doesn't support.
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
-    return float(value) if abs(value) <= MAX_PIXELS else None  # also excludes NaN
+    return float(value) if abs(value) <= MAX_COORDINATE_PX else None  # also excludes NaN

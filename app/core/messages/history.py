@@ -72,7 +72,7 @@ class MessageHistory:
         for message in batch.messages:
             self.add(message)
 
-    def rewind(self) -> None:
+    def reset(self) -> None:
         """Remove all messages. Called when the source seeks to another time."""
         self._kept.clear()
         self.size_bytes = self.first = self.missed = 0

@@ -22,7 +22,7 @@ RATE_WINDOW_S = 2.0
 RATE_DELAY_S = 0.25
 
 
-class Rate:
+class ImageRateMeter:
     """Image rate over the last two seconds, by arrival time.
 
     The interval ends slightly before the current time, so that images that arrived but are not painted
@@ -36,7 +36,7 @@ class Rate:
         """Count an image that arrived at ``arrived_s`` (monotonic seconds)."""
         self._times.append(arrived_s)
 
-    def per_second(self, now: float) -> float | None:
+    def rate_hz(self, now: float) -> float | None:
         """Return the rate in images per second; None if fewer than two images arrived in the interval."""
         end = now - RATE_DELAY_S
         while self._times and self._times[0] <= end - RATE_WINDOW_S:
@@ -64,7 +64,7 @@ class ImageStream:
     picture: Picture | None = None
     error: str | None = None
     is_frozen: bool = False
-    is_awaiting_picture: bool = True
+    is_awaiting_image: bool = True
     requested_size: Size | None = None
     """Requested size in screen pixels; None for full resolution.
 
@@ -74,9 +74,9 @@ class ImageStream:
     """Requested display style."""
     pending: tuple[Message, float] | None = None
     """Newest message that is not decoded yet, and its arrival time (monotonic seconds)."""
-    arrival_rate: Rate = field(default_factory=Rate)
+    arrival_rate: ImageRateMeter = field(default_factory=ImageRateMeter)
     """Rate of arriving images."""
-    _display_rate: Rate = field(default_factory=Rate)
+    _display_rate: ImageRateMeter = field(default_factory=ImageRateMeter)
     silence_start_s: float = 0.0
     """Time from which the silence of the topic is measured (monotonic seconds). Used by `Images`."""
     _is_suspended: bool = False
@@ -91,12 +91,12 @@ class ImageStream:
     def arriving_hz(self) -> float | None:
         """Number of images that arrive per second; None if unknown."""
         with self._images.lock:
-            return self.arrival_rate.per_second(self._images.clock())
+            return self.arrival_rate.rate_hz(self._images.clock())
 
     @property
     def displayed_hz(self) -> float | None:
         """Number of images that are painted per second; None if unknown."""
-        return self._display_rate.per_second(self._images.clock())
+        return self._display_rate.rate_hz(self._images.clock())
 
     @property
     def silent_s(self) -> float | None:
@@ -147,7 +147,7 @@ class ImageStream:
         The last image remains visible.
         """
         if not self._is_suspended:
-            self._is_suspended = self.is_awaiting_picture = True
+            self._is_suspended = self.is_awaiting_image = True
             self._images.unregister(self)
             self._watch.suspend()
 
@@ -193,7 +193,7 @@ class Images:
         """Register an opened or resumed stream."""
         with self.lock:
             self._streams.setdefault(stream.topic, []).append(stream)
-            stream.arrival_rate = Rate()
+            stream.arrival_rate = ImageRateMeter()
             self._arrived.notify()  # a held one may be requested larger
             if self._thread is None and not self._closing:
                 self._thread = self._start_decoding()
@@ -227,7 +227,7 @@ class Images:
                     stream.arrival_rate.add(now)
             self._arrived.notify()
 
-    def rewind(self, topics: Collection[str] = ()) -> None:
+    def reset(self, topics: Collection[str] = ()) -> None:
         """Discard all images except images of the given topics.
 
         Called when the source seeks to another time.
@@ -239,10 +239,10 @@ class Images:
                     if stream.is_frozen:
                         continue
                     stream.pending = None
-                    stream.arrival_rate = Rate()
+                    stream.arrival_rate = ImageRateMeter()
                     if topic not in topics:
                         stream.picture = stream.error = None
-                        stream.is_awaiting_picture = True
+                        stream.is_awaiting_image = True
 
     def unregister(self, stream: ImageStream) -> None:
         """Unregister a closed or suspended stream."""
@@ -367,8 +367,8 @@ def _deliver(stream: ImageStream, message: Message, picture: Picture | None, err
         if picture.look != stream.look and stream.pending is None:  # changed while it was decoded
             stream.pending = (message, picture.received_s)
         stream.picture = picture
-        stream.is_awaiting_picture = (
-            stream.is_awaiting_picture and before is not None and before.message is message
+        stream.is_awaiting_image = (
+            stream.is_awaiting_image and before is not None and before.message is message
         )
 
 

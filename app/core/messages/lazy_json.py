@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     Positions = NDArray[np.int64]
 
-CHUNK = 1 << 20
+CHUNK_BYTES = 1 << 20
 MAX_DEPTH = 1000
 MIN_CACHED_SEPARATORS = 256  # separators
 MAX_CACHED_CONTAINERS = 1000  # containers
@@ -31,7 +31,7 @@ QUOTE, BACKSLASH, COMMA, COLON = b'"\\,:'
 WHITESPACE = b" \t\r\n"
 
 
-class Unreadable:
+class UnreadableValue:
     """Placeholder for a value whose text is not valid JSON."""
 
     def __init__(self, text: bytes) -> None:
@@ -41,7 +41,7 @@ class Unreadable:
         return f"no JSON: {self.text[:60].decode('utf-8', 'replace')}"
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Unreadable) and other.text == self.text
+        return isinstance(other, UnreadableValue) and other.text == self.text
 
     def __hash__(self) -> int:
         return hash(self.text)
@@ -58,7 +58,7 @@ class JsonIndex:
         import numpy as np  # noqa: PLC0415  slow import, needed only by large messages
 
         self.data = data
-        self._places, kinds = _find_structure(data)
+        self._places, kinds = _find_separators(data)
         opens, closes = np.isin(kinds, list(OPEN)), np.isin(kinds, list(CLOSE))
         after = np.cumsum(opens.astype(np.int32) - closes)
         if not len(after) or after[-1] != 0 or after.min() < 0:
@@ -71,7 +71,7 @@ class JsonIndex:
         self._levels = [  # `take` releases the GIL, unlike indexing with brackets
             (np.take(self._places, order[a:b]), np.take(kinds, order[a:b])) for a, b in pairwise(bounds)
         ]
-        self._kept: dict[int, _Lazy] = {}
+        self._kept: dict[int, _LazyContainer] = {}
         self._many: dict[int, tuple[int, Positions, Positions]] = {}
         self._ends = [places[np.isin(kinds, list(CLOSE))] for places, kinds in self._levels]
 
@@ -99,10 +99,10 @@ class JsonIndex:
         try:
             found: object = orjson.loads(text)
         except orjson.JSONDecodeError:
-            return Unreadable(text)
+            return UnreadableValue(text)
         return found
 
-    def _container(self, start: int, level: int, first: int) -> _Lazy:
+    def _container(self, start: int, level: int, first: int) -> _LazyContainer:
         # Cached, so that it is the same object each time, up to `MAX_CACHED_CONTAINERS` containers.
         found = self._kept.get(start)
         if found is None:
@@ -136,7 +136,7 @@ class JsonIndex:
         """Return the keys and indices that lead to the value at a position of the text."""
         path: list[str | int] = []
         here = self.root
-        while isinstance(here, _Lazy):
+        while isinstance(here, _LazyContainer):
             row = here.row_at(place)
             if row is None:
                 break
@@ -145,7 +145,7 @@ class JsonIndex:
         return tuple(path)
 
 
-class _Lazy:
+class _LazyContainer:
     """Base class of lazy objects and arrays, with the positions of their elements."""
 
     def __init__(self, index: JsonIndex, start: int, level: int) -> None:
@@ -201,7 +201,7 @@ class _Lazy:
         return hash(self.text)
 
 
-class LazyList(_Lazy, Sequence[object]):
+class LazyList(_LazyContainer, Sequence[object]):
     """JSON array whose elements are decoded at each access."""
 
     def __len__(self) -> int:
@@ -222,7 +222,7 @@ class LazyList(_Lazy, Sequence[object]):
         return self.value_at(place)
 
 
-class LazyObject(_Lazy, Mapping[str, object]):
+class LazyObject(_LazyContainer, Mapping[str, object]):
     """JSON object whose values are decoded at each access. For duplicate keys, the last value is used."""
 
     def __len__(self) -> int:
@@ -248,7 +248,7 @@ class LazyObject(_Lazy, Mapping[str, object]):
         _start, end = self._bounds(row)
         colon = self._colon(row)
         if colon == end:
-            return Unreadable(b"")
+            return UnreadableValue(b"")
         return self._index.value(colon + 1, end, self._level + 1)
 
     def _colon(self, row: int) -> int:
@@ -263,13 +263,13 @@ class LazyObject(_Lazy, Mapping[str, object]):
         return {self.key_at(row): row for row in range(self._count)}
 
     def __eq__(self, other: object) -> bool:
-        return _Lazy.__eq__(self, other)
+        return _LazyContainer.__eq__(self, other)
 
     def __hash__(self) -> int:
-        return _Lazy.__hash__(self)
+        return _LazyContainer.__hash__(self)
 
 
-def _find_structure(data: memoryview) -> tuple[Positions, NDArray[np.uint8]]:
+def _find_separators(data: memoryview) -> tuple[Positions, NDArray[np.uint8]]:
     # Positions and kinds of all brackets, commas and colons outside of strings.
     import numpy as np  # noqa: PLC0415
 
@@ -277,8 +277,8 @@ def _find_structure(data: memoryview) -> tuple[Positions, NDArray[np.uint8]]:
     wanted[list(OPEN + CLOSE + bytes((COMMA, COLON)))] = True
     places, kinds = [], []
     in_text, escaped = 0, False
-    for begin in range(0, len(data), CHUNK):
-        part = np.frombuffer(data[begin : begin + CHUNK], np.uint8)
+    for begin in range(0, len(data), CHUNK_BYTES):
+        part = np.frombuffer(data[begin : begin + CHUNK_BYTES], np.uint8)
         quotes = part == QUOTE
         slashes = np.flatnonzero(part == BACKSLASH)
         if escaped or len(slashes):

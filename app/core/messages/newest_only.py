@@ -10,7 +10,7 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 
-class NewestOnly(Generic[Job, Result]):
+class NewestJobWorker(Generic[Job, Result]):
     """Background thread that processes one job at a time. A newer job replaces a pending one. Thread-safe.
 
     The first job starts the thread.

@@ -13,7 +13,7 @@ from itertools import islice
 from typing import TypeAlias
 
 from app.core.messages.lazy_json import LazyList, LazyObject
-from app.core.storage.csv_text import csv_text, escape_formula
+from app.core.storage.csv_text import escape_formula, format_csv
 from nep.messages.fields import path_text
 
 Steps: TypeAlias = tuple[str | int, ...]
@@ -109,7 +109,7 @@ def rows_of(value: object, most: int = MAX_ROWS) -> list[ObjectRow]:
     ]
 
 
-def rows_found(found: Iterable[tuple[str, object]], most: int = MAX_ROWS) -> list[ObjectRow]:
+def query_rows(found: Iterable[tuple[str, object]], most: int = MAX_ROWS) -> list[ObjectRow]:
     """Return the objects in a query result as rows, named by their paths.
 
     If the result is a single array of objects, the rows are its elements.
@@ -183,7 +183,7 @@ def cell_text(value: object) -> str:
     return json.dumps(value, ensure_ascii=False, default=str)
 
 
-def table_csv(first: str, columns: Sequence[Steps], rows: Iterable[ObjectRow]) -> str:
+def format_table_csv(first: str, columns: Sequence[Steps], rows: Iterable[ObjectRow]) -> str:
     """Return a table as CSV.
 
     Args:
@@ -193,4 +193,4 @@ def table_csv(first: str, columns: Sequence[Steps], rows: Iterable[ObjectRow]) -
     """
     head = [first, *(escape_formula(column_name(column)) for column in columns)]
     lines = ([escape_formula(row.name), *(cell_text(row.at(column)) for column in columns)] for row in rows)
-    return csv_text([head, *lines])
+    return format_csv([head, *lines])

@@ -98,8 +98,8 @@ def decode(
     import cv2  # noqa: PLC0415  150 MB: loaded with the first image, not at the start
 
     try:
-        frame, size = _frame(message, fit)
-        found = _bgra(frame, look)
+        frame, size = _decode_frame(message, fit)
+        found = _to_bgra(frame, look)
     except NepError as error:
         return None, str(error)
     except (cv2.error, MemoryError) as error:
@@ -129,7 +129,7 @@ def reuse_picture(
     """
     if shown is None or shown.message is None or shown.message is message or shown.look != look:
         return None
-    of, factor = shown.message, _factor((shown.width, shown.height), fit)
+    of, factor = shown.message, _reduction_factor((shown.width, shown.height), fit)
     if abs(shown.bgra.shape[0] * factor - shown.height) >= factor:  # rounded up or down
         return None
     if of.extension != message.extension or not _are_bytes_equal(of.data, message.data):
@@ -154,7 +154,7 @@ def _short_message(error: BaseException) -> str:
     )
 
 
-def png_of(message: Message) -> bytes:
+def encode_png(message: Message) -> bytes:
     """Return the image of a message in full resolution as the content of a PNG file.
 
     A message in PNG format is returned unchanged, without trailing data. Raises NepError if the message
@@ -166,7 +166,7 @@ def png_of(message: Message) -> bytes:
         file = parse_header(message.data)
         if file.kind == "png":
             return bytes(file.data)
-    frame, _size = _frame(message, None)
+    frame, _size = _decode_frame(message, None)
     if frame.dtype not in PNG_DTYPES:
         raise EncodeError(
             "png",
@@ -179,19 +179,19 @@ def png_of(message: Message) -> bytes:
     return bytes(data.tobytes())
 
 
-def _frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
+def _decode_frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
     # In OpenCV's layout (grey, BGR or BGRA; any type), perhaps reduced, and its full size.
     layout = image_codec.raw_layout(message.extension.get("encoding"))
     if layout is not None:
         frame = image_codec.raw_array(message.data, layout, message.extension.get("shape"))
         size = (frame.shape[1], frame.shape[0])
-        frame = _reduce(frame, _factor(size, fit))
+        frame = _reduce(frame, _reduction_factor(size, fit))
         if layout.is_red_first:
             frame = frame[:, :, [2, 1, 0, 3][: layout.channels]]
         return frame, size
     file = parse_header(message.data)
     size = (file.width, file.height)
-    factor = _factor(size, fit)
+    factor = _reduction_factor(size, fit)
     if file.kind == "jpeg":
         return image_codec.read_file(file, factor), size
     return _reduce(image_codec.read_file(file), factor), size
@@ -209,7 +209,7 @@ def _reduce(frame: NDArray[Any], factor: int) -> NDArray[Any]:
     return smaller
 
 
-def _factor(size: Size, fit: Size | None) -> int:
+def _reduction_factor(size: Size, fit: Size | None) -> int:
     # Factor by which the image can be reduced for `fit`.
     if fit is None:
         return 1
@@ -217,7 +217,7 @@ def _factor(size: Size, fit: Size | None) -> int:
     return next((factor for factor in REDUCTION_FACTORS if shrink >= factor), 1)
 
 
-def _bgra(
+def _to_bgra(
     frame: NDArray[Any], look: PictureLook
 ) -> tuple[Any, NDArray[Any] | None, ColourScale | None] | None:
     # In QImage's layout, the numbers of one channel, and the meaning of their colours; None if unsupported.

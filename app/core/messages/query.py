@@ -24,7 +24,7 @@ else:
 
 MAX_LENGTH = 500
 """Maximum length of a query in characters."""
-MAX_STEPS = 50_000
+MAX_VISITED_VALUES = 50_000
 """Maximum number of visited values."""
 MAX_RESULTS = 2_000
 Steps = tuple[str | int, ...]
@@ -57,7 +57,7 @@ class QueryResult:
         cut: Reason why the result is incomplete, or "".
     """
 
-    found: Mapping[FoundPath, object]
+    values: Mapping[FoundPath, object]
     cut: str = ""
 
 
@@ -79,7 +79,7 @@ class JsonQuery:
             raise QueryError(_("the query isn't valid")) from error
 
     def evaluate(
-        self, value: object, most_steps: int = MAX_STEPS, most_found: int = MAX_RESULTS
+        self, value: object, most_steps: int = MAX_VISITED_VALUES, most_found: int = MAX_RESULTS
     ) -> QueryResult:
         """Run the query on a decoded message.
 
@@ -146,7 +146,7 @@ def _wrap_counted(value: object, count: _StepCounter) -> object:
     if isinstance(value, Mapping):
         return _CountedObject(value, count)
     if isinstance(value, (bytes, bytearray, memoryview)):
-        return _Bytes(value)
+        return _WrappedBytes(value)
     if isinstance(value, Sequence) and not isinstance(value, str):
         return _CountedList(value, count)
     return value
@@ -154,7 +154,7 @@ def _wrap_counted(value: object, count: _StepCounter) -> object:
 
 def _unwrap(value: object) -> object:
     # Unwraps a counted value.
-    return value.raw if isinstance(value, (_CountedObject, _CountedList, _Bytes)) else value
+    return value.raw if isinstance(value, (_CountedObject, _CountedList, _WrappedBytes)) else value
 
 
 def _are_equal(one: object, other: object) -> bool:
@@ -163,7 +163,7 @@ def _are_equal(one: object, other: object) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class _Bytes:
+class _WrappedBytes:
     """Wrapper of msgpack bytes, so that they count as one value and not as an array."""
 
     raw: object

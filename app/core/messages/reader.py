@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.core.messages.lazy_json import JsonIndex
-from app.core.messages.newest_only import NewestOnly
+from app.core.messages.newest_only import NewestJobWorker
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
@@ -16,7 +16,7 @@ READ_INTERVAL_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reading:
+class ReadResult:
     """Result of reading a message.
 
     Attributes:
@@ -32,7 +32,7 @@ class Reading:
     index: JsonIndex | None = None
 
 
-def read(message: Message) -> Reading:
+def read(message: Message) -> ReadResult:
     """Decode a message for display; large JSON is indexed instead (`app.core.messages.lazy_json`).
 
     Thread-safe.
@@ -40,15 +40,15 @@ def read(message: Message) -> Reading:
     try:
         if message.codec == "json" and message.size_bytes > LARGE_BYTES:
             index = JsonIndex(message.data)
-            return Reading(message, index.root, index=index)
-        return Reading(message, message.payload)
+            return ReadResult(message, index.root, index=index)
+        return ReadResult(message, message.payload)
     except (NepError, ValueError) as error:
-        return Reading(message, error=str(error))
+        return ReadResult(message, error=str(error))
     except MemoryError:
-        return Reading(message, error=_("not enough memory"))
+        return ReadResult(message, error=_("not enough memory"))
 
 
-class Reader(NewestOnly[Message, Reading]):
+class MessageReader(NewestJobWorker[Message, ReadResult]):
     """Background thread that reads the messages of one panel. The first message starts the thread."""
 
     def __init__(self) -> None:
@@ -56,7 +56,7 @@ class Reader(NewestOnly[Message, Reading]):
         self._asked_at: float | None = None
 
     @staticmethod
-    def _read(message: Message) -> Reading:
+    def _read(message: Message) -> ReadResult:
         return read(message)
 
     def submit_throttled(self, message: Message, now: float) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import platformdirs
 
-from app.core.messages.picture import png_of
+from app.core.messages.picture import encode_png
 from app.core.storage.settings import Settings, home
 from nep.i18n import _
 from nep.messages.message import Message
@@ -44,7 +44,7 @@ def save(message: Message, into: Path | None = None) -> Path:
         message: Message with an image.
         into: Folder; default: `folder`.
     """
-    data = png_of(message)
+    data = encode_png(message)
     place = into if into is not None else folder()
     place.mkdir(parents=True, exist_ok=True)
     stem = file_stem(message)

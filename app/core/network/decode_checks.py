@@ -15,12 +15,12 @@ from dataclasses import dataclass
 from nep.errors import NepError
 from nep.messages.message import Message
 
-READABLE = frozenset({"json", "string", "msgpack"})
+CHECKED_CODECS = frozenset({"json", "string", "msgpack"})
 LARGE_BYTES = 300_000
 MAX_CPU_SHARE = 0.07
 MAX_BUDGET_S = 1.0
-RESERVE_S = 0.5
-SUSPECT_S = 30.0
+RESERVED_BUDGET_S = 0.5
+SUSPECT_TIMEOUT_S = 30.0
 CLOCK_READ_INTERVAL_S = 0.0002
 """Minimum decoding time in seconds between two readings of the clock.
 
@@ -42,13 +42,13 @@ class CheckResult:
     """
 
     checked: int = 0
-    bad: int = 0
-    unchecked: int = 0
+    bad_count: int = 0
+    unchecked_count: int = 0
     error: str = ""
-    is_last_good: bool = True
+    is_newest_readable: bool = True
 
 
-class Checks:
+class DecodeChecker:
     """Check of received messages. `check` runs in the receiving thread, `pop_results` in the main thread."""
 
     def __init__(
@@ -66,7 +66,7 @@ class Checks:
 
     def check(self, topic: str, messages: Sequence[Message]) -> None:
         """Check messages of one topic, oldest first. Images and bytes are skipped."""
-        if not messages or messages[-1].codec not in READABLE:
+        if not messages or messages[-1].codec not in CHECKED_CODECS:
             return
         found = CheckResult()
         self._refill_budget()
@@ -75,8 +75,8 @@ class Checks:
             old = self._found.get(topic)
             if old is not None:
                 found.checked += old.checked
-                found.bad += old.bad
-                found.unchecked += old.unchecked
+                found.bad_count += old.bad_count
+                found.unchecked_count += old.unchecked_count
                 found.error = found.error or old.error
             self._found[topic] = found
 
@@ -95,33 +95,33 @@ class Checks:
         newest = messages[-1]
         # the newest is always decoded and stays decoded: panels show it
         found.error = _decode_error(newest, keep=True)
-        found.is_last_good = not found.error
-        found.checked, found.bad = 1, int(not found.is_last_good)
+        found.is_newest_readable = not found.error
+        found.checked, found.bad_count = 1, int(not found.is_newest_readable)
         now = self._refilled
-        if found.bad:
+        if found.bad_count:
             self._suspects[topic] = now
         if len(messages) > 1:  # reading the clock takes longer than a single message
             self._check_older(topic, messages, found, now)
 
     def _check_older(self, topic: str, messages: Sequence[Message], found: CheckResult, now: float) -> None:
         began = self._work()
-        left = self._advance_s - (0.0 if self._is_suspect(topic, now) else RESERVE_S)
+        left = self._advance_s - (0.0 if self._is_suspect(topic, now) else RESERVED_BUDGET_S)
         place, some, worked, older = 0, 1, 0.0, len(messages) - 1
         while place < older and worked < left:
-            was_well, before = not found.bad, worked
+            was_well, before = not found.bad_count, worked
             end = min(older, place + some)
             place = _check_batch(messages, place, end, found)
-            if was_well and found.bad:
+            if was_well and found.bad_count:
                 self._suspects[topic] = now
                 left = self._advance_s
             worked = self._work() - began
             some = min(2 * some, SOME) if worked - before < CLOCK_READ_INTERVAL_S else max(1, some // 2)
-        found.unchecked = len(messages) - found.checked
+        found.unchecked_count = len(messages) - found.checked
         self._advance_s -= worked
 
     def _is_suspect(self, topic: str, now: float) -> bool:
         seen = self._suspects.get(topic)
-        if seen is not None and now - seen > SUSPECT_S:
+        if seen is not None and now - seen > SUSPECT_TIMEOUT_S:
             del self._suspects[topic]
             return False
         return seen is not None
@@ -135,7 +135,7 @@ def _check_batch(messages: Sequence[Message], place: int, end: int, found: Check
         problem = _decode_error(message, keep=False)
         found.checked += 1
         if problem:
-            found.bad += 1
+            found.bad_count += 1
             found.error = found.error or problem
         size_bytes += message.size_bytes
         place += 1

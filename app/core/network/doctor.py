@@ -78,7 +78,7 @@ class Doctor:
         """Start the checks, unless they are running."""
         if self.is_running:
             return
-        self._thread = threading.Thread(target=self._run, name="studio-doctor", daemon=True)
+        self._thread = threading.Thread(target=self._run_checks, name="studio-doctor", daemon=True)
         self._thread.start()
         self.revision += 1
 
@@ -98,7 +98,7 @@ class Doctor:
         if self._thread is not None:
             self._thread.join(JOIN_TIMEOUT_S)
 
-    def _run(self) -> None:
+    def _run_checks(self) -> None:
         while True:  # repeats when another topic was set meanwhile
             missed, self._so_far = self._missed, None
             found = self._find(missed)
@@ -124,7 +124,7 @@ class Doctor:
             )
 
 
-def doctor_of(address: str, folder: Path) -> Doctor:
+def create_doctor(address: str, folder: Path) -> Doctor:
     """Return a doctor for a master, which also checks Studio's folder.
 
     Topics of other networks are not checked, because the doctor supports only the native network.

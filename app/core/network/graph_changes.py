@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from nep.i18n import _, ngettext
 from nep.protocol.graph_view import GraphView, NodeInfo
 
-NATIVE = "native"
-GATEWAY = "gateway"
+NATIVE_GENERATION = "native"
+GATEWAY_GENERATION = "gateway"
 MASTER = "master"
 UNNAMED_PREFIX = "program "
 INTERNAL_PREFIX = "/nep/"
@@ -18,7 +18,7 @@ MAX_LINES = 8
 
 If there are more changes, one line with their number is written; a bridge can add a thousand topics.
 """
-NAMED = 3
+MAX_NAMED = 3
 
 
 def change_messages(before: GraphView, after: GraphView) -> list[str]:
@@ -34,7 +34,7 @@ def change_messages(before: GraphView, after: GraphView) -> list[str]:
     topics_of = _topics_by_node(after)
     for node in came:
         new = [name for name in topics_of.get(node, ()) if not _is_published(before, name)]
-        name, original = after.nodes[node].name, after.nodes[node].generation != NATIVE
+        name, original = after.nodes[node].name, after.nodes[node].generation != NATIVE_GENERATION
         if len(new) > MAX_LISTED_TOPICS:
             here.append((name, _joined_message(name, len(new), original=original)))
             reported.update(new)
@@ -60,8 +60,8 @@ def change_messages(before: GraphView, after: GraphView) -> list[str]:
 def _summarize(lines: Sequence[tuple[str, str]], many: str) -> list[str]:
     if len(lines) <= MAX_LINES:
         return [line for _name, line in lines]
-    named = ", ".join(name for name, _line in lines[:NAMED])
-    return [many.format(count=len(lines), names=named, more=len(lines) - NAMED)]
+    named = ", ".join(name for name, _line in lines[:MAX_NAMED])
+    return [many.format(count=len(lines), names=named, more=len(lines) - MAX_NAMED)]
 
 
 def _joined_message(node: str, count: int, *, original: bool) -> str:
@@ -79,7 +79,11 @@ def _joined_message(node: str, count: int, *, original: bool) -> str:
 
 def _is_reported(node: NodeInfo) -> bool:
     # a behaviour's program is reported by its run; the gateway and the master's log node belong to the master
-    return node.generation != GATEWAY and node.name != MASTER and not node.name.startswith(UNNAMED_PREFIX)
+    return (
+        node.generation != GATEWAY_GENERATION
+        and node.name != MASTER
+        and not node.name.startswith(UNNAMED_PREFIX)
+    )
 
 
 def _is_internal(topic: str) -> bool:

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 
 from nep.messages.message import Message
 
-MESSAGES_PER_TOPIC = 256
-BYTES_PER_TOPIC = 64 * 1024 * 1024
+MAX_MESSAGES_PER_TOPIC = 256
+MAX_BYTES_PER_TOPIC = 64 * 1024 * 1024
 MAX_EVENTS = 20_000
 
 
@@ -37,7 +37,7 @@ class Batch:
 
 
 @dataclass(slots=True)
-class Drained:
+class DrainResult:
     """Result of a drain.
 
     Attributes:
@@ -48,7 +48,7 @@ class Drained:
 
     batches: dict[str, Batch]
     events: list[object]
-    lost_events: int
+    lost_event_count: int
 
 
 class _Ring:
@@ -65,8 +65,8 @@ class Mailbox:
 
     def __init__(
         self,
-        messages_per_topic: int = MESSAGES_PER_TOPIC,
-        bytes_per_topic: int = BYTES_PER_TOPIC,
+        messages_per_topic: int = MAX_MESSAGES_PER_TOPIC,
+        bytes_per_topic: int = MAX_BYTES_PER_TOPIC,
         events: int = MAX_EVENTS,
     ) -> None:
         self._messages_per_topic = messages_per_topic
@@ -127,11 +127,11 @@ class Mailbox:
             else:
                 self._events.append(event)
 
-    def drain(self) -> Drained:
+    def drain(self) -> DrainResult:
         """Return and clear all messages and events posted since the last drain."""
         with self._lock:
             rings, self._rings = self._rings, {}
             events, self._events = self._events, deque()
             lost, self._lost_events = self._lost_events, 0
         batches = {topic: Batch(list(ring.messages), ring.dropped) for topic, ring in rings.items()}
-        return Drained(batches, list(events), lost)
+        return DrainResult(batches, list(events), lost)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 else:
     doctor = lazy_module("nep.programs.doctor")
 
-DISCOVERY_S = 1.5
+DISCOVERY_TIMEOUT_S = 1.5
 """Time in seconds after a master's start during which it may not know all nodes yet.
 
 A master waits one second for nodes to register again.
@@ -36,7 +36,7 @@ START_TIMEOUT_S = 50.0
 The first start after an installation, from a slow disk and with a virus scanner, takes longer than the
 usual ten seconds.
 """
-END_TIMEOUT_S = 2.0
+JOIN_TIMEOUT_S = 2.0
 
 _log = logging.getLogger("studio.master")
 
@@ -55,7 +55,7 @@ class MasterState:
     message: str = ""
 
 
-class MasterChange:
+class MasterChangeDetector:
     """Detector of a change to another master, such as after a restart.
 
     Not thread-safe; use it from the main thread.
@@ -76,10 +76,10 @@ class MasterChange:
             return False
         if self._new_epoch[0] != view.epoch:
             self._new_epoch = (view.epoch, now)
-        return now - self._new_epoch[1] < DISCOVERY_S
+        return now - self._new_epoch[1] < DISCOVERY_TIMEOUT_S
 
 
-class MasterStart:
+class MasterStarter:
     """Start of a master, unless one is running.
 
     Consecutive failures with the same reason are reported once.
@@ -121,7 +121,7 @@ class MasterStart:
     def close(self) -> None:
         """Wait for a start in progress."""
         if self._thread is not None:
-            self._thread.join(timeout=END_TIMEOUT_S)
+            self._thread.join(timeout=JOIN_TIMEOUT_S)
 
     def _start(self) -> None:
         why = self._try_start()

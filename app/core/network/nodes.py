@@ -11,7 +11,7 @@ from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView, NodeInfo
 
 GONE_DISPLAY_S = 10.0
 GATEWAY = "gateway"
-NATIVE = frozenset({"native", GATEWAY})
+NATIVE_GENERATIONS = frozenset({"native", GATEWAY})
 
 
 @dataclass(slots=True, eq=False)
@@ -38,8 +38,8 @@ class NodeEntry:
     generation: str = "native"
     since_ns: int = 0
     cpu_ratio: float | None = None
-    publishes: tuple[str, ...] = ()
-    subscribes: tuple[str, ...] = ()
+    published_topics: tuple[str, ...] = ()
+    subscribed_topics: tuple[str, ...] = ()
     is_new: bool = False
     gone_s: float | None = None
     gone_since: float | None = None
@@ -56,12 +56,12 @@ class NodeEntry:
     @property
     def is_original(self) -> bool:
         """True if the node is a program of the original NEP."""
-        return not self.network and self.generation not in NATIVE
+        return not self.network and self.generation not in NATIVE_GENERATIONS
 
     @property
     def is_bridge(self) -> bool:
         """True if the node connects this network to another one (see `nep.programs.bridges`)."""
-        return BRIDGES_TOPIC in self.publishes
+        return BRIDGES_TOPIC in self.published_topics
 
 
 class Nodes:
@@ -146,7 +146,7 @@ class Nodes:
             topic = view.topics.get(place)
             topic = view.topics.get(place)
             node.has_parameters = node.can_set_parameters or (topic is not None and bool(topic.publishers))
-            node.publishes, node.subscribes = publishes.get(id, ()), subscribes.get(id, ())
+            node.published_topics, node.subscribed_topics = publishes.get(id, ()), subscribes.get(id, ())
         for id, node in self._nodes.items():
             if id not in view.nodes and node.gone_since is None:
                 node.gone_since, node.gone_s, node.cpu_ratio = now, 0.0, None

@@ -23,7 +23,7 @@ from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
 
-POLL_S = 0.4
+POLL_INTERVAL_S = 0.4
 POLL_PAUSE_FACTOR = 5.0
 """Minimum pause between two queries of the graph, as a multiple of the duration of the last query.
 
@@ -51,7 +51,7 @@ class GraphReceived:
     """
 
     view: GraphView
-    query_s: float
+    query_duration_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ class JobFailed:
         message: Reason for the failure.
     """
 
-    what: str
+    message_template: str
     message: str
 
 
@@ -125,7 +125,7 @@ class Source(Protocol):
         """Stop the source and wait for its thread."""
 
 
-MakeSource = Callable[[str, Sequence[Sink], Callable[[object], None]], Source]
+SourceFactory = Callable[[str, Sequence[Sink], Callable[[object], None]], Source]
 """Factory of a source, given the address of a master, the message sinks, and the event callback."""
 
 
@@ -171,13 +171,13 @@ class LiveSource:
             self._wanted.add(topic)
             held = self._subscribers.get(topic)
             self._missed_before[topic] = -(held[1].lost or 0) if held is not None else 0
-        self.submit("", _wake)
+        self.submit("", _ignore_wake_job)
 
     def unwatch(self, topic: str) -> None:
         """Unsubscribe from ``topic``."""
         with self._lock:
             self._wanted.discard(topic)
-        self.submit("", _wake)
+        self.submit("", _ignore_wake_job)
 
     def submit(self, what: str, job: Job) -> None:
         """Queue a job. Jobs run in order and wait until a master replies.
@@ -213,7 +213,7 @@ class LiveSource:
 
     # -- overridden for other networks (see `app.core.networks`); called in its thread -------------
 
-    poll_s = POLL_S
+    poll_interval_s = POLL_INTERVAL_S
     """Interval between queries of the graph in seconds."""
 
     def join(self) -> Node:
@@ -250,7 +250,7 @@ class LiveSource:
                 with log_errors("poll the network"):
                     went_well = self._run_cycle()
                 if not went_well:
-                    self._closing.wait(self.poll_s)
+                    self._closing.wait(self.poll_interval_s)
         finally:
             for _, subscriber in self._subscribers.values():
                 with log_errors("end a subscription"):
@@ -263,7 +263,7 @@ class LiveSource:
         if self._node is None and not self._join():
             return False
         asked_s = self._query_graph()
-        pause_s = max(self.poll_s, min(MAX_POLL_INTERVAL_S, POLL_PAUSE_FACTOR * asked_s))
+        pause_s = max(self.poll_interval_s, min(MAX_POLL_INTERVAL_S, POLL_PAUSE_FACTOR * asked_s))
         self._run_jobs(time.monotonic() + pause_s)
         return True
 
@@ -368,4 +368,4 @@ def _free_name(view: GraphView) -> str:
     return NODE_NAME if NODE_NAME not in taken else next(name for name in others if name not in taken)
 
 
-def _wake(_node: Node) -> None: ...
+def _ignore_wake_job(_node: Node) -> None: ...

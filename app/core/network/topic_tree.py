@@ -18,7 +18,7 @@ Deeper levels remain part of the topic's name, because no window is wide enough.
 """
 
 
-def parts_of_name(name: str) -> tuple[str, ...]:
+def split_name(name: str) -> tuple[str, ...]:
     """Split the name of a topic at its slashes into at most `MAX_DEPTH` folders and a non-empty rest."""
     parts = [part for part in name.split("/") if part]
     if not parts:
@@ -146,7 +146,7 @@ class TopicTree:
 
     def _insert(self, topic: Topic) -> None:
         inside, path = self._top, "/"
-        for deep, part in enumerate(parts_of_name(topic.name)[:-1]):
+        for deep, part in enumerate(split_name(topic.name)[:-1]):
             path = f"{path}{part}/"
             folder = self._folders.get(folder_key(topic.network, path))
             if folder is None:
@@ -161,7 +161,7 @@ class TopicTree:
 
 def folders_above(topic: str, network: str = "") -> list[str]:
     """Return the keys of the folders that contain a topic, outermost first."""
-    parts = parts_of_name(topic)[:-1]
+    parts = split_name(topic)[:-1]
     return [folder_key(network, f"/{'/'.join(parts[: count + 1])}/") for count in range(len(parts))]
 
 

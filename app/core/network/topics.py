@@ -15,7 +15,7 @@ from nep.protocol.graph_view import GraphView, TopicInfo
 
 GONE_DISPLAY_S = 10.0
 MAX_RATES = 60
-BATCH_SIZE = 1500
+MAX_TOPICS_PER_UPDATE = 1500
 START_GRACE_S = 5.0
 """Time in seconds that a publisher may need for its first message after a subscription.
 
@@ -92,9 +92,9 @@ class Topic:
     is_watched: bool = False
     gone_since: float | None = None
     last_stamp_ns: int | None = None
-    last_received: float | None = None
+    last_received_s: float | None = None
     subscribed_since: float | None = None
-    active_at: float | None = None
+    last_activity_s: float | None = None
     info: TopicInfo | None = None
     network: str = ""
     is_stale: bool = False
@@ -107,7 +107,7 @@ class Topic:
         return key_of(self.network, self.name)
 
     @property
-    def displayed_and_sent(self) -> tuple[int, int]:
+    def displayed_and_sent_counts(self) -> tuple[int, int]:
         """Number of messages passed to panels, and number of messages sent, since the watch began."""
         return self.received - self.dropped, self.received + self.missed
 
@@ -157,7 +157,7 @@ class Topics:
         """Return the topics that have not vanished."""
         return [topic for topic in self._topics.values() if topic.gone_since is None]
 
-    def of_type(self, *msg_types: str) -> list[Topic]:
+    def topics_of_type(self, *msg_types: str) -> list[Topic]:
         """Return the existing topics that have one of these message types."""
         return [topic for topic in self.existing_topics() if topic.msg_type in msg_types]
 
@@ -178,7 +178,7 @@ class Topics:
         self._clocks = self._clock_offsets(view)
         if seen != self._seen:
             self._apply_graph(view, now)
-        elif len(self._topics) <= BATCH_SIZE:
+        elif len(self._topics) <= MAX_TOPICS_PER_UPDATE:
             _update_statistics(self._topics.values(), view, now, self._clocks)
         self._seen, self._view, self._reported_at = seen, view, now
         self.values_revision += 1
@@ -210,14 +210,14 @@ class Topics:
             self._apply_info(topic, info, view, now)
         for name, topic in self._topics.items():
             if name not in shown and topic.gone_since is None:
-                self._vanish(topic, now)
+                self._mark_vanished(topic, now)
         self._first_graph = False
 
     def mark_all_vanished(self, now: float) -> None:
         """Set all topics to vanished, because the connection to the master was lost."""
         for topic in self._topics.values():
             if topic.gone_since is None:
-                self._vanish(topic, now)
+                self._mark_vanished(topic, now)
 
     def set_stale(self, stale: bool) -> None:
         """Set ``stale`` of all topics.
@@ -269,9 +269,9 @@ class Topics:
         """
         if self._next_index >= len(self._topics):
             self._next_index = 0
-        begin, self._next_index = self._next_index, self._next_index + BATCH_SIZE
+        begin, self._next_index = self._next_index, self._next_index + MAX_TOPICS_PER_UPDATE
         some = list(islice(self._topics.values(), begin, self._next_index))
-        if self._view is not None and len(self._topics) > BATCH_SIZE:
+        if self._view is not None and len(self._topics) > MAX_TOPICS_PER_UPDATE:
             _update_statistics(some, self._view, self._reported_at, self._clocks)
         for topic in some:
             if topic.gone_since is not None:
@@ -307,7 +307,7 @@ class Topics:
         # dropped messages are assumed to be as large as the others
         topic.received_bytes += kept_bytes * batch.arrived_count // len(batch.messages)
         topic.dropped += batch.dropped
-        topic.last_received = topic.active_at = now
+        topic.last_received_s = topic.last_activity_s = now
         self.values_revision += 1
 
     def unwatch(self, name: str) -> None:
@@ -317,7 +317,7 @@ class Topics:
             topic.newest = topic.previous = None
             topic.received = topic.dropped = topic.missed = topic.received_bytes = 0
             topic.measured_rates = None
-            topic.last_received = None
+            topic.last_received_s = None
             topic.is_watched = False
 
     def set_stats(self, figures: Mapping[str, tuple[float | None, int | None]]) -> None:
@@ -334,19 +334,19 @@ class Topics:
                     topic.rates.append(rate_hz)
         self.values_revision += 1
 
-    def rewind(self) -> None:
+    def reset(self) -> None:
         """Discard the newest messages and their times. Called when a replay seeks."""
         for topic in self._topics.values():
             topic.newest = topic.previous = None
-            topic.last_stamp_ns = topic.last_received = topic.age_s = None
+            topic.last_stamp_ns = topic.last_received_s = topic.age_s = None
             topic.rates.clear()
         self.values_revision += 1
 
-    def _vanish(self, topic: Topic, now: float) -> None:
+    def _mark_vanished(self, topic: Topic, now: float) -> None:
         topic.gone_since, topic.gone_s = now, 0.0
         topic.publishers, topic.publisher_nodes = 0, ()
         topic.rate_hz = topic.bandwidth_Bps = topic.age_s = None
-        topic.silent_s = topic.subscribed_since = topic.active_at = None
+        topic.silent_s = topic.subscribed_since = topic.last_activity_s = None
         self.revision += 1
 
     def _apply_info(self, topic: Topic, info: TopicInfo, view: GraphView, now: float) -> None:
@@ -354,7 +354,7 @@ class Topics:
         topic.subscribed_since = _subscribed_since(topic, info, now)
         topic.msg_type, topic.codec = info.msg_type, info.codec
         topic.publishers, topic.subscribers = len(info.publishers), len(info.subscribers)
-        topic.publisher_nodes = _names(info, view)
+        topic.publisher_nodes = _publisher_names(info, view)
         topic.gone_since = topic.gone_s = None
         topic.is_stale = False
         self._hidden.discard(topic.name)
@@ -377,7 +377,7 @@ def _apply_statistics(topic: Topic, info: TopicInfo, now: float, clocks: Mapping
     if info.last_stamp_ns is not None and (
         topic.info is None or info.last_stamp_ns != topic.info.last_stamp_ns
     ):
-        topic.active_at = now
+        topic.last_activity_s = now
     topic.info = info
     topic.rate_hz = rate_hz = info.rate_hz
     topic.bandwidth_Bps = info.bandwidth_Bps
@@ -403,7 +403,7 @@ def _newest_stamp_ns(info: TopicInfo, clocks: Mapping[str, int]) -> int | None:
     return max(stamps, default=None)
 
 
-def _names(info: TopicInfo, view: GraphView) -> tuple[str, ...]:
+def _publisher_names(info: TopicInfo, view: GraphView) -> tuple[str, ...]:
     names = {view.nodes[p.node_id].name for p in info.publishers if p.node_id in view.nodes}
     return tuple(sorted(names))
 
@@ -415,7 +415,7 @@ def _age(topic: Topic, now: float, now_ns: int) -> float | None:
         stamp = max(stamp or 0, newest.stamp_ns + (0 if known is None else known.offset_ns))
     if stamp is not None:
         return (now_ns - stamp) / 1e9 if now_ns > stamp else 0.0
-    return now - topic.last_received if topic.last_received is not None else None
+    return now - topic.last_received_s if topic.last_received_s is not None else None
 
 
 def _subscribed_since(topic: Topic, info: TopicInfo, now: float) -> float | None:
@@ -430,12 +430,12 @@ def _subscribed_since(topic: Topic, info: TopicInfo, now: float) -> float | None
 def _silence_s(topic: Topic, now: float, told_at: float) -> float | None:
     # By this computer's clock, because the publisher's may be wrong. For topics that are not watched, the
     # last report of the master (`told_at`) counts.
-    if topic.subscribed_since is None or topic.active_at is None:
+    if topic.subscribed_since is None or topic.last_activity_s is None:
         return None
     until = now if topic.is_watched else told_at
     since = (
-        topic.active_at
-        if topic.active_at >= topic.subscribed_since
+        topic.last_activity_s
+        if topic.last_activity_s >= topic.subscribed_since
         else topic.subscribed_since + START_GRACE_S
     )
     silent_s = max(0.0, until - since)

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Mapping
 
 from app.core.network.mailbox import Batch
-from app.core.network.topics import BATCH_SIZE, Topics, total_rate_hz
+from app.core.network.topics import MAX_TOPICS_PER_UPDATE, Topics, total_rate_hz
 from nep.protocol.graph_view import GraphView
 
 WINDOW_S = 30.0
@@ -63,22 +63,22 @@ class Traffic:
     def update_graph(self, view: GraphView, now: float) -> None:
         """Apply a new graph at ``now`` (monotonic seconds). Large graphs are evaluated less often."""
         self._pending_view = view
-        if len(view.topics) <= BATCH_SIZE:
-            self._sum(view, now)
+        if len(view.topics) <= MAX_TOPICS_PER_UPDATE:
+            self._update_totals(view, now)
         else:
-            self._sum_if_due(now)
+            self._update_totals_if_due(now)
 
     def add(self, batches: Mapping[str, Batch], now: float) -> None:
         """Count the messages received since the last tick."""
         shown = sum(len(batch.messages) for batch in batches.values())
         self._count(shown, sum(batch.arrived_count for batch in batches.values()), now)
-        self._sum_if_due(now)
+        self._update_totals_if_due(now)
 
-    def _sum_if_due(self, now: float) -> None:
+    def _update_totals_if_due(self, now: float) -> None:
         if self._pending_view is not None and now - self._summed_at >= SUM_INTERVAL_S:
-            self._sum(self._pending_view, now)
+            self._update_totals(self._pending_view, now)
 
-    def _sum(self, view: GraphView, now: float) -> None:
+    def _update_totals(self, view: GraphView, now: float) -> None:
         self._pending_view, self._summed_at = None, now
         self.lost_30s = self._losses.count(sum(info.lost or 0 for info in view.topics.values()), now)
         self.messages_per_s = total_rate_hz(view.topics.values())

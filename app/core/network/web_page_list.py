@@ -56,7 +56,7 @@ class PageList:
         return tuple(page for id_, page in self._pages.items() if id_ not in self._left_at)
 
     @property
-    def listed(self) -> tuple[ListedPage, ...]:
+    def listed_pages(self) -> tuple[ListedPage, ...]:
         """Pages in order of arrival, including pages that left in the last `GONE_DISPLAY_S` seconds."""
         return tuple(
             ListedPage(page, self._now - self._left_at[id_] if id_ in self._left_at else None)

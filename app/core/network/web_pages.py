@@ -29,7 +29,7 @@ else:  # loaded with the first start of a server
 DEFAULT_PORT = 9090
 STOP_TIMEOUT_S = 12.0
 LOOPBACK = "127.0.0.1"
-_PORTS_TRIED = 20
+_MAX_PORTS_TRIED = 20
 MAX_PORT = 65535
 WebState = Literal["off", "starting", "on"]
 WebProtocol = Literal["rosbridge", "foxglove"]
@@ -45,7 +45,7 @@ class RunningServer(Protocol):
         """Connected pages."""
 
     @property
-    def refusals(self) -> tuple[context.Refusal, ...]:
+    def rejections(self) -> tuple[context.Rejection, ...]:
         """Rejected connections, oldest first."""
 
     def set_access(self, access: access.Access) -> int:
@@ -206,9 +206,9 @@ class WebPages:
         return self._list.revision
 
     @property
-    def listed(self) -> tuple[ListedPage, ...]:
+    def listed_pages(self) -> tuple[ListedPage, ...]:
         """Pages that were connected at the last `refresh`, and pages that left recently."""
-        return self._list.listed
+        return self._list.listed_pages
 
     @property
     def slow_topics(self) -> tuple[SlowTopic, ...]:
@@ -221,9 +221,9 @@ class WebPages:
         return self._list.bytes_per_s
 
     @property
-    def refusals(self) -> tuple[context.Refusal, ...]:
+    def rejections(self) -> tuple[context.Rejection, ...]:
         """Rejected connections and commands, oldest first."""
-        return () if self._server is None else self._server.refusals
+        return () if self._server is None else self._server.rejections
 
     @property
     def is_port_taken(self) -> bool:
@@ -282,7 +282,7 @@ class WebPages:
             self.protocols = protocols
             self._start_server()
 
-    def new_token(self) -> int:
+    def generate_token(self) -> int:
         """Generate a new token; return the number of pages that are disconnected by the change."""
         return self.set_token(access.new_token())
 
@@ -424,5 +424,5 @@ def _port_conflict(port: int) -> tuple[str, int]:
         sentence = _("Port {port} is in use by {program} (process {pid}).").format(
             port=port, program=holder.name, pid=holder.pid
         )
-    others = range(port + 1, min(port + 1 + _PORTS_TRIED, MAX_PORT + 1))
+    others = range(port + 1, min(port + 1 + _MAX_PORTS_TRIED, MAX_PORT + 1))
     return sentence, next((each for each in others if processes.is_free(each)), 0)

@@ -16,9 +16,9 @@ from nep.masters.master import master_address
 from nep.system.addresses import OwnAddress
 
 if TYPE_CHECKING:
-    from nep.programs.web.context import ConnectedPage, Refusal
+    from nep.programs.web.context import ConnectedPage, Rejection
 
-_WIRELESS = ("wl", "wi-fi", "wifi")
+_WIRELESS_PREFIXES = ("wl", "wi-fi", "wifi")
 NextStep = Literal["", "allow origin", "choose robots", "let in"]
 
 
@@ -56,7 +56,7 @@ class WebNotice:
 
 def is_wireless(own: OwnAddress) -> bool:
     """Return True if an address belongs to a Wi-Fi interface, judged by the name of the interface."""
-    return own.interface.casefold().startswith(_WIRELESS)
+    return own.interface.casefold().startswith(_WIRELESS_PREFIXES)
 
 
 def address_text(own: OwnAddress) -> str:
@@ -153,7 +153,7 @@ def notices(web: WebPages, dismissed: Collection[tuple[str, ...]] = ()) -> tuple
 
 
 def _rejection_notices(web: WebPages) -> Iterator[WebNotice]:
-    for refusal in reversed(web.refusals):
+    for refusal in reversed(web.rejections):
         if refusal.kind == "kept out":
             yield from _blocked_notices(web, refusal)
             continue
@@ -161,10 +161,10 @@ def _rejection_notices(web: WebPages) -> Iterator[WebNotice]:
             continue
         if refusal.kind == "robot" and refusal.robot in web.robots:
             continue
-        yield _notice_of(refusal)
+        yield _create_notice(refusal)
 
 
-def _blocked_notices(web: WebPages, refusal: Refusal) -> Iterator[WebNotice]:
+def _blocked_notices(web: WebPages, refusal: Rejection) -> Iterator[WebNotice]:
     for page in web.kept_out.values():
         if refusal.client in {page.origin, page.address}:
             sentence = _("{page} tried to connect again at {time} and was rejected.").format(
@@ -173,7 +173,7 @@ def _blocked_notices(web: WebPages, refusal: Refusal) -> Iterator[WebNotice]:
             yield WebNotice(("kept out", str(page.id)), "error", sentence, "let in", str(page.id))
 
 
-def _notice_of(refusal: Refusal) -> WebNotice:
+def _create_notice(refusal: Rejection) -> WebNotice:
     key = (refusal.kind, refusal.client, refusal.robot)
     who, clock = refusal.client, _clock_text(refusal.time_s)
     if refusal.kind == "robot" and refusal.robot:

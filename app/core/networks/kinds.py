@@ -32,10 +32,10 @@ class NetworkKind:
     name: str
     product_name: str
     address_label: str
-    example: str
+    default_address: str
     hint: str
     reports_stats: bool
-    codec: Callable[[TopicInfo], str]
+    codec_of: Callable[[TopicInfo], str]
     readable_type_of: Callable[[TopicInfo], str]
     qos: str = ""
 
@@ -44,7 +44,7 @@ class NetworkKind:
 
         Raises `NepError` if it is invalid.
         """
-        return find_backend(self.name).master(address.strip() or self.example)
+        return find_backend(self.name).master(address.strip() or self.default_address)
 
     @property
     def unknown_text(self) -> str:
@@ -75,7 +75,7 @@ KINDS = (
         "127.0.0.1:11311",
         lazy("A master on another computer. This computer then accepts connections from that network, too."),
         reports_stats=False,
-        codec=lambda info: info.codec,
+        codec_of=lambda info: info.codec,
         readable_type_of=_ros_readable_type,
     ),
     NetworkKind(
@@ -85,7 +85,7 @@ KINDS = (
         "0",
         lazy("Programs on this computer; others only if ROS_AUTOMATIC_DISCOVERY_RANGE allows it."),
         reports_stats=False,
-        codec=_ros_2_codec,
+        codec_of=_ros_2_codec,
         readable_type_of=_ros_2_readable_type,
         qos="best_effort",  # a best-effort reader is compatible with best-effort and reliable writers
     ),
@@ -96,13 +96,13 @@ KINDS = (
         "local",
         lazy("“local” is this computer; the address of a router looks like tcp/192.168.1.5:7447."),
         reports_stats=True,
-        codec=lambda info: info.codec,
+        codec_of=lambda info: info.codec,
         readable_type_of=lambda info: info.msg_type,
     ),
 )
-_BY_NAME = {kind.name: kind for kind in KINDS}
+_KINDS_BY_NAME = {kind.name: kind for kind in KINDS}
 
 
 def find_kind(name: str) -> NetworkKind | None:
     """Return the kind with this name; None for "" (the native network) and unknown names."""
-    return _BY_NAME.get(name)
+    return _KINDS_BY_NAME.get(name)

@@ -50,7 +50,7 @@ class NetworkSource(Protocol):
         """Stop the thread and wait for it."""
 
 
-MakeNetwork = Callable[[NetworkKind, str, Sequence[Sink], Callable[[object], None]], NetworkSource]
+NetworkSourceFactory = Callable[[NetworkKind, str, Sequence[Sink], Callable[[object], None]], NetworkSource]
 """Factory of a network's source, given the kind, the address, the message sinks, and the event callback."""
 
 
@@ -99,7 +99,7 @@ class OtherNetwork:
         """True if the network is shown."""
         return self.source is not None
 
-    def apply(self, event: object, now: float) -> None:
+    def on_event(self, event: object, now: float) -> None:
         """Apply an event of the network's source."""
         match event:
             case GraphReceived():
@@ -145,7 +145,7 @@ class Networks:
         sinks: Sequence[Sink],
         post_event: Callable[[object], None],
         alerts: Alerts,
-        make: MakeNetwork = OtherSource,
+        make: NetworkSourceFactory = OtherSource,
     ) -> None:
         # `sinks` get messages by topic key (`key_of`); `post_event` gets the sources' events.
         self._alerts = alerts
@@ -164,7 +164,7 @@ class Networks:
         return self._networks.get(name)
 
     @property
-    def selected(self) -> list[OtherNetwork]:
+    def selected_networks(self) -> list[OtherNetwork]:
         """Networks that are shown."""
         return [network for network in self if network.is_selected]
 
@@ -181,12 +181,12 @@ class Networks:
     @property
     def topics(self) -> list[Topic]:
         """Topics of all shown networks."""
-        return [topic for network in self.selected for topic in network.topics]
+        return [topic for network in self.selected_networks for topic in network.topics]
 
     @property
     def nodes(self) -> list[NodeEntry]:
         """Nodes of all shown networks."""
-        return [node for network in self.selected for node in network.nodes]
+        return [node for network in self.selected_networks for node in network.nodes]
 
     def topic(self, key: str) -> Topic | None:
         """Return the topic with this key; None if it is native or unknown."""
@@ -267,7 +267,7 @@ class Networks:
         network = self._networks[told.kind]
         if network.is_selected and told.number == network.number:
             before = network.state
-            network.apply(told.event, now)
+            network.on_event(told.event, now)
             if network.state != before:
                 self._changes += 1
                 self._update_alert(network)
@@ -329,7 +329,7 @@ class Networks:
             now: Monotonic seconds.
             now_ns: Current time in ns since 1970.
         """
-        for network in self.selected:
+        for network in self.selected_networks:
             network.update_ages(now, now_ns)
 
     def close(self) -> None:

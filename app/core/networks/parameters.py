@@ -39,7 +39,7 @@ _MAX_DESCRIPTION_LENGTH = 2_000
 
 
 @dataclass(frozen=True, slots=True)
-class ShownParameter:
+class ReportedParameter:
     """Parameter as reported by its node.
 
     Attributes:
@@ -58,7 +58,7 @@ class ShownParameter:
     minimum: float | None = None
     maximum: float | None = None
     choices: tuple[object, ...] = ()
-    read_only: bool = False
+    is_read_only: bool = False
     text: str = ""
 
 
@@ -73,7 +73,9 @@ class ParameterSetter:
     def set(self, node_id: str, name: str, value: object) -> None:
         """Start to set a parameter; `has_been_set` returns the result."""
         owner = f"{node_id} {name}"
-        self._submit("", lambda node: self._worker.submit(owner, partial(_set, node, node_id, name, value)))
+        self._submit(
+            "", lambda node: self._worker.submit(owner, partial(_set_parameter, node, node_id, name, value))
+        )
 
     def has_been_set(self, node_id: str, name: str) -> bool:
         """Return True if the parameter was set since the last call, else False.
@@ -87,7 +89,7 @@ class ParameterSetter:
         self._worker.close()
 
 
-def _set(node: Node, node_id: str, name: str, value: object) -> bool:
+def _set_parameter(node: Node, node_id: str, name: str, value: object) -> bool:
     try:
         with RemoteParameters(
             node.new_client(parameters_topic(node_id), timeout_s=REPLY_TIMEOUT_S)
@@ -120,7 +122,7 @@ class NodeParameters:
         self._watch, self._topic, self._setter, self._has_master = watch, topic, setter, has_master
         self.watching: WatchHandle | None = None
         self.node: NodeEntry | None = None
-        self.all: tuple[ShownParameter, ...] = ()
+        self.all: tuple[ReportedParameter, ...] = ()
         self.changed: dict[str, float] = {}
         self.heard = False
         """True if the node has reported its parameters since it was selected."""
@@ -152,7 +154,7 @@ class NodeParameters:
         self.problem = self.setting = self.refusal = ""
         self.revision += 1
 
-    def find(self, name: str) -> ShownParameter | None:
+    def find(self, name: str) -> ReportedParameter | None:
         """Return the parameter with this name, or None."""
         return next((each for each in self.all if each.name == name), None)
 
@@ -171,7 +173,7 @@ class NodeParameters:
             self._applied_message = newest
             self._apply(newest, now)
         if self.setting:
-            self._poll_result(node)
+            self._check_result(node)
 
     def _apply(self, message: Message, now: float) -> None:
         self.revision += 1
@@ -193,7 +195,7 @@ class NodeParameters:
             )
         self.all, self.heard, self.problem = parameters, True, ""
 
-    def _poll_result(self, node: NodeEntry) -> None:
+    def _check_result(self, node: NodeEntry) -> None:
         try:
             done = self._setter.has_been_set(node.id, self.setting)
         except NepError as error:
@@ -220,7 +222,7 @@ class NodeParameters:
         if self.refusal:
             return
         try:
-            value = value_of(text, parameter.kind)
+            value = parse_value(text, parameter.kind)
         except ValueError as error:
             self.refusal = str(error)
             return
@@ -228,7 +230,7 @@ class NodeParameters:
         self._setter.set(node.id, name, value)
 
 
-def read_only_reason(node: NodeEntry, parameter: ShownParameter) -> str:
+def read_only_reason(node: NodeEntry, parameter: ReportedParameter) -> str:
     """Return the reason why a parameter can't be set from Studio, or ""."""
     if node.gone_s is not None:
         return _("the node has disappeared")
@@ -236,10 +238,10 @@ def read_only_reason(node: NodeEntry, parameter: ShownParameter) -> str:
         return _("the value is too long to edit here; use nep param set")
     if not node.can_set_parameters:
         return _("parameters on this network are read-only")
-    return _("only its own node can set it") if parameter.read_only else ""
+    return _("only its own node can set it") if parameter.is_read_only else ""
 
 
-def parse_parameters(state: object) -> tuple[ShownParameter, ...]:
+def parse_parameters(state: object) -> tuple[ReportedParameter, ...]:
     """Parse and validate a parameter message. Raises `NepError` if the message is malformed.
 
     Validation is necessary, because any node can publish on a parameter topic.
@@ -251,9 +253,9 @@ def parse_parameters(state: object) -> tuple[ShownParameter, ...]:
     return tuple({each.name: each for each in parameters}.values())
 
 
-def _parse_parameter(told: Mapping[str, object]) -> ShownParameter:
+def _parse_parameter(told: Mapping[str, object]) -> ReportedParameter:
     choices = told.get("choices")
-    return ShownParameter(
+    return ReportedParameter(
         bounded_str(told.get("name")),
         told.get("value"),
         bounded_str(told.get("type")),
@@ -262,7 +264,7 @@ def _parse_parameter(told: Mapping[str, object]) -> ShownParameter:
         _number(told.get("max")),
         tuple(choices[:MAX_PARAMETERS]) if isinstance(choices, list) else (),
         told.get("read_only") is True,
-        text_of(told.get("value")),
+        format_value(told.get("value")),
     )
 
 
@@ -275,7 +277,7 @@ def _are_equal(one: object, other: object) -> bool:
     return type(one) is type(other) and one == other
 
 
-def text_of(value: object) -> str:
+def format_value(value: object) -> str:
     """Format a value for editing: strings unchanged, anything else as JSON."""
     if isinstance(value, str):
         return value
@@ -285,7 +287,7 @@ def text_of(value: object) -> str:
         return bounded_str(value)
 
 
-def value_of(text: str, kind: str) -> object:
+def parse_value(text: str, kind: str) -> object:
     """Parse the text of a value. Raises `ValueError` with a message for the user.
 
     Args:

@@ -18,13 +18,13 @@ from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
 
 REQUEST_TIMEOUT_S = 1.0
-POLL_S = 2.0
+POLL_INTERVAL_S = 2.0
 
 
 class OtherSource(LiveSource):
     """Source of another network. Messages are passed to the sinks by topic key (`key_of`)."""
 
-    poll_s = REQUEST_TIMEOUT_S
+    poll_interval_s = REQUEST_TIMEOUT_S
 
     def __init__(
         self,
@@ -46,7 +46,7 @@ class OtherSource(LiveSource):
     def join(self) -> Node:
         """Join the network and return the node. Raises `NepError` if the network does not respond."""
         with _convert_errors():
-            return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=POLL_S)
+            return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=POLL_INTERVAL_S)
 
     def query_graph(self, node: Node) -> GraphView:
         """Return the graph, with the codec that is used to read each topic.
@@ -55,12 +55,12 @@ class OtherSource(LiveSource):
         does not count revisions.
         """
         with _convert_errors():
-            view = node.graph(timeout_s=POLL_S)
+            view = node.graph(timeout_s=POLL_INTERVAL_S)
         topics = {
-            name: info if (codec := self._kind.codec(info)) == info.codec else replace(info, codec=codec)
+            name: info if (codec := self._kind.codec_of(info)) == info.codec else replace(info, codec=codec)
             for name, info in view.topics.items()
         }
-        members = _members(view)
+        members = _graph_members(view)
         if members != self._members:
             self._members = members
             self._revision += 1
@@ -74,7 +74,7 @@ class OtherSource(LiveSource):
             return node.new_sub(topic, wanted, sink=sink, wildcards=False, qos=self._kind.qos)
 
 
-def _members(view: GraphView) -> object:
+def _graph_members(view: GraphView) -> object:
     nodes = {(each.id, each.name, each.host, each.pid, each.generation) for each in view.nodes.values()}
     topics = {
         (

@@ -94,9 +94,9 @@ def parse_choice(told: object) -> RecordingChoice:
     mode = told.get("mode")
     return RecordingChoice(
         mode if isinstance(mode, str) and mode in MODES else "all",
-        _names(told.get("topics")),
-        _names(told.get("patterns")),
-        _names(told.get("left_out")),
+        _parse_names(told.get("topics")),
+        _parse_names(told.get("patterns")),
+        _parse_names(told.get("left_out")),
         _number(told.get("ends_min"), MIN_MINUTES, MAX_MINUTES),
         _number(told.get("ends_gb"), MIN_GB, MAX_GB),
     )
@@ -114,7 +114,7 @@ def choice_to_json(choice: RecordingChoice) -> dict[str, object]:
     }
 
 
-def _names(told: object) -> tuple[str, ...]:
+def _parse_names(told: object) -> tuple[str, ...]:
     return tuple(each for each in told if isinstance(each, str))[:MAX_NAMES] if isinstance(told, list) else ()
 
 
@@ -151,8 +151,8 @@ def parse_ring_settings(told: object) -> RingSettings:
         told.get("is_on") is True,
         int(seconds) if _is_within(seconds, MIN_S, MAX_S) else USUAL_S,  # type: ignore[arg-type]
         float(size_gb) if _is_within(size_gb, MIN_GB, MAX_GB) else USUAL_GB,  # type: ignore[arg-type]
-        _names(told.get("patterns")),
-        _names(told.get("left_out")),
+        _parse_names(told.get("patterns")),
+        _parse_names(told.get("left_out")),
     )
 
 

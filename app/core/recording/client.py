@@ -30,7 +30,7 @@ LOW_DISK_BYTES = 1_000_000_000
 """Free disk space in bytes below which the user is warned. The recorder itself stops at 200 MB."""
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
 """Initial and maximum pause before a flight recorder whose process ended is restarted; doubled each time."""
-END_TIMEOUT_S = 2.0
+EXIT_TIMEOUT_S = 2.0
 MAX_QUEUED_COMMANDS = 1000
 MAX_PENDING_SAVES = 100
 _TAIL_BYTES = 2000
@@ -96,14 +96,14 @@ class RecorderState:
     size_bytes: int = 0
     duration_s: float = 0.0
     lost: int = 0
-    unwritten: int = 0
+    unwritten_count: int = 0
     free_bytes: int | None = None
     topics: Mapping[str, TopicStats] = field(default_factory=dict)
     ring_s: float | None = None
     ring_bytes: int = 0
-    saving: tuple[Path, ...] = ()
+    pending_saves: tuple[Path, ...] = ()
     last: Path | None = None
-    limit: str = ""
+    reached_limit: str = ""
 
 
 class CommandChannel(Protocol):
@@ -157,7 +157,7 @@ class RecorderProcess:
                 try:
                     detail = self._run_process(log)
                 finally:
-                    detail = detail or _tail(log)
+                    detail = detail or _read_tail(log)
         except OSError as error:
             detail = str(error)
         finally:
@@ -184,8 +184,12 @@ class RecorderProcess:
             code = process.wait()
             with suppress(queue.Full):
                 self._orders.put_nowait(None)  # ends the thread that waits for commands
-            writer.join(END_TIMEOUT_S)
-        return "" if code == 0 else _tail(log) or _("the recorder exited with code {code}").format(code=code)
+            writer.join(EXIT_TIMEOUT_S)
+        return (
+            ""
+            if code == 0
+            else _read_tail(log) or _("the recorder exited with code {code}").format(code=code)
+        )
 
     def _write(self, process: subprocess.Popen[bytes]) -> None:
         if process.stdin is None:
@@ -198,7 +202,7 @@ class RecorderProcess:
             process.stdin.close()
 
 
-def _tail(log: IO[bytes]) -> str:
+def _read_tail(log: IO[bytes]) -> str:
     # Last line of the output.
     size = log.seek(0, 2)
     log.seek(max(0, size - _TAIL_BYTES))
@@ -267,13 +271,13 @@ class RecorderClient:
             return False
         self._alerts.resolve_all("recorder:")
         old = self.state
-        self._set(
+        self._set_state(
             RecorderState(
                 "starting",
                 path,
                 ring_s=old.ring_s,
                 ring_bytes=old.ring_bytes,
-                saving=old.saving,
+                pending_saves=old.pending_saves,
                 last=old.last,
             )
         )
@@ -287,7 +291,7 @@ class RecorderClient:
     def stop(self) -> None:
         """Stop the recording. The file is complete once ``phase`` is "" again."""
         if self.state.phase in {"starting", "recording"}:
-            self._set(replace(self.state, phase="ending"))
+            self._set_state(replace(self.state, phase="ending"))
             self._send(op="stop")
 
     def add_bookmark(self, text: str) -> None:
@@ -333,9 +337,9 @@ class RecorderClient:
         Returns:
             False if the flight recorder is off or is already saving too many files.
         """
-        if self._ring is None or self._process is None or len(self.state.saving) >= MAX_PENDING_SAVES:
+        if self._ring is None or self._process is None or len(self.state.pending_saves) >= MAX_PENDING_SAVES:
             return False
-        self._set(replace(self.state, saving=(*self.state.saving, path)))
+        self._set_state(replace(self.state, pending_saves=(*self.state.pending_saves, path)))
         self._send(op="keep", path=str(path), seconds=seconds, note=note)
         return True
 
@@ -344,7 +348,7 @@ class RecorderClient:
         if self._ring is not None and self._process is None and self._clock() >= self._retry_at:
             self._start_ring(self._ring)
 
-    def close(self, wait_s: float = END_TIMEOUT_S) -> None:
+    def close(self, wait_s: float = EXIT_TIMEOUT_S) -> None:
         """Close the input of the process, and wait at most ``wait_s`` seconds while it finishes its work."""
         line, self._process = self._process, None
         if line is not None:
@@ -357,7 +361,7 @@ class RecorderClient:
         if event.process != self._number or self._process is None:
             return
         if isinstance(event, RecorderExited):
-            self._on_gone(event.detail)
+            self._on_exited(event.detail)
             return
         handler = self._handlers.get(str(event.content.get("event")))
         if handler is not None:
@@ -365,7 +369,7 @@ class RecorderClient:
 
     def _on_recording(self, _content: Mapping[str, object]) -> None:
         if self.state.phase == "starting":
-            self._set(replace(self.state, phase="recording"))
+            self._set_state(replace(self.state, phase="recording"))
 
     def _on_stats(self, content: Mapping[str, object]) -> None:
         state = self.state
@@ -381,15 +385,15 @@ class RecorderClient:
                 ring_s=float(seconds) if isinstance(seconds, int | float) else 0.0,
                 ring_bytes=_non_negative_int(ring.get("size_bytes")) or 0,
             )
-        self._set(state)
-        self._warn()
+        self._set_state(state)
+        self._warn_about_disk()
 
     def _on_ended(self, content: Mapping[str, object]) -> None:
         status = content.get("status")
         status = status if isinstance(status, Mapping) else {}
         path = self.state.path
         ended = replace(_with_status(self.state, status), phase="", last=path, free_bytes=None)
-        self._set(replace(ended, limit=str(content.get("limit", ""))))
+        self._set_state(replace(ended, reached_limit=str(content.get("limit", ""))))
         self._alerts.resolve("recorder:low")
         problem = status.get("problem")
         if isinstance(problem, str) and problem:
@@ -404,7 +408,7 @@ class RecorderClient:
         self._backoff_s = AGAIN_S
         self._alerts.resolve("recorder:ring")
         if self._ring is not None:
-            self._set(replace(self.state, ring_s=self.state.ring_s or 0.0))
+            self._set_state(replace(self.state, ring_s=self.state.ring_s or 0.0))
 
     def _on_ring_ended(self, content: Mapping[str, object]) -> None:
         status = content.get("status")
@@ -413,41 +417,43 @@ class RecorderClient:
             self._ring = None  # the user switches it on again when there is space
             self._alert_ring_off(problem)
         if self._ring is None:
-            self._set(replace(self.state, ring_s=None, ring_bytes=0))
+            self._set_state(replace(self.state, ring_s=None, ring_bytes=0))
 
     def _on_saved(self, content: Mapping[str, object]) -> None:
-        path = _path(content)
-        self._set(replace(self._without_saving(path), last=path or self.state.last))
+        path = _parse_path(content)
+        self._set_state(replace(self._without_pending_save(path), last=path or self.state.last))
 
     def _on_problem(self, content: Mapping[str, object]) -> None:
         op, sentence = content.get("op"), str(content.get("sentence", ""))
         if op == "record":
-            self._set(replace(self.state, phase="", path=None))
+            self._set_state(replace(self.state, phase="", path=None))
             self._alerts.raise_alert("recorder:ended", "error", _("Nothing is being recorded."), sentence)
         elif op == "keep":
-            self._set(self._without_saving(_path(content)))
+            self._set_state(self._without_pending_save(_parse_path(content)))
             self._alerts.raise_alert(
                 "recorder:keep", "error", _("The last seconds couldn't be saved."), sentence
             )
         elif op == "ring":
             self._ring = None
-            self._set(replace(self.state, ring_s=None, ring_bytes=0))
+            self._set_state(replace(self.state, ring_s=None, ring_bytes=0))
             self._alert_ring_off(sentence)
         elif op == "stop":
-            self._set(replace(self.state, phase=""))
+            self._set_state(replace(self.state, phase=""))
             self._alerts.raise_alert(
                 "recorder:ended", "error", _("The recording couldn't be closed."), sentence
             )
 
-    def _on_gone(self, detail: str) -> None:
+    def _on_exited(self, detail: str) -> None:
         before, self._process = self.state, None
         self._retry_at = self._clock() + self._backoff_s
         self._backoff_s = min(2 * self._backoff_s, AGAIN_AT_MOST_S)
-        self._set(replace(before, phase="", free_bytes=None, ring_s=None, ring_bytes=0, saving=()))
+        self._set_state(
+            replace(before, phase="", free_bytes=None, ring_s=None, ring_bytes=0, pending_saves=())
+        )
         if before.phase:
             title = _("The recorder stopped. Everything up to a second before that is saved.")
             self._alerts.raise_alert("recorder:ended", "error", title, detail or _path_text(before.path))
-        if before.saving:
+        if before.pending_saves:
             title = _("The last seconds couldn't be saved.")
             self._alerts.raise_alert("recorder:keep", "error", title, detail)
         if self._ring is not None:
@@ -459,7 +465,7 @@ class RecorderClient:
         title = _("The flight recorder is off: the last seconds can't be saved.")
         self._alerts.raise_alert("recorder:ring", "warn", title, reason)
 
-    def _warn(self) -> None:
+    def _warn_about_disk(self) -> None:
         state = self.state
         if state.phase and state.free_bytes is not None and state.free_bytes < LOW_DISK_BYTES:
             self._alerts.raise_alert(
@@ -471,13 +477,15 @@ class RecorderClient:
             )
         else:
             self._alerts.resolve("recorder:low")
-        if state.phase and state.unwritten:
+        if state.phase and state.unwritten_count:
             title = ngettext(
                 "{count} message wasn't recorded: the disk is too slow.",
                 "{count} messages weren't recorded: the disk is too slow.",
-                state.unwritten,
+                state.unwritten_count,
             )
-            self._alerts.raise_alert("recorder:unkept", "warn", title.format(count=state.unwritten), count=0)
+            self._alerts.raise_alert(
+                "recorder:unkept", "warn", title.format(count=state.unwritten_count), count=0
+            )
 
     def _start_ring(self, choice: RingChoice) -> None:
         self._send(
@@ -496,10 +504,12 @@ class RecorderClient:
         if not self._process.send_command(content):
             self._on_problem({**content, "sentence": _("the recorder doesn't respond")})
 
-    def _without_saving(self, path: Path | None) -> RecorderState:
-        return replace(self.state, saving=tuple(each for each in self.state.saving if each != path))
+    def _without_pending_save(self, path: Path | None) -> RecorderState:
+        return replace(
+            self.state, pending_saves=tuple(each for each in self.state.pending_saves if each != path)
+        )
 
-    def _set(self, state: RecorderState) -> None:
+    def _set_state(self, state: RecorderState) -> None:
         if state != self.state:
             self.state = state
             self.revision += 1
@@ -516,7 +526,7 @@ def _with_status(state: RecorderState, status: Mapping[str, object]) -> Recorder
         size_bytes=_non_negative_int(status.get("size_bytes")) or 0,
         duration_s=float(duration) if isinstance(duration, int | float) else 0.0,
         lost=sum(each.lost or 0 for each in topics.values()),
-        unwritten=_non_negative_int(status.get("unkept")) or 0,
+        unwritten_count=_non_negative_int(status.get("unkept")) or 0,
         topics=topics,
     )
 
@@ -525,7 +535,7 @@ def _non_negative_int(value: object) -> int | None:
     return value if type(value) is int and value >= 0 else None
 
 
-def _path(content: Mapping[str, object]) -> Path | None:
+def _parse_path(content: Mapping[str, object]) -> Path | None:
     path = content.get("path")
     return Path(path) if isinstance(path, str) and path else None
 

@@ -13,7 +13,7 @@ from nep.i18n import _
 from nep.programs.alarms import AlarmEvent
 from nep.programs.alarms.sentences import event_text
 
-MAX_ACTIVE = 200
+MAX_ACTIVE_ALARMS = 200
 """Maximum number of active alarms that are sent repeatedly; further alarms are sent once."""
 MAX_TEXT_LENGTH = 200
 _ACTIVE_STATES = frozenset({"running", "paused"})
@@ -48,7 +48,7 @@ class RecordedEvents:
         self._run: RunState | None = None
         self._run_told: dict[str, object] = {}
 
-    def repeat(self, to: str) -> None:
+    def resend(self, to: str) -> None:
         """Send the active runs and alarms again.
 
         Args:
@@ -65,7 +65,7 @@ class RecordedEvents:
         if run is before:
             return
         was_on, is_on = before is not None and before.state in _ACTIVE_STATES, run.state in _ACTIVE_STATES
-        is_same = was_on and before is not None and _is_same(before, run)
+        is_same = was_on and before is not None and _is_unchanged(before, run)
         if was_on and not (is_on and is_same):
             self._end_run(run if is_same else None)
         elif self._run_told and not is_on:
@@ -125,11 +125,11 @@ class RecordedEvents:
 
     def _add(self, role: str, told: Mapping[str, object], key: str = "") -> None:
         self._say(role, dict(told))
-        if len(self._present) < MAX_ACTIVE:
+        if len(self._present) < MAX_ACTIVE_ALARMS:
             self._present[key or str(told["id"])] = (role, told)
 
 
-def _is_same(before: RunState, run: RunState) -> bool:
+def _is_unchanged(before: RunState, run: RunState) -> bool:
     # The clock of the same run is set once more when its scripts begin.
     return run.started_s == before.started_s or (run.is_started and not before.is_started)
 
@@ -140,7 +140,7 @@ def _result(run: RunState) -> dict[str, object]:
     if run.finished:
         return {"result": "ended", "words": ""}
     report = run.report
-    if report is None or not report.is_proven or not report.robots:
+    if report is None or not report.is_confirmed or not report.robots:
         return {"result": "stopped", "words": ""}
     elapsed = max(1, round(report.elapsed_ms))
     return {"result": "stopped", "words": _("Stop, {elapsed} ms").format(elapsed=elapsed)}

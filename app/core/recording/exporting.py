@@ -45,7 +45,7 @@ class RecordingExport:
         self._thread.start()
 
     @property
-    def is_over(self) -> bool:
+    def is_finished(self) -> bool:
         """True if the export has finished, failed, or was cancelled."""
         return self._is_over.is_set()
 
@@ -72,7 +72,7 @@ class RecordingExport:
 
     def result_text(self) -> str:
         """Return the result as a sentence without a full stop; "" while the export is in progress."""
-        if not self.is_over:
+        if not self.is_finished:
             return ""
         if self.was_cancelled and not self.files:
             return _("The export was cancelled")

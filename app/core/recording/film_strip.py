@@ -14,10 +14,10 @@ from nep.recordings.export import Part
 from nep.recordings.reader import RecordedTopic, Recording
 from nep.recordings.recorder import TopicSelection
 
-_BUDGET = (1_000_000_000, 20.0)
+_READ_BUDGET = (1_000_000_000, 20.0)
 """Maximum number of bytes and seconds for reading one recording."""
 _MAX_TOPICS = 10_000
-SAMPLES = 4
+SAMPLES_PER_TOPIC = 4
 """Number of messages of a topic that are read to estimate the size of all its messages."""
 MAX_SAMPLED_TOPICS = 200
 """Maximum number of topics whose message size is estimated."""
@@ -64,14 +64,14 @@ class FilmStripPreview:
         is_known = True
         for topic in self.topics:
             if topic.name in topics:
-                share = self._share(self.by_topic.get(topic.name, ()), begin_ns, end_ns)
+                share = self._share_in_range(self.by_topic.get(topic.name, ()), begin_ns, end_ns)
                 count += share * topic.message_count
                 its = self.size_of(topic)
                 is_known = is_known and its is not None
                 size += share * (its or 0.0)
         return count, size if is_known else None
 
-    def _share(self, counts: Sequence[int], begin_ns: int, end_ns: int) -> float:
+    def _share_in_range(self, counts: Sequence[int], begin_ns: int, end_ns: int) -> float:
         # Share of the counted messages within the range, 0 to 1.
         if begin_ns <= self.start_ns and end_ns >= self.end_ns:
             return 1.0
@@ -97,7 +97,7 @@ def film_strip(
         opener: Opens the recording.
     """
     try:
-        with opener.open(path, cache_bytes=CACHE_BYTES, budget=_BUDGET) as recording:
+        with opener.open(path, cache_bytes=CACHE_BYTES, budget=_READ_BUDGET) as recording:
             if not recording.message_count or len(recording.topics) > _MAX_TOPICS:
                 return None
             start_ns, end_ns = recording.start_ns, recording.end_ns
@@ -136,8 +136,8 @@ def _message_bytes(recording: Recording) -> dict[str, float]:
     others = [topic for topic in recording.topics if topic not in made][:MAX_SAMPLED_TOPICS]
     seen: dict[str, dict[int, int]] = {topic: {} for topic in others}
     span = recording.end_ns - recording.start_ns
-    for place in range(SAMPLES if others else 0):
-        at_ns = recording.start_ns + (place + 1) * span // SAMPLES
+    for place in range(SAMPLES_PER_TOPIC if others else 0):
+        at_ns = recording.start_ns + (place + 1) * span // SAMPLES_PER_TOPIC
         for topic, found in recording.newest(at_ns, others).items():
             seen[topic][found.log_ns] = found.message.size_bytes
     return made | {topic: sum(sizes.values()) / len(sizes) for topic, sizes in seen.items() if sizes}

@@ -29,11 +29,11 @@ CACHE_BYTES = 8_000_000
 """Cache size in bytes for a recording that is opened only briefly."""
 SCAN_BUDGET = (256_000_000, 3.0)
 """Maximum number of bytes and seconds for reading one file."""
-_OWNER = "recordings"
+_JOB_OWNER = "recordings"
 
 
 @dataclass(frozen=True, slots=True)
-class RecordingFacts:
+class RecordingInfo:
     """Recording file in the folder.
 
     Attributes:
@@ -51,7 +51,7 @@ class RecordingFacts:
     size_bytes: int
     changed_s: float
     is_read: bool = False
-    started_ns: int = 0
+    start_ns: int = 0
     duration_s: float = 0.0
     message_count: int = 0
     topics: tuple[str, ...] = ()
@@ -75,7 +75,7 @@ class FolderScan:
         is_complete: True if all files have been read; otherwise call `RecordingFolder.start_scan` again.
     """
 
-    files: Sequence[RecordingFacts] = ()
+    files: Sequence[RecordingInfo] = ()
     problem: str = ""
     omitted_count: int = 0
     is_complete: bool = True
@@ -112,7 +112,7 @@ class RecordingFolder:
         self.folder = folder
         self._opener: RecordingOpener = LocalOpener() if opener is None else opener
         self._worker: BackgroundWorker[FolderScan] = BackgroundWorker("recordings-folder")
-        self._known: dict[Path, tuple[tuple[int, int], RecordingFacts]] = {}
+        self._known: dict[Path, tuple[tuple[int, int], RecordingInfo]] = {}
         """Facts already read, with the size and time of each file. Used by the worker thread only."""
 
     def start_scan(self, being_written: Path | None = None) -> None:
@@ -121,11 +121,11 @@ class RecordingFolder:
         Args:
             being_written: File of the recording in progress, which is not opened.
         """
-        self._worker.submit(_OWNER, lambda: self._scan(being_written))
+        self._worker.submit(_JOB_OWNER, lambda: self._scan(being_written))
 
     def pop_result(self) -> FolderScan | None:
         """Return and clear a new scan result; None if there is none."""
-        return self._worker.pop_result(_OWNER)
+        return self._worker.pop_result(_JOB_OWNER)
 
     def close(self) -> None:
         """Stop scanning."""
@@ -152,21 +152,21 @@ class RecordingFolder:
             if known is not None and known[0] == mark:
                 files.append(known[1])
                 continue
-            plain = RecordingFacts(path, about.st_size, about.st_mtime)
+            plain = RecordingInfo(path, about.st_size, about.st_mtime)
             if (
                 path != being_written
                 and opened < MAX_READS_PER_SCAN
                 and (not opened or time.monotonic() < until)
             ):
                 opened += 1
-                plain = read_facts(plain, self._opener)
+                plain = read_info(plain, self._opener)
                 self._known[path] = (mark, plain)
             files.append(plain)
         is_whole = all(each.is_read or each.path == being_written for each in files)
         return FolderScan(tuple(files), "", left_out, is_whole)
 
 
-def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts:
+def read_info(plain: RecordingInfo, opener: RecordingOpener) -> RecordingInfo:
     """Return the facts of a recording with the fields that are read from the file.
 
     If reading fails, they contain the reason.
@@ -178,12 +178,12 @@ def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts
     try:
         with opener.open(plain.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
             words = recording.recorder_metadata
-            return RecordingFacts(
+            return RecordingInfo(
                 plain.path,
                 plain.size_bytes,
                 plain.changed_s,
                 is_read=True,
-                started_ns=recording.start_ns,
+                start_ns=recording.start_ns,
                 duration_s=recording.duration_s,
                 message_count=recording.message_count,
                 topics=tuple(recording.topics)[:MAX_TOPICS],
@@ -191,7 +191,7 @@ def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts
                 is_complete=recording.is_complete,
                 is_repaired=words.get("repaired") == "1",
                 is_from_flight_recorder=words.get("kept") == "1",
-                lost=_lost(recording),
+                lost=_lost_count(recording),
             )
     except RecordingTooLargeError as error:
         why = _("Not scanned: {reason}.").format(reason=error.reason)
@@ -200,7 +200,7 @@ def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts
         return replace(plain, is_read=True, problem=str(error))
 
 
-def _lost(recording: Recording) -> int | None:
+def _lost_count(recording: Recording) -> int | None:
     try:
         figures = recording.stats()
     except RecordingTooLargeError:  # a file that was not closed would have to be read completely
@@ -208,7 +208,7 @@ def _lost(recording: Recording) -> int | None:
     return sum((each.lost or 0) + each.unkept for each in figures.values()) if figures else None
 
 
-def picture_in(path: Path, fit: Size, opener: RecordingOpener) -> Picture | None:
+def read_picture(path: Path, fit: Size, opener: RecordingOpener) -> Picture | None:
     """Return an image of the topic with the most images; None if the recording has no readable image.
 
     Args:

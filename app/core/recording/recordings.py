@@ -46,14 +46,14 @@ else:  # they import the reading of recordings, which no start should wait for
     openers = lazy_module("app.core.recording.opener")
 
 FOLDER_KEY, CHOICE_KEY, RING_KEY = "recordings_folder", "recording", "flight_recorder"
-NO_FOLDER = "recorder:folder"
-CHOOSE_FOLDER = "recording.folder"
+NO_FOLDER_ALERT = "recorder:folder"
+CHOOSE_FOLDER_COMMAND = "recording.folder"
 """Name of the window command that lets the user choose another folder."""
 _GB = 1_000_000_000
-_SAVED_FILE = re.compile(r"[\w.-]+\.mcap\b")
+_SAVED_FILE_PATTERN = re.compile(r"[\w.-]+\.mcap\b")
 
 
-def _ignore_made(_path: Path, _kind: str) -> None: ...
+def _ignore_created(_path: Path, _kind: str) -> None: ...
 
 
 class SessionRecordings:
@@ -83,7 +83,7 @@ class SessionRecordings:
         self.events = RecordedEvents(self.client.write_entry)
         self.choice = parse_choice(settings.get(CHOICE_KEY, {}))
         self.wish = parse_ring_settings(settings.get(RING_KEY, {}))
-        self.on_made: Callable[[Path, str], object] = _ignore_made
+        self.on_made: Callable[[Path, str], object] = _ignore_created
         self.recorded = self.choice
         """Selection of the recording in progress."""
         self._started_s: float | None = None
@@ -100,7 +100,7 @@ class SessionRecordings:
     def set_folder(self, folder: Path) -> None:
         """Set and save the folder of recordings."""
         self._save_setting(FOLDER_KEY, str(folder))
-        self._alerts.resolve(NO_FOLDER)
+        self._alerts.resolve(NO_FOLDER_ALERT)
 
     def _prepare_folder(self) -> Path | None:
         # None if it doesn't exist, which an alert reports. A chosen folder is not created: its disk may not
@@ -116,15 +116,15 @@ class SessionRecordings:
             reason = (error.strerror or str(error)).lower()
             problem = _("Can't create {folder}: {reason}.").format(folder=folder, reason=reason)
         if not problem:
-            self._alerts.resolve(NO_FOLDER)
+            self._alerts.resolve(NO_FOLDER_ALERT)
             return folder
         self._alerts.raise_alert(
-            NO_FOLDER,
+            NO_FOLDER_ALERT,
             "error",
             _("Not recording: the recordings folder is missing."),
             problem,
             button=_("Choose a folder"),
-            action=CHOOSE_FOLDER,
+            action=CHOOSE_FOLDER_COMMAND,
         )
         return None
 
@@ -248,7 +248,7 @@ class SessionRecordings:
             done: Called with the result.
         """
         said = event_text(event.rule.condition, event.value)
-        why_not = self.save_last(said, action.seconds, done)
+        why_not = self.save_last(said, action.recording_s, done)
         if why_not:
             words = _("nothing saved: {reason}")
             done(False, words.format(reason=f"{why_not[:1].lower()}{why_not[1:]}".rstrip(".")))
@@ -266,7 +266,7 @@ class SessionRecordings:
         `RecordedEvents.repeat`.
         """
         self.client.check()
-        self.events.repeat("ring")
+        self.events.resend("ring")
 
     def on_event(self, event: RecorderEvent | RecorderExited) -> None:
         """Apply an event of the recorder's process."""
@@ -275,12 +275,12 @@ class SessionRecordings:
         state = self.client.state
         if was.phase == "starting" and state.phase == "recording":
             self._started_s = self._clock()
-            self.events.repeat("recording")
+            self.events.resend("recording")
         if was.phase and not state.phase:
             self._started_s = None
             if state.last is not None and state.last == was.path:
                 self.on_made(state.last, "recorded")
-        for path in [each for each in self._keeping if each not in state.saving]:
+        for path in [each for each in self._keeping if each not in state.pending_saves]:
             done = self._keeping.pop(path)
             is_there = state.last == path
             if is_there:
@@ -300,5 +300,5 @@ class SessionRecordings:
 
 def saved_file_name(words: str) -> str:
     """Return the file name in a text such as "kept alarm-2026-11-27-10-00-00.mcap"; "" if there is none."""
-    found = _SAVED_FILE.search(words)
+    found = _SAVED_FILE_PATTERN.search(words)
     return found[0] if found is not None else ""

@@ -21,7 +21,7 @@ CRASH_SIGNALS = frozenset(
     if hasattr(signal, name)
 )
 """Signals that indicate a crash. The system sends SIGKILL when it runs out of memory."""
-FIRST_BAD_STATUS = 0xC0000000
+MIN_CRASH_STATUS = 0xC0000000
 """Lowest exit code on Windows that indicates a crash; such exit codes are NTSTATUS values."""
 CTRL_C_STATUS = 0xC000013A
 """Exit code on Windows after Ctrl+C or when the user logs out. Not a crash."""
@@ -33,7 +33,7 @@ STATUS_TEXTS = {
     0xC0000374: "damaged heap",
     0xC0000409: "abort",
 }
-TRACE_BEGINS = ("Fatal Python error:", "Windows fatal exception:")
+TRACE_PREFIXES = ("Fatal Python error:", "Windows fatal exception:")
 """First words of a stack trace written by Python's faulthandler."""
 CAUGHT_EXCEPTION_PREFIX = "Windows fatal exception: code "
 
@@ -70,7 +70,7 @@ def is_crash(code: int) -> bool:
     """Return True if an exit code indicates a crash. Negative codes are signal numbers."""
     if code < 0:
         return -code in CRASH_SIGNALS
-    return code >= FIRST_BAD_STATUS and code != CTRL_C_STATUS
+    return code >= MIN_CRASH_STATUS and code != CTRL_C_STATUS
 
 
 def exit_text(code: int) -> str:
@@ -81,7 +81,7 @@ def exit_text(code: int) -> str:
         except ValueError:
             name = ""
         return f"ended by signal {-code}{name}"
-    if code >= FIRST_BAD_STATUS:
+    if code >= MIN_CRASH_STATUS:
         words = STATUS_TEXTS.get(code)
         return f"ended with the status 0x{code:08X}" + (f" ({words})" if words else "")
     return f"ended with the code {code}"
@@ -91,7 +91,7 @@ def split_trace(said: str) -> tuple[str, str]:
     """Split the output of a process into normal output and faulthandler's stack trace ("" if none)."""
     lines = said.splitlines(keepends=True)
     for place, line in enumerate(lines):
-        if line.startswith(TRACE_BEGINS):
+        if line.startswith(TRACE_PREFIXES):
             return "".join(lines[:place]), "".join(lines[place:])
     return said, ""
 
@@ -101,5 +101,5 @@ def fatal_line(trace: str) -> str:
 
     On Windows, faulthandler also writes exceptions that a system library raises and handles itself.
     """
-    headers = [line for line in trace.splitlines() if line.startswith(TRACE_BEGINS)]
+    headers = [line for line in trace.splitlines() if line.startswith(TRACE_PREFIXES)]
     return next((line for line in reversed(headers) if not line.startswith(CAUGHT_EXCEPTION_PREFIX)), "")

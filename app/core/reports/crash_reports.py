@@ -25,14 +25,14 @@ from nep.version import __version__
 
 MAX_REPORTS = 10
 MAX_REPORT_CHARS = 100_000
-ALERT = "crash"
+ALERT_ID = "crash"
 REPORT_COMMAND = "help.report"
-_STAMP = "%Y-%m-%d %H.%M.%S"
-_NAME = re.compile(
+_STAMP_FORMAT = "%Y-%m-%d %H.%M.%S"
+_NAME_PATTERN = re.compile(
     rf"crash (?P<stamp>\d{{4}}-\d\d-\d\d \d\d\.\d\d\.\d\d) (?P<part>{'|'.join(PARTS)})(?: \d+)?"
     r"(?P<new>\.new)?\.txt"
 )
-TITLES: dict[Part, str] = {
+ALERT_TITLES: dict[Part, str] = {
     "studio": lazy("Studio closed unexpectedly last time."),
     "behaviour": lazy("A behaviour's program crashed last time."),
     "robot": lazy("A virtual robot crashed last time."),
@@ -41,7 +41,7 @@ TITLES: dict[Part, str] = {
 }
 HEADING = "Crash report of NEP Studio "
 OTHER_VERSION_MESSAGE = lazy("The crash happened in NEP Studio {version}; this is {own}.")
-DETAIL = lazy("A report helps us fix the problem. Nothing is sent automatically.")
+ALERT_DETAIL = lazy("A report helps us fix the problem. Nothing is sent automatically.")
 
 _log = logging.getLogger("studio.crashes")
 
@@ -59,7 +59,7 @@ class CrashReport:
 
     path: Path
     part: Part
-    noticed_s: float
+    detected_s: float
     is_new: bool
 
 
@@ -79,8 +79,12 @@ class CrashReports:
         """
         now = self._clock()
         try:
-            path = self._unused_path(f"crash {time.strftime(_STAMP, time.localtime(now))} {crash.part}")
-            write_atomically(path, _text(crash, now).encode("utf-8", "replace"), durable=False, private=True)
+            path = self._unused_path(
+                f"crash {time.strftime(_STAMP_FORMAT, time.localtime(now))} {crash.part}"
+            )
+            write_atomically(
+                path, _format_report(crash, now).encode("utf-8", "replace"), durable=False, private=True
+            )
         except OSError as error:
             _log.warning("a crash report can't be kept: %s", error, extra=CONSOLE_EXTRA)
             return None
@@ -98,11 +102,11 @@ class CrashReports:
     def all(self) -> list[CrashReport]:
         """Return the stored reports, newest first."""
         try:
-            found = [_report(path) for path in self._folder.glob("crash *.txt")]
+            found = [_parse_report(path) for path in self._folder.glob("crash *.txt")]
         except OSError:
             return []
         known = [each for each in found if each is not None]
-        return sorted(known, key=lambda each: (each.noticed_s, each.path.name), reverse=True)
+        return sorted(known, key=lambda each: (each.detected_s, each.path.name), reverse=True)
 
     def take_new(self) -> list[CrashReport]:
         """Return the new reports, newest first, and save that they have been offered.
@@ -115,7 +119,7 @@ class CrashReports:
                 path = each.path.with_name(each.path.name.replace(".new.txt", ".txt"))
                 with suppress(OSError):  # another instance took it, or the disk is read-only
                     replace_file(each.path, path)
-                    taken.append(CrashReport(path, each.part, each.noticed_s, is_new=False))
+                    taken.append(CrashReport(path, each.part, each.detected_s, is_new=False))
         return taken
 
 
@@ -138,21 +142,21 @@ def show_crash_alert(alerts: Alerts, reports: CrashReports) -> None:
     found = reports.take_new()
     if found:
         worst = min(found, key=lambda each: PARTS.index(each.part))
-        version = _version_of(worst)
-        sentences = [_(DETAIL)]
+        version = _read_version(worst)
+        sentences = [_(ALERT_DETAIL)]
         if version not in {"", __version__}:  # it may be fixed already
             sentences.insert(0, _(OTHER_VERSION_MESSAGE).format(version=version, own=__version__))
         alerts.raise_alert(
-            ALERT,
+            ALERT_ID,
             "warn",
-            _(TITLES[worst.part]),
+            _(ALERT_TITLES[worst.part]),
             " ".join(sentences),
             button=_("Report a problem"),
             action=REPORT_COMMAND,
         )
 
 
-def texts(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
+def read_reports(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
     """Return the file names and contents of reports; unreadable reports are skipped."""
     found = []
     for each in reports:
@@ -163,7 +167,7 @@ def texts(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
     return found
 
 
-def _version_of(report: CrashReport) -> str:
+def _read_version(report: CrashReport) -> str:
     # From the report's first line; "" if it has none.
     try:
         first = read_regular_file(report.path, MAX_BYTES).partition(b"\n")[0].decode("utf-8", "replace")
@@ -173,7 +177,7 @@ def _version_of(report: CrashReport) -> str:
     return found if first.startswith(HEADING) and VERSION_PATTERN.fullmatch(found) else ""
 
 
-def _text(crash: Crash, now_s: float) -> str:
+def _format_report(crash: Crash, now_s: float) -> str:
     # For developers, therefore in English.
     noticed = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now_s))
     by = "" if crash.version == __version__ else f" by NEP Studio {__version__}"
@@ -189,13 +193,13 @@ def _text(crash: Crash, now_s: float) -> str:
     return without_home("\n".join(lines).rstrip() + "\n")
 
 
-def _report(path: Path) -> CrashReport | None:
-    match = _NAME.fullmatch(path.name)
+def _parse_report(path: Path) -> CrashReport | None:
+    match = _NAME_PATTERN.fullmatch(path.name)
     part = next((part for part in PARTS if match is not None and match["part"] == part), None)
     if match is None or part is None:
         return None
     try:
-        noticed = time.mktime(time.strptime(match["stamp"], _STAMP))
+        noticed = time.mktime(time.strptime(match["stamp"], _STAMP_FORMAT))
     except (ValueError, OverflowError):
         return None
     return CrashReport(path, part, noticed, match["new"] is not None)

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from app.core.alerts import Alerts
 from nep.i18n import _, format_list, ngettext
 
-ALERT = "system-libraries"
-LIBRARIES: Mapping[str, str] = {
+ALERT_ID = "system-libraries"
+PACKAGES_BY_LIBRARY: Mapping[str, str] = {
     "libEGL.so.1": "libegl1",
     "libGL.so.1": "libgl1",
     "libX11.so.6": "libx11-6",
@@ -145,7 +145,7 @@ def missing_libraries(
     if not named:
         return None
     names = {named: None}
-    for name in LIBRARIES:
+    for name in PACKAGES_BY_LIBRARY:
         try:
             load(name)
         except OSError as failure:
@@ -155,7 +155,7 @@ def missing_libraries(
 
 def alert_missing(alerts: Alerts, missing: MissingLibraries) -> None:
     """Raise an alert that the block editor can't be opened, which is also shown on the start page."""
-    alerts.raise_alert(ALERT, "error", missing.title, missing.remedy, count=0)
+    alerts.raise_alert(ALERT_ID, "error", missing.title, missing.remedy, count=0)
 
 
 def _library_in(error: str) -> str:
@@ -185,7 +185,7 @@ def import_problem(
 
 
 def _missing_libraries(names: tuple[str, ...], release: Callable[[], Mapping[str, str]]) -> MissingLibraries:
-    packages = dict.fromkeys(LIBRARIES[name] for name in names if name in LIBRARIES)
+    packages = dict.fromkeys(PACKAGES_BY_LIBRARY[name] for name in names if name in PACKAGES_BY_LIBRARY)
     is_renamed = _has_time64_names(release)
     return MissingLibraries(
         names, tuple(_RENAMED_PACKAGES.get(each, each) if is_renamed else each for each in packages)

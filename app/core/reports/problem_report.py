@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 
 from app.core.documents.file_format import DISK_FULL_ERRNOS, SUFFIX
 from app.core.faults import error_text, log_folder
-from app.core.reports.crash_reports import CrashReports, texts
+from app.core.reports.crash_reports import CrashReports, read_reports
 from app.core.reports.privacy import reportable_settings, without_home
 from app.core.reports.studio_versions import format_versions
 from app.core.storage.atomic_file import read_regular_file, write_atomically
@@ -53,7 +53,7 @@ MAX_NAME_LENGTH = 60
 
 _log = logging.getLogger("studio.report")
 
-Facts = Sequence[tuple[str, str]]
+InfoRows = Sequence[tuple[str, str]]
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class ReportParts:
         crashes: Stored crash reports.
     """
 
-    facts: Facts
+    info: InfoRows
     settings: Mapping[str, object]
     doctor: Callable[[], str]
     log: Path = field(default_factory=log_folder)
@@ -95,7 +95,7 @@ def file_name(now_s: float) -> str:
 
 def describe_contents(parts: ReportParts) -> list[str]:
     """Return a list of the contents, so that the user can decide whether to share them."""
-    size = sum(path.stat().st_size for path in _logs(parts.log)) / 1000
+    size = sum(path.stat().st_size for path in _list_logs(parts.log)) / 1000
     lines = [
         _("Versions of Studio, Python, Qt and the operating system, and the screen size"),
         _("Studio log with recent errors ({size} kB)").format(size=number(size, ".1f"))
@@ -116,7 +116,7 @@ def work_text(names: Sequence[str]) -> str:
     return _("Open behaviours: {names}").format(names=format_list([f"“{name}”" for name in names]))
 
 
-def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] = ()) -> bytes:
+def create_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] = ()) -> bytes:
     """Create the content of the zip file. Slow because of the doctor; don't call it in the main thread.
 
     Args:
@@ -127,16 +127,16 @@ def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] 
     files: list[tuple[str, bytes]] = [
         ("README.txt", README_TEXT.format(version=__version__).encode()),
         ("what-happened.txt", (happened.strip() or "(nothing was written)").encode("utf-8", "replace")),
-        ("versions.txt", _anonymize(_versions(parts))),
-        ("settings.json", _anonymize(_settings(parts.settings))),
+        ("versions.txt", _anonymize(_format_versions(parts))),
+        ("settings.json", _anonymize(_format_settings(parts.settings))),
         ("doctor.txt", _anonymize(parts.doctor())),
     ]
-    for path in _logs(parts.log):
+    for path in _list_logs(parts.log):
         with suppress(OSError):  # rotated or unreadable; the other files are included
             files.append((f"log/{path.name}", _anonymize(read_regular_file(path).decode("utf-8", "replace"))))
-    for name, data in texts(parts.crashes.all()):
+    for name, data in read_reports(parts.crashes.all()):
         files.append((f"crashes/{name}", _anonymize(data.decode("utf-8", "replace"))))
-    files += _name_files(work)
+    files += _encode_work(work)
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in files:
@@ -164,7 +164,7 @@ class ReportWriter:
         self.problem = ""
         """Why the report could not be written, as a sentence without a full stop; "" if there is no error."""
         self._make = make
-        self._thread = threading.Thread(target=self._work, name="studio-report")
+        self._thread = threading.Thread(target=self._run, name="studio-report")
         self._thread.start()
 
     @property
@@ -177,7 +177,7 @@ class ReportWriter:
         self._thread.join(timeout_s)
         return self.is_done
 
-    def _work(self) -> None:
+    def _run(self) -> None:
         try:
             write_report(self.path, self._make())
         except ReportError as error:
@@ -187,7 +187,7 @@ class ReportWriter:
             self.problem = _("can't write the report: {error}").format(error=error_text(error))
 
 
-def _logs(folder: Path) -> list[Path]:
+def _list_logs(folder: Path) -> list[Path]:
     try:
         return sorted(path for path in folder.glob("studio.log*") if path.is_file())
     except OSError:
@@ -198,11 +198,11 @@ def _anonymize(text: str) -> bytes:
     return without_home(text).encode("utf-8", "replace")
 
 
-def _settings(values: Mapping[str, object]) -> str:
+def _format_settings(values: Mapping[str, object]) -> str:
     return json.dumps(reportable_settings(values), indent=1, ensure_ascii=False, default=str)
 
 
-def _name_files(work: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
+def _encode_work(work: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
     # Each with a unique name that is valid on every system.
     found: dict[str, bytes] = {}
     for each in work:
@@ -215,13 +215,13 @@ def _name_files(work: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
     return list(found.items())
 
 
-def _versions(parts: ReportParts) -> str:
+def _format_versions(parts: ReportParts) -> str:
     used = ("versions used here", format_versions(parts.settings))
-    lines = [f"{name}: {value}" for name, value in (*_own_facts(), used, *parts.facts)]
-    return "\n".join([*lines, "", "packages:", *_packages()]) + "\n"
+    lines = [f"{name}: {value}" for name, value in (*_system_info(), used, *parts.info)]
+    return "\n".join([*lines, "", "packages:", *_list_packages()]) + "\n"
 
 
-def _own_facts() -> Facts:
+def _system_info() -> InfoRows:
     # Available without a window.
     memory = psutil.virtual_memory()
     names = ("XDG_SESSION_TYPE", "XDG_CURRENT_DESKTOP", "QT_QPA_PLATFORM", "NEP_MASTER", "NEP_LANG")
@@ -246,6 +246,6 @@ def _distribution() -> str:
         return ""
 
 
-def _packages() -> list[str]:
+def _list_packages() -> list[str]:
     found = {str(each.metadata["Name"]): each.version for each in metadata.distributions()}
     return sorted((f"{name} {version}" for name, version in found.items()), key=str.lower)

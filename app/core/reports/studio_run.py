@@ -22,7 +22,7 @@ from typing import IO, TYPE_CHECKING
 from app.core.faults import CONSOLE_EXTRA, error_text, log_folder
 from app.core.reports.crash import Crash, fatal_line
 from app.core.reports.crash_reports import CrashReports
-from app.core.reports.studio_versions import valid_version
+from app.core.reports.studio_versions import parse_version
 from app.core.storage.atomic_file import create_private_folder, read_regular_file, write_atomically
 from app.core.storage.file_lock import FileLock
 from app.core.storage.settings import state_home
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 else:
     psutil = lazy_module("psutil")
 
-LOG_LINES = 80
+MAX_LOG_LINES = 80
 MAX_TRACE_BYTES = 1_000_000
 CLOCK_TOLERANCE_S = 2.0
 """Tolerance in seconds when the start time of a process is compared with the clock."""
@@ -117,7 +117,7 @@ class StudioRun:
             marks = [mark for mark in self._folder.glob("*.json") if mark != self._mark]
         except OSError:
             return []
-        found = [self._check(mark) for mark in marks]
+        found = [self._check_marker(mark) for mark in marks]
         return [crash for crash in found if crash is not None]
 
     # -- this run -------------------------------------------------------------------------------------------
@@ -145,11 +145,11 @@ class StudioRun:
             self._trace.close()
             self._trace = None
         self._lock.release()
-        _remove(self._mark, self._log)
+        _remove_files(self._mark, self._log)
 
     # -- earlier runs ------------------------------------------------------------------------------
 
-    def _check(self, mark: Path) -> Crash | None:
+    def _check_marker(self, mark: Path) -> Crash | None:
         lock = FileLock(mark)
         if not lock.acquire():
             return None  # its process is running
@@ -167,22 +167,22 @@ class StudioRun:
             pass  # damaged, so nothing is known
         finally:
             lock.release()  # before it is deleted: Windows can't delete an open file
-        trace = self._trace_of(mark)
-        _remove(mark, self._log)
-        return self._crash_of(*judged, trace) if judged is not None else None
+        trace = self._read_trace(mark)
+        _remove_files(mark, self._log)
+        return self._detect_crash(*judged, trace) if judged is not None else None
 
-    def _crash_of(self, entry: Mapping[str, object], began_s: float, trace: str) -> Crash | None:
+    def _detect_crash(self, entry: Mapping[str, object], began_s: float, trace: str) -> Crash | None:
         how = fatal_line(trace)
         if not how:
             if entry.get("asked") is True or psutil.boot_time() > began_s + CLOCK_TOLERANCE_S:
                 return None
             how = NO_TRACE_CAUSE
         began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(began_s))
-        version = valid_version(entry.get("version"))
-        text = f"It was version {version or 'not known'}, begun {began}.\n\n{trace}\n{self._end_of_log()}"
+        version = parse_version(entry.get("version"))
+        text = f"It was version {version or 'not known'}, begun {began}.\n\n{trace}\n{self._log_tail()}"
         return Crash("studio", how, text, version)
 
-    def _trace_of(self, mark: Path) -> str:
+    def _read_trace(self, mark: Path) -> str:
         try:
             return read_regular_file(self._log / _trace_name(mark), MAX_TRACE_BYTES).decode(
                 "utf-8", "replace"
@@ -190,19 +190,19 @@ class StudioRun:
         except OSError:
             return ""
 
-    def _end_of_log(self) -> str:
+    def _log_tail(self) -> str:
         try:
             lines = read_regular_file(self._log / "studio.log").decode("utf-8", "replace").splitlines()
         except OSError:
             return ""
-        return "\n".join(["The end of the log:", *lines[-LOG_LINES:]]) + "\n"
+        return "\n".join(["The end of the log:", *lines[-MAX_LOG_LINES:]]) + "\n"
 
 
 def _trace_name(mark: Path) -> str:
     return f"crash-{mark.stem}.trace"
 
 
-def _remove(mark: Path, log: Path) -> None:
+def _remove_files(mark: Path, log: Path) -> None:
     for path in (mark, mark.with_name(f"{mark.name}.lock"), log / _trace_name(mark)):
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)

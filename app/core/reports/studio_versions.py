@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from nep.version import __version__
 
-KEY = "studio_versions"
+SETTING_KEY = "studio_versions"
 """Name of the setting that stores the versions and the times of their first start, newest last."""
 MAX_VERSIONS = 10
 VERSION_PATTERN = re.compile(r"[0-9A-Za-z][0-9A-Za-z.+-]{0,39}")
@@ -24,7 +24,7 @@ A damaged file may contain a time that the calendar doesn't support.
 VersionEntries = list[dict[str, object]]
 
 
-def valid_version(value: object) -> str:
+def parse_version(value: object) -> str:
     """Return a version read from a file, or "" if it is invalid."""
     return value if isinstance(value, str) and VERSION_PATTERN.fullmatch(value) else ""
 
@@ -34,12 +34,12 @@ def known_versions(values: Mapping[str, object]) -> list[tuple[str, float]]:
 
     Times are in seconds since 1970.
     """
-    entries = values.get(KEY)
+    entries = values.get(SETTING_KEY)
     found = []
     for entry in entries if isinstance(entries, list) else ():
         if not isinstance(entry, Mapping):
             continue
-        version, since = valid_version(entry.get("version")), entry.get("since_s")
+        version, since = parse_version(entry.get("version")), entry.get("since_s")
         if (
             isinstance(since, int | float)
             and not isinstance(since, bool)

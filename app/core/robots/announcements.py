@@ -39,8 +39,8 @@ MAX_CPU_SHARE = 0.2
 MAX_PARSE_BUDGET_S = 1.0
 """Maximum time in seconds for parsing after an idle period, for example for all robots of a room."""
 
-NATIVE = frozenset({"native", "gateway"})
-SUFFIXES = ("_driver", "_robot", "_node")
+NATIVE_GENERATIONS = frozenset({"native", "gateway"})
+NODE_NAME_SUFFIXES = ("_driver", "_robot", "_node")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ class _Announcement:
     owner: Identity | None = None
     owners: tuple[str, ...] = ()
     messages: dict[int, Message] = field(default_factory=dict)
-    parsed: Message | None = None
+    parsed_message: Message | None = None
     robot: Robot | None = None
     claim: Claim | None = None
     is_unreadable: bool = False
@@ -113,7 +113,7 @@ class Announcements:
                 yield topic, known.robot, known.owner
 
     @property
-    def unreadable(self) -> tuple[str, ...]:
+    def unreadable_topics(self) -> tuple[str, ...]:
         """Topics whose descriptions are invalid."""
         return tuple(
             topic for topic, known in self._topics.items() if known.is_unreadable and known.robot is None
@@ -162,7 +162,7 @@ class Announcements:
             if topic not in there:
                 self._mark_vanished(known)
         left_out: list[str] = []
-        for place, topic in _fair_order(there):
+        for place, topic in _fair_topic_order(there):
             nodes = there[topic]
             begun = self._topics.get(topic) or self._add_topic(topic, place, left_out)
             if begun is None:
@@ -172,7 +172,7 @@ class Announcements:
             if known.watch is None:
                 known.watch = self._watches.open([topic])
             if known.owner is None or known.owner.node_id not in nodes:
-                known.owner, known.robot, known.parsed = identity_of(view, nodes[0]), None, None
+                known.owner, known.robot, known.parsed_message = identity_of(view, nodes[0]), None, None
                 known.claim = None
                 known.owners = tuple(dict.fromkeys((nodes[0], *known.owners)))[:MAX_OWNERS]
             others = (node for node in nodes if node != known.owner.node_id)
@@ -222,7 +222,7 @@ class Announcements:
         # over the same connection.
         if known.watch is not None:
             known.watch.close()
-        known.watch, known.robot, known.parsed, known.other_owners = None, None, None, ()
+        known.watch, known.robot, known.parsed_message, known.other_owners = None, None, None, ()
         known.messages = {id: told for id, told in known.messages.items() if self._is_from_owner(known, told)}
 
     def _evict_one(self, known: _Announcement) -> None:
@@ -251,7 +251,7 @@ class Announcements:
         self._waiting = set(wait)
 
         def sort_key(each: tuple[str, Message]) -> tuple[bool, int]:
-            return self._topics[each[0]].parsed is not None, len(each[1].data)
+            return self._topics[each[0]].parsed_message is not None, len(each[1].data)
 
         for topic, newest in sorted(wait.items(), key=sort_key):
             if self._parse_budget_s <= 0:
@@ -270,11 +270,11 @@ class Announcements:
         newest = next(
             (told for told in reversed(known.messages.values()) if self._is_from_owner(known, told)), None
         )
-        return None if newest is known.parsed else newest
+        return None if newest is known.parsed_message else newest
 
     def _parse(self, topic: str, newest: Message) -> None:
         known = self._topics[topic]
-        known.parsed, known.claim, known.is_unreadable = newest, None, False
+        known.parsed_message, known.claim, known.is_unreadable = newest, None, False
         try:
             robot = parse_announcement(newest)
         except NepError:
@@ -298,7 +298,7 @@ class Announcements:
             known.claim = Claim(f"{wrong}.", _("Find out what this program is, and close it."))
 
 
-def _fair_order(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
+def _fair_topic_order(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
     # Sorted so that the first topic of each node comes before the second topic of any node.
     counts: Counter[str] = Counter()
     placed = []
@@ -332,7 +332,9 @@ class RizeNames:
         info = view.topics.get(rize.COMMANDS)
         ids = {subscriber.node_id for subscriber in info.subscribers} if info is not None else set()
         nodes = [
-            view.nodes[id].name for id in ids if id in view.nodes and view.nodes[id].generation not in NATIVE
+            view.nodes[id].name
+            for id in ids
+            if id in view.nodes and view.nodes[id].generation not in NATIVE_GENERATIONS
         ]
         if len(nodes) == 1 and len(candidates) == 1:
             return {candidates[0]}
@@ -341,7 +343,7 @@ class RizeNames:
 
 def _match_name(node: str, told: Collection[str]) -> str:
     stem = node
-    for suffix in SUFFIXES:
+    for suffix in NODE_NAME_SUFFIXES:
         stem = stem.removesuffix(suffix)
     same = {stem.lower(), node.lower()}
     return next((name for name in told if name.lower() in same), stem or node)

@@ -26,35 +26,35 @@ class CommandPublishers:
             return
         link.is_opening = True
 
-        def open_them(node: Node) -> None:
+        def open_job(node: Node) -> None:
             native = link.robot.dialect == "native"
             try:
                 if link.robot.topics != topics:
                     return  # the description changed; the next graph opens the new topics
                 world = node.new_pub(topics.world, "json") if topics.world is not None else None
-                link.world = world
+                link.world_publisher = world
                 link.publisher = node.new_pub(topics.command, COMMAND_TYPE if native else "json", batch=False)
             finally:
                 link.is_opening = False
 
-        self._submit(_failure_text(_("Can't connect to {robot}: {error}"), link), open_them)
+        self._submit(_failure_text(_("Can't connect to {robot}: {error}"), link), open_job)
 
     def close_outdated(self, link: RobotLink) -> None:
         """Close the publishers for topics that are no longer in the robot's description."""
-        old = [publisher for publisher in (link.publisher, link.world) if publisher is not None]
-        link.publisher = link.world = None
+        old = [publisher for publisher in (link.publisher, link.world_publisher) if publisher is not None]
+        link.publisher = link.world_publisher = None
 
-        def close_them(_node: Node) -> None:
+        def close_job(_node: Node) -> None:
             for publisher in old:
                 publisher.close()
 
         if old:
             text = _failure_text(_("Can't close the old publishers of {robot}: {error}"), link)
-            self._submit(text, close_them)
+            self._submit(text, close_job)
 
     def close(self, link: RobotLink) -> None:
         """Close the publishers of a robot that is removed, including publishers that are being opened."""
-        if link.is_opening or link.publisher is not None or link.world is not None:
+        if link.is_opening or link.publisher is not None or link.world_publisher is not None:
             self._submit("", lambda _node: close_publishers(link))
 
 
@@ -65,7 +65,7 @@ def _failure_text(template: str, link: RobotLink) -> str:
 
 def close_publishers(link: RobotLink) -> None:
     """Close the publishers of a robot in the calling thread."""
-    for publisher in (link.publisher, link.world):
+    for publisher in (link.publisher, link.world_publisher):
         if publisher is not None:
             publisher.close()
-    link.publisher = link.world = None
+    link.publisher = link.world_publisher = None

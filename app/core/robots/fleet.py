@@ -13,7 +13,7 @@ from app.core.robots.command_publishers import CommandPublishers, Submit, close_
 from app.core.robots.known import KnownRobots
 from app.core.robots.motion.gate import MotionGate, MovableRobots
 from app.core.robots.motion.permission import MayNotMoveError, MotionPermission
-from app.core.robots.own_messages import OwnMessages, mapping_of
+from app.core.robots.own_messages import OwnMessageFilter, decode_mapping
 from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import (
     SENDER,
@@ -35,7 +35,7 @@ from app.robots import rize
 from app.robots.description.description import Robot, topic_of
 from app.robots.heartbeat import Heartbeat
 from app.robots.identity import (
-    AllVirtual,
+    AllVirtualProcesses,
     Identity,
     RobotProcesses,
     Senders,
@@ -66,10 +66,10 @@ class Fleet:
         self._publishers = CommandPublishers(submit)
         self._clock = clock
         self._links: dict[str, RobotLink] = {}
-        self._processes = processes if processes is not None else AllVirtual()
+        self._processes = processes if processes is not None else AllVirtualProcesses()
         self._senders = Senders()
-        self._own = OwnMessages(self._senders, self._links)
-        self._announcements = Announcements(watches, self._senders, clock, self._is_proven)
+        self._own = OwnMessageFilter(self._senders, self._links)
+        self._announcements = Announcements(watches, self._senders, clock, self._must_keep_topic)
         self._unlisted: tuple[StopTarget, ...] = ()
         self._settings = settings
         self._names: dict[str, str] = {}
@@ -134,7 +134,7 @@ class Fleet:
         if chosen is not None and chosen.is_connected:
             return chosen
         connected = self.connected
-        return next((link for link in connected if link.virtual), connected[0] if connected else chosen)
+        return next((link for link in connected if link.is_virtual), connected[0] if connected else chosen)
 
     def select(self, name: str) -> None:
         """Choose the robot that is shown by panels that show one robot."""
@@ -150,7 +150,7 @@ class Fleet:
         Raises:
             RobotUnknownError: No robot has this name.
         """
-        return self._watches.open(topics_of(self._get(name).robot))
+        return self._watches.open(topics_of(self._get_link(name).robot))
 
     def invoke(self, name: str, action: str, input: Payload) -> Invocation:
         """Send an action to a robot.
@@ -167,7 +167,7 @@ class Fleet:
             MayNotMoveError: The user is asked to allow the motion. If the user allows it, the action is
                 sent.
         """
-        link = self._get(name)
+        link = self._get_link(name)
         described = link.robot.action(action)
         if described is None:
             raise RobotInputError((_("{robot} can't {action}").format(robot=name, action=action),))
@@ -195,7 +195,7 @@ class Fleet:
 
     def cancel(self, name: str, action: str) -> None:
         """Cancel the last invocation of an action, if it is still running."""
-        self._tries.cancel(self._get(name), action)
+        self._tries.cancel(self._get_link(name), action)
 
     def change_world(self, name: str, change: Payload) -> None:
         """Change the world of a virtual robot, for example touch its head, move the ball or say a word.
@@ -206,13 +206,13 @@ class Fleet:
             name: Name of the robot.
             change: Message for the world topic.
         """
-        link = self._get(name)
+        link = self._get_link(name)
         actions = [action.name for action in link.robot.actions]
         may = self.permission.request_permission(
             [(link.robot, actions)], lambda: self._retry_change(name, change)
         )
-        if may and link.world is not None:
-            link.world.publish(dict(change))
+        if may and link.world_publisher is not None:
+            link.world_publisher.publish(dict(change))
 
     @property
     def resets_at_start(self) -> bool:
@@ -226,10 +226,10 @@ class Fleet:
 
     def return_to_start(self, names: Iterable[str]) -> None:
         """If `resets_at_start` is set, move the virtual robots among ``names`` to their start position."""
-        links = [link for name in names if (link := self._links.get(name)) is not None and link.virtual]
+        links = [link for name in names if (link := self._links.get(name)) is not None and link.is_virtual]
         for link in links if self.resets_at_start else ():
-            if link.world is not None:
-                link.world.publish({"start": [each.name for each in links]})
+            if link.world_publisher is not None:
+                link.world_publisher.publish({"start": [each.name for each in links]})
 
     def _retry_change(self, name: str, change: Payload) -> None:
         if name in self._links:
@@ -239,21 +239,21 @@ class Fleet:
         """Set robots to the state "stopping", until `apply_stop` applies the result of the Stop."""
         self.stops += 1
         for link in map(self._links.get, names):
-            if link is not None and link.stop_began_s is None:
-                link.stop_began_s = self._clock()
+            if link is not None and link.pending_stop_start_s is None:
+                link.pending_stop_start_s = self._clock()
 
     @property
     def stopping_robots(self) -> tuple[str, ...]:
         """Names of robots that have not replied to a Stop yet."""
-        return tuple(link.name for link in self._links.values() if link.stop_began_s is not None)
+        return tuple(link.name for link in self._links.values() if link.pending_stop_start_s is not None)
 
     @property
-    def unresponsive(self) -> tuple[str, ...]:
+    def unresponsive_robots(self) -> tuple[str, ...]:
         """Names of robots that may be moving and don't reply. Every Stop reports these robots."""
         return tuple(name for name in self.moved.names if not self._is_responsive(self._links.get(name)))
 
     @property
-    def stoppable(self) -> tuple[str, ...]:
+    def stoppable_robots(self) -> tuple[str, ...]:
         """Names of the robots whose replies a Stop of all robots waits for."""
         unlisted = (target.robot.name for target in self._unlisted if target.is_expected)
         return tuple(dict.fromkeys((*(link.name for link in self.connected), *self.moved.names, *unlisted)))
@@ -276,15 +276,15 @@ class Fleet:
             words: Message and status for each robot.
             report: Result of the Stop.
         """
-        wrong = {name: robot.problem for name, robot in report.by_name.items()}
+        wrong = {name: robot.problem for name, robot in report.results_by_robot.items()}
         for name, (last_stop, status) in words.items():
             link = self._links.get(name)
             if link is None:
                 continue
             link.last_stop, link.last_stop_status = last_stop, status
             link.stop_problem = wrong.get(name, "")
-            link.stop_began_s, link.is_stopping = None, False
-            link.has_proven_stop |= name in report.stopped_names
+            link.pending_stop_start_s, link.is_stopping = None, False
+            link.has_confirmed_stop |= name in report.stopped_names
             if not link.stop_problem:
                 self._tries.end_all(link, "canceled")
             self._heartbeat.stop(name)
@@ -312,17 +312,17 @@ class Fleet:
         self._announcements.update(view)
         topics = (self._own.topics(link.robot) for link in self._links.values())
         self._senders.update(view, {rize.ANSWERS}.union(*topics))
-        self._update_announced()
+        self._update_announced_robots()
         known = self._announcements
         self._unlisted = (
             *unlisted_targets(view, known.left_out),
-            *unlisted_targets(view, known.unreadable, is_expected=False),
+            *unlisted_targets(view, known.unreadable_topics, is_expected=False),
         )
         self._update_rize(view)
         commanded = map(self._links.get, self.moved.recently_commanded)
         newcomers = {link.name: self._own.new_programs(link, before) for link in commanded if link}
         self.moved.record_new_programs(newcomers)
-        self._messages.apply_held(self._links)
+        self._messages.apply_held_replies(self._links)
         for link in self._links.values():
             if link.is_connected and link.publisher is None:
                 self._publishers.open(link)
@@ -331,16 +331,16 @@ class Fleet:
     def add(self, batches: Mapping[str, Batch]) -> None:
         """Process received messages: descriptions, replies, sensor values."""
         if self._announcements.add(batches):
-            self._update_announced()
+            self._update_announced_robots()
             self._evict_disconnected()
         events = batches.get(rize.EVENTS)
         for message in events.messages if events is not None else ():
-            name = rize.ready(mapping_of(message))
+            name = rize.ready(decode_mapping(message))
             if name is not None:
                 self._rize_names.add(name)
         for link in self._links.values():
             self._messages.read(link, batches)
-            began_s = link.stop_began_s
+            began_s = link.pending_stop_start_s
             link.is_stopping = began_s is not None and self._clock() - began_s >= STOPPING_DISPLAY_DELAY_S
         self._tries.check_timeouts(self._links.values())
         self.gate.update()
@@ -379,7 +379,7 @@ class Fleet:
 
     def _drop_ended(self, link: RobotLink) -> None:
         # A virtual robot is its program: it has stopped once the process has ended.
-        if link.virtual and link.name in self.moved:
+        if link.is_virtual and link.name in self.moved:
             self.moved.drop_ended(link.name)
             link.stop_problem = link.stop_problem if link.name in self.moved else ""
 
@@ -390,11 +390,11 @@ class Fleet:
         motion = self.moved.motion(link.name)
         link.motion_warning = motion.reason if motion is not None and not self._is_responsive(link) else ""
 
-    def _is_proven(self, topic: str) -> bool:
+    def _must_keep_topic(self, topic: str) -> bool:
         link = self._links.get(self._names.get(topic, ""))
-        return link is not None and (link.has_proven_stop or link.name in self.moved)
+        return link is not None and (link.has_confirmed_stop or link.name in self.moved)
 
-    def _get(self, name: str) -> RobotLink:
+    def _get_link(self, name: str) -> RobotLink:
         link = self._links.get(name)
         if link is None:
             raise UnknownRobotError(name)
@@ -413,7 +413,7 @@ class Fleet:
             if link.robot.dialect == "rize" and link.is_connected and link.name not in there:
                 self._disconnect(link)
 
-    def _update_announced(self) -> None:
+    def _update_announced_robots(self) -> None:
         # Connects announced robots; disconnects those whose program is no longer listed.
         found = {topic: (robot, identity) for topic, robot, identity in self._announcements.robots}
         for topic, name in list(self._names.items()):
@@ -475,11 +475,11 @@ class Fleet:
         link.is_connected, link.gone_s = True, None
         if before.topics != robot.topics or before.dialect != robot.dialect:
             if before.dialect == robot.dialect:
-                known = dict.fromkeys((*link.topics_before, before.topics))
-                link.topics_before = tuple(known)[:MAX_TOPICS]
+                known = dict.fromkeys((*link.earlier_topics, before.topics))
+                link.earlier_topics = tuple(known)[:MAX_TOPICS]
             self._close_topics(link)
         if link.watch is None:
-            link.watch = self._watches.open([robot.topics.answer])
+            link.watch = self._watches.open([robot.topics.reply])
         self._senders.update(self._own.view, self._own.topics(robot))
         self._publishers.open(link)
         self.known.record([robot])
@@ -512,7 +512,7 @@ class Fleet:
 
     def _record_unended_actions(self, link: RobotLink, program: Identity | None) -> None:
         # Records actions that the robot could not end: their end can no longer be observed.
-        if link.unended_actions and not link.virtual:  # a virtual robot is its program
+        if link.unended_actions and not link.is_virtual:  # a virtual robot is its program
             self.moved.record_command([link.name], "action", program=program)
             link.stop_problem = link.stop_problem or link.unended_actions
         link.unended_actions = ""
@@ -526,7 +526,7 @@ class Fleet:
             link.watch.close()
             link.watch = None
         link.is_unresponsive = False
-        if self.permission.question is not None and link.name in self.permission.question.moves:
+        if self.permission.question is not None and link.name in self.permission.question.moving_actions:
             self.permission.withdraw()
         self._tries.end_all(
             link, "failed", _("{robot} disconnected; check that it is switched on").format(robot=link.name)

@@ -14,7 +14,7 @@ from app.core.robots.robot_link import RobotLink
 from nep.i18n import _, format_list, lazy, ngettext
 from nep.protocol.graph_view import Alert, GraphView
 
-SILENT_S = 3.0
+SILENCE_TIMEOUT_S = 3.0
 RECOVERY_S = 1.0
 RESTART_TIMEOUT_S = 5.0
 """Time limit in seconds for a restarted driver to connect again."""
@@ -42,8 +42,8 @@ class _BadTopic:
     """
 
     count: int = 0
-    unchecked: int = 0
-    since: float = 0.0
+    unchecked_count: int = 0
+    last_error_s: float = 0.0
     has_recovered: bool = False
 
 
@@ -70,15 +70,15 @@ class Health:
         """
         for topic, checked in found.items():
             bad = self._bad.get(topic)
-            if bad is None and checked.bad:
+            if bad is None and checked.bad_count:
                 bad = self._bad[topic] = _BadTopic()
             if bad is None:
                 continue
-            bad.has_recovered = checked.is_last_good
-            bad.unchecked += checked.unchecked
-            if checked.bad:
-                bad.since = self._clock()
-                bad.count += checked.bad
+            bad.has_recovered = checked.is_newest_readable
+            bad.unchecked_count += checked.unchecked_count
+            if checked.bad_count:
+                bad.last_error_s = self._clock()
+                bad.count += checked.bad_count
                 self._alert_bad_topic(topic, bad, checked)
 
     def discard(self, topic: str) -> None:
@@ -95,7 +95,7 @@ class Health:
         """
         now = self._clock()
         for topic in [
-            t for t, bad in self._bad.items() if bad.has_recovered and now - bad.since >= RECOVERY_S
+            t for t, bad in self._bad.items() if bad.has_recovered and now - bad.last_error_s >= RECOVERY_S
         ]:
             self.discard(topic)
         self._check_claims()
@@ -113,7 +113,7 @@ class Health:
                     "error",
                     _("{robot} isn't responding.").format(robot=link.name),
                     _("The behaviour uses this robot. {next_step}").format(
-                        next_step=_(VIRTUAL_ROBOT_HINT if link.virtual else REAL_ROBOT_HINT)
+                        next_step=_(VIRTUAL_ROBOT_HINT if link.is_virtual else REAL_ROBOT_HINT)
                     ),
                     button=_("Stop"),
                     action="run.stop",
@@ -254,7 +254,7 @@ class Health:
         )
         detail = (
             _("{why} See the raw bytes in the Inspector. {count} more arrived too fast to be decoded.")
-            if bad.unchecked
+            if bad.unchecked_count
             else _("{why} See the raw bytes in the Inspector.")
         )
         why = f"{checked.error[:1].upper()}{checked.error[1:]}."
@@ -262,27 +262,27 @@ class Health:
             f"message:{topic}",
             "warn",
             title.format(topic=topic, count=bad.count),
-            detail.format(why=why, count=bad.unchecked),
+            detail.format(why=why, count=bad.unchecked_count),
             button=_("Show"),
             action=f"inspect:{topic}",
-            count=checked.bad,
+            count=checked.bad_count,
         )
 
     def _check_presence(self, link: RobotLink, now: float, *, runs_here: bool) -> None:
         # A real robot that left, or a virtual one that hangs.
         since = self._gone_since.setdefault(link.name, now)
-        if now - since < RESTART_TIMEOUT_S or (link.virtual and not runs_here):
+        if now - since < RESTART_TIMEOUT_S or (link.is_virtual and not runs_here):
             self._alerts.resolve(f"robot:{link.name}")
             return
         self._alerts.raise_alert(
             f"robot:{link.name}",
             "warn",
-            (_("{robot} isn't responding.") if link.virtual else _("{robot} disconnected.")).format(
+            (_("{robot} isn't responding.") if link.is_virtual else _("{robot} disconnected.")).format(
                 robot=link.name
             ),
-            _(VIRTUAL_ROBOT_HINT if link.virtual else REAL_ROBOT_HINT),
-            button=_("Restart it") if link.virtual else _(OPEN_DOCTOR_LABEL),
-            action=f"connect:{link.name}" if link.virtual else "help.doctor",
+            _(VIRTUAL_ROBOT_HINT if link.is_virtual else REAL_ROBOT_HINT),
+            button=_("Restart it") if link.is_virtual else _(OPEN_DOCTOR_LABEL),
+            action=f"connect:{link.name}" if link.is_virtual else "help.doctor",
             count=0,
         )
 
@@ -375,13 +375,13 @@ class Health:
             and topic is not None
             and topic.gone_since is None
             and topic.silent_s is not None
-            and topic.silent_s > SILENT_S
+            and topic.silent_s > SILENCE_TIMEOUT_S
         )
         if not silent or topic is None or topic.silent_s is None:
-            link.silent = None
+            link.silence_reason = None
             self._alerts.resolve(id)
             return
-        link.silent = _("camera silent")
+        link.silence_reason = _("camera silent")
         self._alerts.raise_alert(
             id,
             "error",

@@ -15,11 +15,11 @@ from app.robots.description.description import Sensor
 from app.robots.description.json_access import finite_float
 from nep.i18n import _, lazy, ngettext, number
 
-SILENT_S = 3.0
+SILENCE_TIMEOUT_S = 3.0
 MAX_MISSED_MESSAGES = 5
 """Number of consecutive missing messages after which a sensor counts as silent."""
-LOW_PERCENT = 20
-WARM_C = 60
+LOW_BATTERY_PERCENT = 20
+WARM_MOTOR_C = 60
 """Temperature in °C above which the motors of small robots begin to lose torque."""
 
 CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Temperature")
@@ -32,7 +32,7 @@ FormatAge = Callable[[float], str]
 
 
 @dataclass(frozen=True, slots=True)
-class HealthFact:
+class HealthItem:
     """One fact about a robot.
 
     Attributes:
@@ -51,7 +51,7 @@ class HealthFact:
         return self.status in ("warn", "error")
 
 
-def facts_of(link: RobotLink, topics: Topics, now: float, age_words: FormatAge) -> tuple[HealthFact, ...]:
+def health_items(link: RobotLink, topics: Topics, now: float, age_words: FormatAge) -> tuple[HealthItem, ...]:
     """Return all facts about a robot; those that need attention come first.
 
     Args:
@@ -66,84 +66,84 @@ def facts_of(link: RobotLink, topics: Topics, now: float, age_words: FormatAge) 
     facts.append(_stop(link))
     if link.is_connected:
         facts += [*_camera(link, topics, age_words), *_sensors(link, topics, age_words)]
-        facts += [*_count_facts(REJECTED, link.rejected, now), *_count_facts(ERRORS, link.errors, now)]
-    facts += [_watchdog_fact(link), *_heartbeat_fact(link)]
+        facts += [*_count_items(REJECTED, link.rejected, now), *_count_items(ERRORS, link.errors, now)]
+    facts += [_watchdog_item(link), *_heartbeat_items(link)]
     return tuple(sorted(facts, key=lambda fact: not fact.needs_attention))
 
 
-def has_reported(link: RobotLink, facts: Sequence[HealthFact]) -> bool:
+def has_reported(link: RobotLink, facts: Sequence[HealthItem]) -> bool:
     """Return True if the robot has sent a message; otherwise only its description is known."""
-    return link.replied_s is not None or any(
+    return link.last_reply_s is not None or any(
         fact.title in REPORTED_TITLES and fact.status == "ok" for fact in facts
     )
 
 
-def _connection(link: RobotLink, now: float, age_words: FormatAge) -> HealthFact:
-    age = age_words(now - link.replied_s) if link.replied_s is not None else ""
+def _connection(link: RobotLink, now: float, age_words: FormatAge) -> HealthItem:
+    age = age_words(now - link.last_reply_s) if link.last_reply_s is not None else ""
     if not link.is_connected:
         if link.gone_s is None:
             words = (
                 _("disconnected; restart it")
-                if link.virtual
+                if link.is_virtual
                 else _("disconnected; check that it is switched on")
             )
-            return HealthFact(CONNECTION, "warn", words)
+            return HealthItem(CONNECTION, "warn", words)
         words = (
             _("disconnected {age} ago; restart it")
-            if link.virtual
+            if link.is_virtual
             else _("disconnected {age} ago; check that it is switched on")
         )
-        return HealthFact(CONNECTION, "warn", words.format(age=age_words(now - link.gone_s)))
+        return HealthItem(CONNECTION, "warn", words.format(age=age_words(now - link.gone_s)))
     if link.is_unresponsive:
-        return HealthFact(CONNECTION, "error", _unresponsive_text(link, age))
+        return HealthItem(CONNECTION, "error", _unresponsive_text(link, age))
     words = _("last response {age} ago").format(age=age) if age else _("connected; no request sent yet")
-    return HealthFact(CONNECTION, "ok", words)
+    return HealthItem(CONNECTION, "ok", words)
 
 
 def _unresponsive_text(link: RobotLink, age: str) -> str:
     if not age:
         return (
             _("not responding; restart it")
-            if link.virtual
+            if link.is_virtual
             else _("not responding; check that it is switched on")
         )
     words = (
         _("not responding for {age}; restart it")
-        if link.virtual
+        if link.is_virtual
         else _("not responding for {age}; check that it is switched on")
     )
     return words.format(age=age)
 
 
-def _battery(link: RobotLink) -> Iterable[HealthFact]:
+def _battery(link: RobotLink) -> Iterable[HealthItem]:
     for sensor in link.robot.sensors:
         if "battery" not in f"{sensor.name} {sensor.title}".casefold() or sensor.unit != "%":
             continue
         value = finite_float(link.values.get(sensor.name))
         if value is None:
-            yield HealthFact(BATTERY, "off", _("not reported yet"))
-        elif value < LOW_PERCENT:
-            yield HealthFact(BATTERY, "warn", _("{percent} %; charge it soon").format(percent=f"{value:.0f}"))
+            yield HealthItem(BATTERY, "off", _("not reported yet"))
+        elif value < LOW_BATTERY_PERCENT:
+            yield HealthItem(BATTERY, "warn", _("{percent} %; charge it soon").format(percent=f"{value:.0f}"))
         else:
-            yield HealthFact(BATTERY, "ok", f"{value:.0f} %")
+            yield HealthItem(BATTERY, "ok", f"{value:.0f} %")
         return
 
 
-def _temperature(link: RobotLink) -> Iterable[HealthFact]:
-    readings = [found for sensor in link.robot.sensors for found in _degrees(sensor, link.values)]
+def _temperature(link: RobotLink) -> Iterable[HealthItem]:
+    readings = [found for sensor in link.robot.sensors for found in _temperatures(sensor, link.values)]
     if readings:
         value, what = max(readings)
-        if value >= WARM_C:
-            yield HealthFact(
+        if value >= WARM_MOTOR_C:
+            yield HealthItem(
                 TEMPERATURE,
                 "warn",
                 _("{what} warm, {degrees} °C; let it cool down").format(what=what, degrees=f"{value:.0f}"),
             )
         else:
-            yield HealthFact(TEMPERATURE, "ok", f"{what} {value:.0f} °C")
+            yield HealthItem(TEMPERATURE, "ok", f"{what} {value:.0f} °C")
 
 
-def _degrees(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[float, str]]:
+def _temperatures(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[float, str]]:
     value = values.get(sensor.name)
     degrees = finite_float(value)
     if sensor.unit == "°C" and degrees is not None:
@@ -155,39 +155,39 @@ def _degrees(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[flo
             yield degrees, field.title
 
 
-def _stop(link: RobotLink) -> HealthFact:
+def _stop(link: RobotLink) -> HealthItem:
     if link.unended_actions:
-        return HealthFact(STOP, "error", link.unended_actions)
+        return HealthItem(STOP, "error", link.unended_actions)
     if link.motion_warning:
-        return HealthFact(STOP, "error", link.motion_warning)
+        return HealthItem(STOP, "error", link.motion_warning)
     if link.is_connected and not link.is_reachable:
-        return HealthFact(STOP, "off", _("can't be sent yet: the robot is connecting"))
+        return HealthItem(STOP, "off", _("can't be sent yet: the robot is connecting"))
     if link.is_stopping:
-        return HealthFact(STOP, "off", _("Stop sent; waiting for confirmation"))
+        return HealthItem(STOP, "off", _("Stop sent; waiting for confirmation"))
     if link.last_stop is not None:
-        return HealthFact(STOP, link.last_stop_status, link.last_stop)
+        return HealthItem(STOP, link.last_stop_status, link.last_stop)
     text = _("not used yet") if link.can_confirm_stop else _("not used yet; this robot can't confirm")
-    return HealthFact(STOP, "off", text)
+    return HealthItem(STOP, "off", text)
 
 
-def _camera(link: RobotLink, topics: Topics, age_words: FormatAge) -> Iterable[HealthFact]:
+def _camera(link: RobotLink, topics: Topics, age_words: FormatAge) -> Iterable[HealthItem]:
     camera = next((sensor for sensor in link.robot.sensors if sensor.is_image), None)
     if camera is None:
         return
     topic = topics.get(camera.topic)
-    if link.silent is not None and topic is not None and topic.silent_s is not None:
-        yield HealthFact(CAMERA, "error", _("silent for {age}").format(age=age_words(topic.silent_s)))
+    if link.silence_reason is not None and topic is not None and topic.silent_s is not None:
+        yield HealthItem(CAMERA, "error", _("silent for {age}").format(age=age_words(topic.silent_s)))
     elif topic is not None and topic.rate_hz:
-        yield HealthFact(
+        yield HealthItem(
             CAMERA, "ok", _("sends {rate} images per second").format(rate=f"{topic.rate_hz:.0f}")
         )
     elif topic is not None and topic.gone_s is None and topic.subscribed_since is None:
-        yield HealthFact(CAMERA, "off", _("ready (not in use)"))
+        yield HealthItem(CAMERA, "off", _("ready (not in use)"))
     else:
-        yield HealthFact(CAMERA, "off", _("no image yet"))
+        yield HealthItem(CAMERA, "off", _("no image yet"))
 
 
-def _sensors(link: RobotLink, topics: Topics, age_words: FormatAge) -> Iterable[HealthFact]:
+def _sensors(link: RobotLink, topics: Topics, age_words: FormatAge) -> Iterable[HealthItem]:
     felt = [sensor for sensor in link.robot.sensors if not sensor.is_image]
     silent = [(sensor, topic) for sensor in felt if _is_silent(sensor, topic := topics.get(sensor.topic))]
     if not felt:
@@ -196,18 +196,18 @@ def _sensors(link: RobotLink, topics: Topics, age_words: FormatAge) -> Iterable[
         age = age_words(max(topic.silent_s or 0.0 for _sensor, topic in silent if topic is not None))
         first, more = silent[0][0].title, len(silent) - 1
         words = _("{sensor} silent for {age}") if not more else _("{sensor} and {more} more silent for {age}")
-        yield HealthFact(SENSORS, "warn", words.format(sensor=first, more=more, age=age))
+        yield HealthItem(SENSORS, "warn", words.format(sensor=first, more=more, age=age))
         return
     sent = sum(1 for sensor in felt if _has_sent(topics.get(sensor.topic)))
     if not sent:
         words = ngettext("has sent nothing yet", "none of {count} has sent anything yet", len(felt))
-        yield HealthFact(SENSORS, "off", words.format(count=len(felt)))
+        yield HealthItem(SENSORS, "off", words.format(count=len(felt)))
     elif sent < len(felt):
-        yield HealthFact(
+        yield HealthItem(
             SENSORS, "ok", _("{sent} of {count} have sent data").format(sent=sent, count=len(felt))
         )
     else:
-        yield HealthFact(
+        yield HealthItem(
             SENSORS,
             "ok",
             ngettext("{count} sensor is sending", "all {count} are sending", len(felt)).format(
@@ -224,28 +224,28 @@ def _is_silent(sensor: Sensor, topic: Topic | None) -> bool:
     # Only sensors with a rate can be silent; others may have no change to report.
     if sensor.rate_hz is None or topic is None or topic.silent_s is None or topic.gone_s is not None:
         return False
-    return topic.silent_s > max(SILENT_S, MAX_MISSED_MESSAGES / sensor.rate_hz)
+    return topic.silent_s > max(SILENCE_TIMEOUT_S, MAX_MISSED_MESSAGES / sensor.rate_hz)
 
 
-def _count_facts(title: str, count: ReportedCount, now: float) -> Iterable[HealthFact]:
+def _count_items(title: str, count: ReportedCount, now: float) -> Iterable[HealthItem]:
     if count.is_growing(now):
-        yield HealthFact(title, "warn", _("{count} so far; see its log").format(count=count.value))
+        yield HealthItem(title, "warn", _("{count} so far; see its log").format(count=count.value))
     elif count.value:
-        yield HealthFact(title, "off", _("{count} since it started").format(count=count.value))
+        yield HealthItem(title, "off", _("{count} since it started").format(count=count.value))
 
 
-def _watchdog_fact(link: RobotLink) -> HealthFact:
+def _watchdog_item(link: RobotLink) -> HealthItem:
     after = link.robot.safe_stop.watchdog_s
     if after is None:
-        return HealthFact(LEFT_ALONE, "off", _("keeps moving; stay near its power switch"))
-    return HealthFact(LEFT_ALONE, "ok", _("stops by itself after {seconds} s").format(seconds=number(after)))
+        return HealthItem(LEFT_ALONE, "off", _("keeps moving; stay near its power switch"))
+    return HealthItem(LEFT_ALONE, "ok", _("stops by itself after {seconds} s").format(seconds=number(after)))
 
 
-def _heartbeat_fact(link: RobotLink) -> Iterable[HealthFact]:
-    every = link.robot.beat_s
+def _heartbeat_items(link: RobotLink) -> Iterable[HealthItem]:
+    every = link.robot.heartbeat_interval_s
     if every is not None:
-        yield HealthFact(
+        yield HealthItem(
             SIGN_OF_LIFE, "ok", _("every {seconds} s during actions").format(seconds=number(every))
         )
     elif link.robot.dialect == "native":
-        yield HealthFact(SIGN_OF_LIFE, "off", _("none during actions"))
+        yield HealthItem(SIGN_OF_LIFE, "off", _("none during actions"))

@@ -11,7 +11,7 @@ from app.core.storage.settings import ListSettings
 from app.errors import SettingsError
 from app.robots.description.description import Robot
 
-KEY = "robots.known"
+SETTING_KEY = "robots.known"
 MAX_ROBOTS = 24
 
 Entry = Mapping[str, object]
@@ -26,7 +26,7 @@ class KnownRobot:
     """
 
     name: str
-    seen_s: float
+    last_connected_s: float
 
 
 class KnownRobots:
@@ -41,9 +41,9 @@ class KnownRobots:
     @property
     def robots(self) -> tuple[KnownRobot, ...]:
         """All known robots, most recently connected first; invalid entries are skipped."""
-        entries: list[Entry] = self._settings.get(KEY, []) if self._settings is not None else []
+        entries: list[Entry] = self._settings.get(SETTING_KEY, []) if self._settings is not None else []
         found = {robot.name: robot for robot in map(_parse_robot, entries) if robot is not None}
-        return tuple(sorted(found.values(), key=lambda robot: -robot.seen_s))
+        return tuple(sorted(found.values(), key=lambda robot: -robot.last_connected_s))
 
     def record(self, robots: Sequence[Robot]) -> None:
         """Save the current time as the time of the last connection of these robots."""
@@ -60,10 +60,10 @@ class KnownRobots:
     def _save(self, robots: Sequence[KnownRobot]) -> None:
         if self._settings is None:
             return
-        entries = [{"name": robot.name, "seen_s": robot.seen_s} for robot in robots[:MAX_ROBOTS]]
+        entries = [{"name": robot.name, "seen_s": robot.last_connected_s} for robot in robots[:MAX_ROBOTS]]
         # Only an entry of a list is lost, and saving other settings alerts problems of the same file.
         with contextlib.suppress(SettingsError):
-            self._settings.set(KEY, entries)
+            self._settings.set(SETTING_KEY, entries)
 
 
 def _parse_robot(told: object) -> KnownRobot | None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Protocol
 
-from app.core.robots.launcher import VIRTUAL_ROBOTS
+from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
 
@@ -45,7 +45,7 @@ class LastRobots:
             return
         kept: Mapping[str, object] = self._settings.get(KEPT, {})
         for name, model in list(kept.items())[:MAX_ROBOTS]:
-            if name and isinstance(model, str) and model in VIRTUAL_ROBOTS:
+            if name and isinstance(model, str) and model in VIRTUAL_ROBOT_MODULES:
                 launcher.start_virtual_robot(name, model)
 
     def save(self, launcher: RobotStarter) -> None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import IO, Protocol
 
 from app.core.faults import CONSOLE_EXTRA
-from app.core.network.master import MasterStart
+from app.core.network.master import MasterStarter
 from app.core.own_process import module_command
 from app.core.reports.crash import crash_extra, exit_text, is_crash, split_trace
 from app.robots.identity import Identity
@@ -23,13 +23,13 @@ from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
 from nep.system.addresses import is_loopback
 
-END_TIMEOUT_S = 2.0
-VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
+EXIT_TIMEOUT_S = 2.0
+VIRTUAL_ROBOT_MODULES = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
 """Name of the module that implements a virtual robot, by model."""
 TAIL_BYTES, TAIL_LETTERS = 100_000, 2000
 FIRST_GRAPH_TIMEOUT_S = 3.0
 """Time in seconds that a start request waits for the first graph, which may already contain the robot."""
-STARTING_S = 30.0
+STARTUP_TIMEOUT_S = 30.0
 """Time in seconds during which a started robot counts as starting; slow computers need that long."""
 REQUEST_LIFETIME_S = 4.0
 """Lifetime in seconds of a start request while a robot with the same name is listed.
@@ -38,7 +38,7 @@ The exit of that robot may be detected as late as 3.3 s afterwards.
 """
 
 MODULE_FLAGS = ("-m", "--module")
-MAX_KNOWN = 1000
+MAX_CACHED_PROCESSES = 1000
 
 _log = logging.getLogger("studio.launcher")
 
@@ -60,7 +60,7 @@ class LaunchFailed:
         detail: Last lines of the output, or the reason why the process could not be started.
     """
 
-    what: str
+    name: str
     message: str
     detail: str
     is_robot: bool = True
@@ -137,7 +137,7 @@ class Launcher:
         sentence = (
             _("The master can't be started.") if is_loopback(address) else _("The master doesn't respond.")
         )
-        self._master = MasterStart(
+        self._master = MasterStarter(
             address, lambda why: post_event(LaunchFailed("master", sentence, why, False))
         )
 
@@ -186,11 +186,11 @@ class Launcher:
         """
         now = self._clock()
         self.wanted[name] = model
-        self._starting[name] = now + STARTING_S
+        self._starting[name] = now + STARTUP_TIMEOUT_S
         self._requests[name] = _StartRequest(model, now + FIRST_GRAPH_TIMEOUT_S, now + REQUEST_LIFETIME_S)
-        self.start_requested()
+        self.start_requested_robots()
 
-    def start_requested(self) -> None:
+    def start_requested_robots(self) -> None:
         """Start the requested robots that are not listed. Called at each tick of the session."""
         if not self._requests:
             return
@@ -212,7 +212,7 @@ class Launcher:
                 return
             log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  open while the process writes
             command = [
-                *module_command(VIRTUAL_ROBOTS[model]),
+                *module_command(VIRTUAL_ROBOT_MODULES[model]),
                 "--name",
                 name,
                 "--owner-pid",
@@ -243,7 +243,7 @@ class Launcher:
             held[0].kill()
             held[0].wait()
             held[1].close()
-        self._starting[name] = self._clock() + STARTING_S
+        self._starting[name] = self._clock() + STARTUP_TIMEOUT_S
         self._start_robot(name, model)
 
     def stop_virtual_robot(self, name: str) -> None:
@@ -270,7 +270,7 @@ class Launcher:
                 _process, log = self._robots.pop(name)
                 self.ended |= {name}
                 self._starting.pop(name, None)
-                output, trace = split_trace(_tail(log))
+                output, trace = split_trace(_read_tail(log))
                 if is_crash(code):
                     how = f"the process of a virtual robot {exit_text(code)}"
                     _log.error(
@@ -299,7 +299,7 @@ class Launcher:
 def _terminate(process: Process) -> None:
     process.terminate()
     try:
-        process.wait(timeout=END_TIMEOUT_S)
+        process.wait(timeout=EXIT_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
@@ -312,7 +312,7 @@ def _exit_reason(code: int) -> str:
     return _("No reason was reported (exit code {code}).").format(code=code)
 
 
-def _tail(log: IO[bytes]) -> str:
+def _read_tail(log: IO[bytes]) -> str:
     log.seek(0, os.SEEK_END)
     log.seek(max(0, log.tell() - TAIL_BYTES))
     return log.read().decode("utf-8", "replace").strip()
@@ -338,7 +338,7 @@ class VirtualProcesses:
         if identity.pid == os.getpid():
             return True
         if identity not in self._known:
-            if len(self._known) >= MAX_KNOWN:
+            if len(self._known) >= MAX_CACHED_PROCESSES:
                 self._known.clear()
             self._known[identity] = self._is_own_process(identity.pid)
         return self._known[identity]

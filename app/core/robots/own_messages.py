@@ -13,7 +13,7 @@ from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
 
-class OwnMessages:
+class OwnMessageFilter:
     """Filter that drops messages not sent by the robot's own program.
 
     Not thread-safe; use it from the main thread.
@@ -56,7 +56,7 @@ class OwnMessages:
 
         This applies if the robot's own program publishes on the topic.
         """
-        return {robot.topics.answer, *topics_of(robot)}
+        return {robot.topics.reply, *topics_of(robot)}
 
     def other_programs(self, name: str) -> list[Identity]:
         """Return other programs that receive the robot's commands and publish replies.
@@ -90,10 +90,10 @@ class OwnMessages:
 
     @staticmethod
     def _serving_nodes(link: RobotLink, view: GraphView) -> list[str]:
-        answering = publisher_nodes(view, link.robot.topics.answer)
+        answering = publisher_nodes(view, link.robot.topics.reply)
         return [node for node in subscriber_nodes(view, link.robot.topics.command) if node in answering]
 
-    def is_from(self, link: RobotLink, message: Message) -> bool | None:
+    def is_from_robot(self, link: RobotLink, message: Message) -> bool | None:
         """Return True if the robot's own program sent a message; None while the sender is unknown.
 
         Programs of RIZE can't be distinguished: the result is True for every subscriber of the robot's
@@ -108,7 +108,7 @@ class OwnMessages:
             return is_gateway or node in subscriber_nodes(self.view, link.robot.topics.command)
         return None if node is None or link.identity is None else node == link.identity.node_id
 
-    def newest(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
+    def newest_payload(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
         """Return the payload of the newest valid message; None if there is none.
 
         If the robot's own program publishes the topic, messages of other programs are ignored.
@@ -122,13 +122,13 @@ class OwnMessages:
             return None
         own = link.identity.node_id if link.identity is not None else ""
         if own not in publisher_nodes(self.view, topic):
-            return mapping_of(batch.messages[-1])
+            return decode_mapping(batch.messages[-1])
         found = (message for message in reversed(batch.messages) if self._senders.node_of(message) == own)
         newest = next(found, None)
-        return None if newest is None else mapping_of(newest)
+        return None if newest is None else decode_mapping(newest)
 
 
-def mapping_of(message: Message) -> Payload | None:
+def decode_mapping(message: Message) -> Payload | None:
     """Return the payload of a message; None if it can't be decoded or is not a mapping."""
     try:
         value = message.payload

@@ -20,7 +20,7 @@ class ReportedCount:
     """
 
     value: int = 0
-    grew_s: float | None = None
+    last_increase_s: float | None = None
 
     def update(self, reported: object, now_s: float) -> None:
         """Apply a reported value. Anything other than an integer from 0 to `MAX_COUNT` is ignored.
@@ -30,9 +30,13 @@ class ReportedCount:
         if type(reported) is not int or not 0 <= reported <= MAX_COUNT:
             return
         if reported > self.value:
-            self.grew_s = now_s
+            self.last_increase_s = now_s
         self.value = reported
 
     def is_growing(self, now_s: float) -> bool:
         """Return True if the counter has increased in the last `GROWTH_WINDOW_S` seconds."""
-        return self.value > 0 and self.grew_s is not None and now_s - self.grew_s < GROWTH_WINDOW_S
+        return (
+            self.value > 0
+            and self.last_increase_s is not None
+            and now_s - self.last_increase_s < GROWTH_WINDOW_S
+        )

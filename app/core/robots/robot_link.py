@@ -58,11 +58,11 @@ class Invocation:
     started_s: float = 0.0
     ended_s: float | None = None
     clock: Callable[[], float] = time.monotonic
-    given: Payload = field(default_factory=dict)
+    input: Payload = field(default_factory=dict)
     timeout_s: float | None = None
     execution_start_s: float | None = None
-    waits_for: tuple[str, ...] = ()
-    replaces: tuple[str, ...] = ()
+    awaited_actions: tuple[str, ...] = ()
+    replaced_actions: tuple[str, ...] = ()
     sent_at_s: float = 0.0
 
     @property
@@ -112,36 +112,36 @@ class RobotLink:
     name: str
     robot: Robot
     is_connected: bool = True
-    silent: str | None = None
+    silence_reason: str | None = None
     values: dict[str, object] = field(default_factory=dict)
     drawing: Payload | None = None
     invocations: dict[str, Invocation] = field(default_factory=dict)
     past_invocations: deque[Invocation] = field(default_factory=lambda: deque(maxlen=MAX_PAST_INVOCATIONS))
     is_unresponsive: bool = False
     last_contact_s: float = 0.0
-    replied_s: float | None = None
+    last_reply_s: float | None = None
     gone_s: float | None = None
     last_stop: str | None = None
     last_stop_status: str = "error"
     stop_problem: str = ""
     unended_actions: str = ""
     motion_warning: str = ""
-    has_proven_stop: bool = False
-    stop_began_s: float | None = None
+    has_confirmed_stop: bool = False
+    pending_stop_start_s: float | None = None
     is_stopping: bool = False
     is_reachable: bool = True
     identity: Identity | None = None
-    topics_before: tuple[RobotTopics, ...] = ()
+    earlier_topics: tuple[RobotTopics, ...] = ()
     is_opening: bool = False
     rejected: ReportedCount = field(default_factory=ReportedCount)
     errors: ReportedCount = field(default_factory=ReportedCount)
     was_real: bool = False
     publisher: Publisher | None = None
-    world: Publisher | None = None
+    world_publisher: Publisher | None = None
     watch: Watch | None = None
 
     @property
-    def virtual(self) -> bool:
+    def is_virtual(self) -> bool:
         """True if the robot is simulated on this computer."""
         return self.robot.virtual
 
@@ -165,12 +165,12 @@ class RobotLink:
             return "away"
         if not self.is_reachable:
             return CONNECTING
-        if self.silent is not None or self.is_unresponsive:
+        if self.silence_reason is not None or self.is_unresponsive:
             return "silent"
-        return "busy" if self.running else "ready"
+        return "busy" if self.running_invocations else "ready"
 
     @property
-    def running(self) -> tuple[Invocation, ...]:
+    def running_invocations(self) -> tuple[Invocation, ...]:
         """Invocations that have not ended."""
         known = {
             invocation.id: invocation for invocation in (*self.past_invocations, *self.invocations.values())
@@ -190,14 +190,16 @@ class RobotLink:
         ):
             return _("may still move")
         if self.is_connected and state == "silent":
-            return _("not responding") if self.is_unresponsive else self.silent or _(STATE_LABELS[state])
+            return (
+                _("not responding") if self.is_unresponsive else self.silence_reason or _(STATE_LABELS[state])
+            )
         return _(STATE_LABELS[state])
 
     @property
     def chip_text(self) -> str:
         """Text of the robot's chip, such as "virtual, ready"."""
         words = self.state_label
-        return _("virtual, {state}").format(state=words) if self.virtual else words
+        return _("virtual, {state}").format(state=words) if self.is_virtual else words
 
 
 def excess_disconnected(links: Iterable[RobotLink], in_use: Collection[str]) -> Sequence[RobotLink]:
@@ -214,11 +216,11 @@ def excess_disconnected(links: Iterable[RobotLink], in_use: Collection[str]) -> 
     away = [
         link
         for link in links
-        if not (link.is_connected or link.has_proven_stop or link.stop_problem or link.name in in_use)
-        and link.stop_began_s is None
+        if not (link.is_connected or link.has_confirmed_stop or link.stop_problem or link.name in in_use)
+        and link.pending_stop_start_s is None
     ]
     excess = max(0, len(away) - MAX_DISCONNECTED)
-    return sorted(away, key=lambda link: (link.replied_s is not None, link.gone_s or 0.0))[:excess]
+    return sorted(away, key=lambda link: (link.last_reply_s is not None, link.gone_s or 0.0))[:excess]
 
 
 def topics_of(robot: Robot) -> list[str]:

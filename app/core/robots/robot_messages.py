@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from app.core.network.mailbox import Batch
-from app.core.robots.own_messages import OwnMessages, mapping_of
+from app.core.robots.own_messages import OwnMessageFilter, decode_mapping
 from app.core.robots.robot_link import FINAL_STATES, Payload, RobotLink
 from app.core.robots.stop.moved_robots import MovedRobots
 from app.core.robots.tries import ManualInvocations
 from app.robots import rize
-from app.robots.held_messages import HeldMessages
+from app.robots.held_messages import PendingMessages
 from app.robots.identity import is_may_move_error, safe_error_text, stop_error_text
 from nep.i18n import _
 from nep.messages.message import Message
 
-MAX_HELD = 64
+MAX_HELD_MESSAGES = 64
 """Maximum number of replies stored for each publisher that the graph does not list yet."""
 
 
@@ -27,10 +27,10 @@ class RobotMessages:
     """
 
     def __init__(
-        self, own: OwnMessages, tries: ManualInvocations, moved: MovedRobots, clock: Callable[[], float]
+        self, own: OwnMessageFilter, tries: ManualInvocations, moved: MovedRobots, clock: Callable[[], float]
     ) -> None:
         self._own, self._tries, self._moved, self._clock = own, tries, moved, clock
-        self._held: dict[str, HeldMessages] = {}
+        self._held: dict[str, PendingMessages] = {}
         self._settled: dict[str, None] = {}
 
     def read(self, link: RobotLink, batches: Mapping[str, Batch]) -> None:
@@ -40,29 +40,31 @@ class RobotMessages:
             link: State of the robot.
             batches: New messages, by topic.
         """
-        answers = batches.get(link.robot.topics.answer)
+        answers = batches.get(link.robot.topics.reply)
         for message in answers.messages if answers is not None else ():
-            is_own = self._own.is_from(link, message)
+            is_own = self._own.is_from_robot(link, message)
             if is_own:
                 self._apply_reply(link, message)
             elif is_own is None:
-                self._held.setdefault(link.name, HeldMessages(per_publisher=MAX_HELD)).add(message)
+                self._held.setdefault(link.name, PendingMessages(per_publisher=MAX_HELD_MESSAGES)).add(
+                    message
+                )
         for sensor in link.robot.sensors:
             if sensor.is_image:
                 continue
-            value = self._own.newest(link, batches.get(sensor.topic), sensor.topic)
+            value = self._own.newest_payload(link, batches.get(sensor.topic), sensor.topic)
             if value is not None:
                 link.values[sensor.name] = value.get("value", value)
         topic = link.robot.topics.state or ""
-        link.drawing = self._own.newest(link, batches.get(topic), topic) or link.drawing
+        link.drawing = self._own.newest_payload(link, batches.get(topic), topic) or link.drawing
 
-    def apply_held(self, links: Mapping[str, RobotLink]) -> None:
+    def apply_held_replies(self, links: Mapping[str, RobotLink]) -> None:
         """Apply the stored replies whose publishers the new graph lists; discard all others."""
         held, self._held = self._held, {}
         for name, messages in held.items():
             link = links.get(name)
             for message in messages.pop_all() if link is not None else ():
-                if link is not None and self._own.is_from(link, message):
+                if link is not None and self._own.is_from_robot(link, message):
                     self._apply_reply(link, message)
 
     def discard(self, name: str) -> None:
@@ -75,7 +77,7 @@ class RobotMessages:
         return settled
 
     def _apply_reply(self, link: RobotLink, message: Message) -> None:
-        answer = mapping_of(message)
+        answer = decode_mapping(message)
         if answer is not None and link.robot.dialect == "rize":
             answer = rize.from_reply(answer)
         if answer is not None:

@@ -22,7 +22,7 @@ from nep.protocol.graph_view import GraphView
 SETTING_KEY = "room"
 SAVE_DELAY_S = 1.0
 """Time in seconds without changes after which the room is saved."""
-SHARING_FAILED = lazy("can't share the room of the virtual robots: {error}")
+SHARING_FAILED_MESSAGE = lazy("can't share the room of the virtual robots: {error}")
 
 
 class SessionRoom:
@@ -96,7 +96,7 @@ class SessionRoom:
 
     def reset(self) -> None:
         """Reset the room to its initial state."""
-        self._map.restore_start()
+        self._map.reset()
         self._publish()
 
     # -- input from the session -----------------------------------------------------------------------
@@ -107,10 +107,10 @@ class SessionRoom:
             return
         self._watch = self._watches.open([TOPIC])
 
-        def open_it(node: Node) -> None:
+        def open_job(node: Node) -> None:
             self._publisher = node.new_pub(TOPIC, "json", latched=True)
 
-        self._submit(SHARING_FAILED, open_it)
+        self._submit(SHARING_FAILED_MESSAGE, open_job)
         self._published_revision = -1  # the robots don't know the saved room
 
     def add_messages(self, batches: Mapping[str, Batch]) -> None:

@@ -47,14 +47,14 @@ class ManualInvocations:
             action.name,
             started_s=self._clock(),
             clock=self._clock,
-            given=dict(input),
+            input=dict(input),
             timeout_s=action.timeout_s,
             sent_at_s=self._wall(),
         )
         link.invocations[action.name] = invocation
         link.past_invocations.append(invocation)
         link.last_contact_s = self._clock()
-        if not self._send(link, command_of(link.robot, invocation, input)):
+        if not self._send(link, create_command(link.robot, invocation, input)):
             self._end(
                 link,
                 invocation,
@@ -71,9 +71,9 @@ class ManualInvocations:
 
     def apply_reply(self, link: RobotLink, answer: Payload) -> None:
         """Apply a reply of the robot. A reply to another program only shows that the robot is responding."""
-        link.last_contact_s = link.replied_s = self._clock()
+        link.last_contact_s = link.last_reply_s = self._clock()
         link.is_unresponsive = False
-        for invocation in link.running:
+        for invocation in link.running_invocations:
             if invocation.id != answer.get("id") or answer.get("op") not in (None, "invoke"):
                 continue
             self._apply(link, invocation, answer)
@@ -88,9 +88,9 @@ class ManualInvocations:
         if "output" in answer:
             made.output = _object(answer["output"]) or made.output
         if "waits_for" in answer:
-            made.waits_for = _names(answer["waits_for"]) or made.waits_for
+            made.awaited_actions = _names(answer["waits_for"]) or made.awaited_actions
         if "replaces" in answer:
-            made.replaces = _names(answer["replaces"]) or made.replaces
+            made.replaced_actions = _names(answer["replaces"]) or made.replaced_actions
         error = answer.get("error")
         if state in FINAL_STATES:
             self._end(link, made, state, safe_error_text(error) if error else None)
@@ -103,7 +103,7 @@ class ManualInvocations:
         """Cancel invocations that exceed their time limit or whose robot doesn't respond; they failed."""
         now = self._clock()
         for link in links:
-            for invocation in link.running:
+            for invocation in link.running_invocations:
                 self._check_invocation(link, invocation, now)
 
     def _check_invocation(self, link: RobotLink, made: Invocation, now: float) -> None:
@@ -116,7 +116,11 @@ class ManualInvocations:
                     _("{robot} isn't responding. Check that it is switched on.").format(robot=link.name),
                 )
             return
-        silence = max(MIN_SILENCE_S, MAX_MISSED_HEARTBEATS * robot.beat_s) if robot.beat_s else None
+        silence = (
+            max(MIN_SILENCE_S, MAX_MISSED_HEARTBEATS * robot.heartbeat_interval_s)
+            if robot.heartbeat_interval_s
+            else None
+        )
         if silence is not None and now - link.last_contact_s > silence:
             error = _(
                 "{robot} stopped responding. Check that it is switched on, or press Stop to stop it."
@@ -149,12 +153,12 @@ class ManualInvocations:
             state: Final state of the invocations.
             error: Error message of the invocations, or None.
         """
-        for invocation in link.running:
+        for invocation in link.running_invocations:
             self._end(link, invocation, state, error)
 
     def _end(self, link: RobotLink, made: Invocation, state: str, error: str | None) -> None:
         made.state, made.error, made.ended_s = state, error, self._clock()
-        if not link.running:
+        if not link.running_invocations:
             self._rest(link.name)
 
     def _send_cancel(self, link: RobotLink, made: Invocation) -> None:
@@ -162,7 +166,7 @@ class ManualInvocations:
             self._send(link, {"id": made.id, "op": "cancel", "from": SENDER, "action": made.action})
 
 
-def command_of(robot: Robot, made: Invocation, input: Payload) -> Payload:
+def create_command(robot: Robot, made: Invocation, input: Payload) -> Payload:
     """Return the message that invokes an action of a robot.
 
     Args:

@@ -23,7 +23,7 @@ FINISHED_RATIO = 0.9
 
 Less than 1, because the voice may be slower than the speech bubble.
 """
-MAX_WAITING = 4
+MAX_QUEUED = 4
 PATIENCE_S, PATIENCE_PER_LETTER_S = 10.0, 0.2
 """Time limit of a voice (base, and for each letter), after which the speech engine counts as hung."""
 MAX_NOTES, MAX_S = 32, 10.0
@@ -100,7 +100,7 @@ class RobotSound:
     spoken_fraction: float = 0.0
     language: str = "en"
     volume: float = 0.6
-    sound: int = 0
+    sound_number: int = 0
     played_fraction: float = 0.0
     notes: Notes = ()
 
@@ -115,7 +115,7 @@ class RobotSound:
             spoken_fraction=_fraction(drawing.get("spoken")),
             language=str(drawing.get("language") or "en"),
             volume=_fraction(drawing.get("volume"), 60.0, 100.0),
-            sound=number if isinstance(number, int) else 0,
+            sound_number=number if isinstance(number, int) else 0,
             played_fraction=_fraction(played.get("played")),
             notes=_notes(played.get("notes")),
         )
@@ -203,7 +203,13 @@ class RobotVoices:
             and (now.speech != before.speech or now.spoken_fraction < before.spoken_fraction)
         ):
             self._enqueue(Utterance(name, now.speech, now.language, now.volume))
-        if now.notes and is_heard and not first and now.sound != before.sound and self.speaker is not None:
+        if (
+            now.notes
+            and is_heard
+            and not first
+            and now.sound_number != before.sound_number
+            and self.speaker is not None
+        ):
             self._playing_robot = name
             self.speaker.play(now.notes, now.volume)
 
@@ -225,7 +231,7 @@ class RobotVoices:
             self.speaker.play((), 0.0)
 
     def _enqueue(self, said: Utterance) -> None:
-        if len(self._waiting) >= MAX_WAITING:
+        if len(self._waiting) >= MAX_QUEUED:
             lost = self._waiting.popleft()
             words = _("“{words}” was shown but not spoken: too many texts were waiting").format(
                 words=lost.text
@@ -260,7 +266,7 @@ class RobotVoices:
 
 
 def _is_audible(link: RobotLink) -> bool:
-    return link.virtual and not link.is_unresponsive
+    return link.is_virtual and not link.is_unresponsive
 
 
 def _fraction(value: object, default: float = 0.0, whole: float = 1.0) -> float:

@@ -35,7 +35,7 @@ class OpenQuestion:
         """Discard the question of the previous program and connect to a new one."""
         self.question, self._runner = None, runner
 
-    def apply(self, event: RunnerEvent) -> None:
+    def on_event(self, event: RunnerEvent) -> None:
         """Apply an event that asks a question or withdraws one; other events are ignored."""
         if event.kind == "ask" and self._runner is not None:
             number = event.question

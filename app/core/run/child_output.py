@@ -8,16 +8,16 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import IO
 
 MAX_LINE_LENGTH = 1_000_000
-CHUNK = 65_536
+CHUNK_BYTES = 65_536
 PROTOCOL_PREFIX = b'{"is"'
 """First bytes of each line of the protocol. Other output is counted but not parsed."""
-LINES_PER_S = 1_000
-BYTES_PER_S = 20_000_000
-PAUSE_S = 0.02
+MAX_LINES_PER_S = 1_000
+MAX_BYTES_PER_S = 20_000_000
+THROTTLE_PAUSE_S = 0.02
 MAX_TEXT_LENGTH = 2_000
 
 
-class Output:
+class OutputReader:
     """Iterator over the lines of a pipe. Limits the rate, so that the window remains responsive.
 
     A process that writes faster blocks.
@@ -68,7 +68,7 @@ class Output:
 
     def _read(self) -> bytes:
         try:
-            return self._stream.read1(CHUNK)  # type: ignore[attr-defined, no-any-return]  # a buffered reader
+            return self._stream.read1(CHUNK_BYTES)  # type: ignore[attr-defined, no-any-return]  # a buffered reader
         except (OSError, ValueError):
             return b""
 
@@ -79,8 +79,8 @@ class Output:
             self._second, self._lines, self._bytes = now, 0, 0
         self._lines += lines
         self._bytes += read
-        if self._lines > LINES_PER_S or self._bytes > BYTES_PER_S:
-            self._stopped.wait(PAUSE_S)
+        if self._lines > MAX_LINES_PER_S or self._bytes > MAX_BYTES_PER_S:
+            self._stopped.wait(THROTTLE_PAUSE_S)
 
 
 class RateLimiter:
@@ -91,7 +91,7 @@ class RateLimiter:
         self._second, self._passed = clock(), 0
         self.kept_back = 0
 
-    def passes(self) -> bool:
+    def try_acquire(self) -> bool:
         """Return True if another item may pass now; otherwise count the item as rejected."""
         now = self._clock()
         if now - self._second >= 1.0:
@@ -110,7 +110,7 @@ class RateLimiter:
         return count
 
 
-def texts(said: object) -> tuple[str, ...]:
+def parse_texts(said: object) -> tuple[str, ...]:
     """Return the items of a list as strings; empty if the value is not a list."""
     return tuple(str(each) for each in said) if isinstance(said, (list, tuple)) else ()
 

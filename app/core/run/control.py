@@ -18,7 +18,7 @@ from app.core.console import Console
 from app.core.documents.document import Document
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion.permission import actions_by_robot
-from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopDone, StopReport
+from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopCompleted, StopReport
 from app.core.robots.stop.stopper import STOP_TIMEOUT_S as STOP_TIMEOUT_S
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.asking import OpenQuestion
@@ -41,9 +41,9 @@ from app.core.run.wanted import OpenBehaviours, RequestedRun
 from app.errors import AppError
 from nep.i18n import _
 
-DOUBLE_CLICK_S = 0.5
+DOUBLE_CLICK_INTERVAL_S = 0.5
 """Maximum time in seconds between two clicks on Run that count as a double click."""
-CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
+CLOSE_TIMEOUT_S = STOP_TIMEOUT_S + 1
 
 _log = logging.getLogger("studio")
 
@@ -191,13 +191,13 @@ class Runs:
         run = self._run
         if run.state == "paused":
             self.resume()
-        elif run.state != "running" or self._clock() - run.started_s >= DOUBLE_CLICK_S:
-            self._request(RequestedRun(self._documents.current))
+        elif run.state != "running" or self._clock() - run.started_s >= DOUBLE_CLICK_INTERVAL_S:
+            self._request_run(RequestedRun(self._documents.current))
 
     def restart(self) -> None:
         """Restart the running or paused behaviour with its current blocks."""
         if self.active and self._current_request is not None:
-            self._request(replace(self._current_request, paused=False))
+            self._request_run(replace(self._current_request, starts_paused=False))
 
     def try_stack(self, stack: Stack) -> None:
         """Stop a running program, and run one stack of the current behaviour."""
@@ -207,8 +207,8 @@ class Runs:
             return
         wanted, run = RequestedRun(self._documents.current, stack=stack), self._run
         again = self.active and self._current_request == wanted
-        if not again or self._clock() - run.started_s >= DOUBLE_CLICK_S:
-            self._request(wanted)
+        if not again or self._clock() - run.started_s >= DOUBLE_CLICK_INTERVAL_S:
+            self._request_run(wanted)
 
     def _show_variable(self, stack: Stack, id: str) -> None:
         # A new program would lack the value of the current or last run.
@@ -222,7 +222,7 @@ class Runs:
             self._pending_request is not None and self._pending_request.document is document
         )
 
-    def _request(self, wanted: RequestedRun) -> None:
+    def _request_run(self, wanted: RequestedRun) -> None:
         # Runs once the running program has stopped and its robots are proven to have stopped.
         if self._run.state in {"ready", "proven"}:
             self._start(wanted)
@@ -239,7 +239,7 @@ class Runs:
         A running program is paused.
         """
         if self._run.state in {"ready", "proven"}:
-            self._start(RequestedRun(self._documents.current, paused=True))
+            self._start(RequestedRun(self._documents.current, starts_paused=True))
         elif self._run.state == "running":
             self.pause()
         elif self._run.state == "paused" and self._runner is not None:
@@ -269,9 +269,9 @@ class Runs:
         run = self._run
         if run.state == "paused" and self._runner is not None:
             self._runner.resume()
-            held_s = 0.0 if run.pause_began_s is None else self._clock() - run.pause_began_s
+            held_s = 0.0 if run.pause_start_s is None else self._clock() - run.pause_start_s
             self._run = replace(
-                self._run, state="running", paused_s=run.paused_s + held_s, pause_began_s=None
+                self._run, state="running", paused_s=run.paused_s + held_s, pause_start_s=None
             )
             self._mark_blocks(stopped=())
 
@@ -343,16 +343,16 @@ class Runs:
         if self._runner is not None:
             self._runner.stop()
         if self._stop_thread is not None:
-            self._stop_thread.join(timeout=CLOSE_WAIT_S)
+            self._stop_thread.join(timeout=CLOSE_TIMEOUT_S)
 
     # -- input from the session --------------------------------------------------------------------------
 
-    def on_runner(self, event: RunnerEvent) -> None:
+    def on_runner_event(self, event: RunnerEvent) -> None:
         """Apply an event of the program's process. Events of earlier runs are ignored."""
         if self._runner is None or event.run != self._runner.run:
             return
         run = self._mark_started(event)
-        self.asking.apply(event)
+        self.asking.on_event(event)
         match event.kind:
             case "running" if run.state in {"running", "paused"}:
                 if event.description and event.description != run.description:
@@ -364,7 +364,7 @@ class Runs:
                     self._run,
                     state="paused",
                     paused_at=block_label(event.description, event.blocks, self._labels),
-                    pause_began_s=run.pause_began_s or self._clock(),
+                    pause_start_s=run.pause_start_s or self._clock(),
                     warning=event.text,
                 )
                 self._mark_blocks(stopped=event.blocks)
@@ -386,7 +386,7 @@ class Runs:
             self._run = replace(self._run, is_started=True, started_s=self._clock())
         return self._run
 
-    def on_stop(self, event: StopDone | RobotReplied | RobotStopped | LateReply) -> None:
+    def on_stop(self, event: StopCompleted | RobotReplied | RobotStopped | LateReply) -> None:
         """Handle an event of a Stop: a reply, a late reply or the result.
 
         Replies to earlier Stops are ignored.
@@ -409,8 +409,8 @@ class Runs:
 
     def _apply_report(self, report: StopReport) -> None:
         # State first, sentences later: an error in formatting must not leave it "stopping".
-        state = "unanswered" if report.unproven else "proven" if report.is_proven else "ready"
-        self._run = replace(self._run, state=state, report=report, last_status=report.status)
+        state = "unanswered" if report.unconfirmed_robots else "proven" if report.is_confirmed else "ready"
+        self._run = replace(self._run, state=state, report=report, last_stop_status=report.status)
         self._news.update_fleet(report, self._stop_mark)
         self._run = replace(
             self._run,
@@ -420,7 +420,7 @@ class Runs:
         )
         self._news.notify_user(report, self._run.name or "stop")
         wanted, self._pending_request = self._pending_request, None
-        if wanted is not None and not report.unproven:
+        if wanted is not None and not report.unconfirmed_robots:
             self._start(wanted)
 
     def _on_late_reply(self, event: LateReply) -> None:
@@ -429,7 +429,7 @@ class Runs:
         if event.number is None:
             self.on_stop(RobotStopped(StopReport((event.robot,), event.robot.elapsed_ms or 0.0), event.mark))
         elif event.number == self._stop_number and run.state == "unanswered" and run.report is not None:
-            self._apply_report(run.report.with_late(event.robot))
+            self._apply_report(run.report.with_late_reply(event.robot))
 
     # -- private -----------------------------------------------------------------------------------------
 
@@ -477,7 +477,7 @@ class Runs:
             [link.robot.source for link in self._fleet.connected],
             self._network.address,
             name=name,
-            paused=wanted.paused,
+            paused=wanted.starts_paused,
             pace_s=self.pace_s,
             owners=owners,
         )
@@ -486,7 +486,10 @@ class Runs:
     def _show_start(self, title: str, trying: str) -> None:
         run, before = RunState("running", title, is_started=False, tried_label=trying), self._run
         self._run = replace(
-            run, started_s=self._clock(), last_stop_text=before.last_stop_text, last_status=before.last_status
+            run,
+            started_s=self._clock(),
+            last_stop_text=before.last_stop_text,
+            last_stop_status=before.last_stop_status,
         )
         text = _("trying “{block}”").format(block=trying) if trying else _("started")
         self._console.add("info", self._run.name, text)
@@ -502,7 +505,7 @@ class Runs:
             self._run = RunState(
                 unrunnable_program=program,
                 last_stop_text=before.last_stop_text,
-                last_status=before.last_status,
+                last_stop_status=before.last_stop_status,
             )
         self._set_errors(wrong, not_started=True)
         return None
@@ -547,16 +550,16 @@ class Runs:
         now, elapsed_s = self._clock(), run.elapsed_s
         if self.active:
             elapsed_s = run.elapsed(now)
-            self._warnings.end()
+            self._warnings.log_final_counts()
         elif run.state not in {"stopping", "unanswered"}:
             elapsed_s = None
         # includes robots that have not replied to an earlier Stop, whose report is discarded
-        wanted = self._fleet.stoppable if names is None else (*names, *self._fleet.unresponsive)
+        wanted = self._fleet.stoppable_robots if names is None else (*names, *self._fleet.unresponsive_robots)
         asked = tuple(dict.fromkeys((*wanted, *self._fleet.stopping_robots)))
         self._run = replace(
             self._run,
             state="stopping",
-            pressed_s=now,
+            stop_pressed_s=now,
             is_stop_repeated=run.state == "unanswered" or (run.state == "stopping" and run.is_stop_repeated),
             elapsed_s=elapsed_s,
             report=None,

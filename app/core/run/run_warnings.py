@@ -49,7 +49,7 @@ class RunWarnings:
         if count >= 10 * self._logged_counts.get(key, 0) or key not in self._logged_counts:
             self._log_count(key)
 
-    def end(self) -> None:
+    def log_final_counts(self) -> None:
         """Log the final number of occurrences of each warning."""
         for key, count in self._counts.items():
             if count != self._logged_counts[key]:

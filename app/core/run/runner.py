@@ -18,7 +18,7 @@ from app.blocks.model.program import Program
 from app.blocks.runtime.variables import VariableValue
 from app.core.faults import CONSOLE_EXTRA
 from app.core.reports.crash import crash_extra, exit_text, is_crash, split_trace
-from app.core.run.child_output import Output, RateLimiter, text_of, texts
+from app.core.run.child_output import OutputReader, RateLimiter, parse_texts, text_of
 from app.core.run.child_process import MAX_MEMORY_BYTES, ChildProcess, home
 from app.core.run.child_process import child_command as child_command
 from app.errors import RunnerError
@@ -36,13 +36,13 @@ STOP_GRACE_S = 0.04
 
 Stopping normally takes well below 100 ms in total.
 """
-END_TIMEOUT_S = 2.0
+EXIT_TIMEOUT_S = 2.0
 """Time in seconds after which a process is killed if it doesn't exit after its program has ended."""
 MEMORY_CHECK_INTERVAL_S = 0.1
 """Interval between memory checks in seconds."""
 PIPE_TIMEOUT_S = 0.5
 """Time in seconds that pipes may stay open after the process has exited, held by child processes."""
-EVENTS_PER_S = 300
+MAX_EVENTS_PER_S = 300
 MAX_BLOCKS = 100
 MAX_CHOICES, MAX_CHOICE_LENGTH = 12, 200
 MIN_REPORTED_BYTES = 10_000
@@ -50,7 +50,7 @@ MAX_ERROR_LENGTH = 100_000
 MAX_ERROR_LINES = 200
 """Number of stored lines of error output. A crash in native code writes the stack of each thread."""
 
-_runs = itertools.count(1)
+_run_numbers = itertools.count(1)
 _log = logging.getLogger("studio.runner")
 
 
@@ -104,7 +104,7 @@ class Runner:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         # `command` starts the child; the default is this Python or this frozen Studio.
-        self.run = next(_runs)
+        self.run = next(_run_numbers)
         self.program_key = uuid.uuid4().hex
         """Key of the program. A Stop that contains the key invalidates the program's commands; until then it
         is secret.
@@ -240,7 +240,7 @@ class Runner:
         self._commands.put(None)
         if not child.wait(STOP_GRACE_S):
             child.kill()
-            child.wait(END_TIMEOUT_S)
+            child.wait(EXIT_TIMEOUT_S)
 
     def wait(self, timeout_s: float | None = None) -> bool:
         """Wait until the program has ended and its last event was delivered; return False on timeout.
@@ -255,7 +255,7 @@ class Runner:
         self.stop()
         for thread in self._threads:
             if thread is not threading.current_thread():
-                thread.join(timeout=END_TIMEOUT_S)
+                thread.join(timeout=EXIT_TIMEOUT_S)
 
     # ---- private
 
@@ -276,8 +276,8 @@ class Runner:
         if child.popen.stdout is None:
             return
         output, gate = (
-            Output(child.popen.stdout, self._ended, self._clock),
-            RateLimiter(EVENTS_PER_S, self._clock),
+            OutputReader(child.popen.stdout, self._ended, self._clock),
+            RateLimiter(MAX_EVENTS_PER_S, self._clock),
         )
         for line in output:
             event = self._parse_event(line)
@@ -286,7 +286,7 @@ class Runner:
             elif event.kind == "ended":
                 self._last = event
                 break
-            elif event.kind in ("ready", "variables", "ask") or gate.passes():
+            elif event.kind in ("ready", "variables", "ask") or gate.try_acquire():
                 self._deliver(event, gate)
         self._report_dropped(gate.kept_back, output.strange_bytes)
         child.popen.stdout.close()
@@ -318,10 +318,10 @@ class Runner:
         while not child.has_ended and not self._output_over.wait(MEMORY_CHECK_INTERVAL_S):
             child.check()
         self._commands.put(None)  # closes its input, which ends a child that still waits for commands
-        hung = not child.wait(END_TIMEOUT_S)
+        hung = not child.wait(EXIT_TIMEOUT_S)
         if hung:
             child.kill()
-            child.wait(END_TIMEOUT_S)
+            child.wait(EXIT_TIMEOUT_S)
         child.kill_descendants()  # remaining children would hold its pipes open
         reader.join(timeout=PIPE_TIMEOUT_S)
         errors.join(timeout=PIPE_TIMEOUT_S)  # its last output
@@ -378,7 +378,10 @@ class Runner:
         kind = event.get("is")
         block = event.get("block")
         first = (block,) if isinstance(block, str) else ()
-        blocks = (*first, *(each for each in texts(event.get("blocks"))[:MAX_BLOCKS] if each not in first))
+        blocks = (
+            *first,
+            *(each for each in parse_texts(event.get("blocks"))[:MAX_BLOCKS] if each not in first),
+        )
         if kind == "ready":
             return RunnerEvent("ready", self.run)
         if kind in ("running", "paused"):
@@ -395,7 +398,9 @@ class Runner:
         if kind in ("print", "ask"):
             question = event.get("question")
             asked = question if isinstance(question, int) else 0
-            choices = tuple(each[:MAX_CHOICE_LENGTH] for each in texts(event.get("choices"))[:MAX_CHOICES])
+            choices = tuple(
+                each[:MAX_CHOICE_LENGTH] for each in parse_texts(event.get("choices"))[:MAX_CHOICES]
+            )
             return RunnerEvent(kind, self.run, text=text_of(event, "text"), question=asked, choices=choices)
         if kind == "variables":
             listed = event.get("values")
@@ -410,6 +415,6 @@ class Runner:
                 self.run,
                 is_ok=event.get("ok") is True,
                 elapsed_s=float(elapsed_s) if isinstance(elapsed_s, (int, float)) else self._elapsed(),
-                unresponsive_robots=texts(event.get("silent")),
+                unresponsive_robots=parse_texts(event.get("silent")),
             )
         return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.core.faults import log_errors
-from app.core.robots.stop.report import LateReply, RobotReplied, RobotStop, RobotStopped, StopDone
+from app.core.robots.stop.report import LateReply, RobotReplied, RobotStop, RobotStopped, StopCompleted
 from app.core.robots.stop.stopper import RobotStopper, stop_and_report
 from app.core.run.runner import Runner
 
@@ -51,7 +51,7 @@ def stop_program(
     report = stop_and_report(
         stopper, names, on_answer=on_reply, ends=ends, on_late=on_late_reply, is_for_all=is_for_all
     )
-    post_event(StopDone(number, report))
+    post_event(StopCompleted(number, report))
 
 
 def stop_robot(post_event: PostEvent, stopper: RobotStopper | None, name: str, mark: int) -> None:

@@ -8,7 +8,7 @@ from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.robots.fleet import Fleet
 from app.core.robots.stop.report import StopReport
-from app.core.run.view import STOP_AGAIN, clock_text, result_text, stop_text, unanswered_texts
+from app.core.run.view import STOP_AGAIN, clock_text, result_text, stop_text, unconfirmed_texts
 from nep.i18n import _
 
 
@@ -27,7 +27,9 @@ class StopReporter:
         """
         self._fleet.moved.apply_report(report, mark)
         clock = clock_text(time.localtime())
-        words = {name: (stop_text(each, clock), each.status) for name, each in report.by_name.items()}
+        words = {
+            name: (stop_text(each, clock), each.status) for name, each in report.results_by_robot.items()
+        }
         self._fleet.apply_stop(words, report)
 
     def motion_warnings(self, report: StopReport) -> tuple[str, ...]:
@@ -36,7 +38,7 @@ class StopReporter:
         The sentences state why a robot may be moving, and which robots receive the Stop once they are
         connected.
         """
-        pending = [name for name, robot in report.by_name.items() if robot.is_pending]
+        pending = [name for name, robot in report.results_by_robot.items() if robot.is_pending]
         motions = (self._fleet.moved.motion(name) for name in report.unconfirmed_names)
         return (
             *(motion.reason for motion in motions if motion is not None and motion.is_known),
@@ -53,7 +55,7 @@ class StopReporter:
             report: Result of the Stop.
             origin: Origin of the Console record.
         """
-        for name, program in report.strangers:
+        for name, program in report.impostors:
             sentence = _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored").format(
                 program=program, robot=name
             )
@@ -61,11 +63,11 @@ class StopReporter:
             detail = _("Find out what this program is, and close it.")
             self._alerts.raise_alert(f"stranger:{name}", "error", f"{sentence}.", detail)
         words = result_text(report)
-        if not report.unproven:
+        if not report.unconfirmed_robots:
             self._console.add("info", origin, words)
             self._alerts.resolve("stop")
         else:
-            title, detail, _compact, _confirm = unanswered_texts(report, self.motion_warnings(report))
+            title, detail, _compact, _confirm = unconfirmed_texts(report, self.motion_warnings(report))
             self._console.add("error", origin, f"{words}: {title}")
             self._alerts.raise_alert(
                 "stop", "error", f"{title}.", detail, button=_(STOP_AGAIN), action="run.stop"

@@ -12,7 +12,7 @@ from nep.i18n import _, format_list, lazy, ngettext, number
 MAX_NAMED = 4
 MAX_NAMES_LENGTH = 24
 """Maximum number of characters of robot names on the Stop button; longer names are shown only next to it."""
-APPLIES_LATER = lazy("Your changes take effect at the next run")
+APPLIES_LATER_HINT = lazy("Your changes take effect at the next run")
 NOTHING_TO_RUN_HINT = lazy("Drag “when started” from Events and put blocks below it")
 RUN, GO_ON, RESTART = lazy("Run"), lazy("Resume"), lazy("Restart")
 STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
@@ -48,9 +48,9 @@ class RunState:
     is_started: bool = True
     started_s: float = 0.0
     paused_s: float = 0.0
-    pause_began_s: float | None = None
+    pause_start_s: float | None = None
     elapsed_s: float | None = None
-    pressed_s: float = 0.0
+    stop_pressed_s: float = 0.0
     is_stop_repeated: bool = False
     is_restarting: bool = False
     is_edited: bool = False
@@ -66,14 +66,14 @@ class RunState:
         None  # the program that Run was pressed for, which had nothing to run, or `errors`
     )
     last_stop_text: str = ""
-    last_status: StopStatus = "off"
+    last_stop_status: StopStatus = "off"
     motion_warnings: tuple[str, ...] = ()
 
     def elapsed(self, now: float) -> float:
         """Return the running time in seconds at ``now``, without pauses."""
         held = self.paused_s
-        if self.pause_began_s is not None:
-            held += now - self.pause_began_s
+        if self.pause_start_s is not None:
+            held += now - self.pause_start_s
         return max(0.0, now - self.started_s - held)
 
 
@@ -95,7 +95,7 @@ class RunView:
     state: str
     title: str
     detail: str
-    compact: str
+    compact_text: str
     can_run: bool = False
     can_pause: bool = False
     can_step: bool = False
@@ -156,7 +156,7 @@ def _tried_view(view: RunView, run: RunState) -> RunView:
     # Of a tried block; Run is for the whole behaviour.
     if view.state == "running":
         title = _("Trying “{block}”").format(block=run.tried_label)
-        return replace(view, title=title, compact=title, run_label=RUN, is_edited=False)
+        return replace(view, title=title, compact_text=title, run_label=RUN, is_edited=False)
     if view.state == "proven" or _ended_without_robots(run):
         words = _("“{block}” stopped because of an error") if run.errors else _("“{block}” was stopped")
         detail = view.detail
@@ -164,8 +164,8 @@ def _tried_view(view: RunView, run: RunState) -> RunView:
             words = _("Tried “{block}”")
             detail = _("Finished") if run.value is None else run.value
         title = words.format(block=run.tried_label)
-        compact = view.compact if view.result else title
-        return replace(view, title=title, detail=detail, compact=compact)
+        compact = view.compact_text if view.result else title
+        return replace(view, title=title, detail=detail, compact_text=compact)
     return view
 
 
@@ -203,7 +203,7 @@ def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: f
     early = (
         run.state == "stopping"
         and not run.is_stop_repeated
-        and now - run.pressed_s < STOPPING_DISPLAY_DELAY_S
+        and now - run.stop_pressed_s < STOPPING_DISPLAY_DELAY_S
     )
     views: dict[str, Callable[[RunState, float], RunView]] = {
         "running": _running_view,
@@ -247,7 +247,7 @@ def _running_view(run: RunState, now: float) -> RunView:
     return RunView(
         "running",
         title.format(time=time_words),
-        _(APPLIES_LATER) if run.is_edited else run.description,
+        _(APPLIES_LATER_HINT) if run.is_edited else run.description,
         compact.format(name=run.name, time=time_words),
         can_pause=True,
         can_step=True,
@@ -255,7 +255,7 @@ def _running_view(run: RunState, now: float) -> RunView:
         is_edited=run.is_edited,
         run_label=RESTART,
         last_stop=run.last_stop_text or None,
-        last_stop_status=run.last_status,
+        last_stop_status=run.last_stop_status,
     )
 
 
@@ -263,7 +263,7 @@ def _paused_view(run: RunState, _now: float) -> RunView:
     return RunView(
         "paused",
         _("Paused at “{block}”").format(block=run.paused_at) if run.paused_at else _("Paused"),
-        _(APPLIES_LATER) if run.is_edited and not run.warning else _paused_detail(run),
+        _(APPLIES_LATER_HINT) if run.is_edited and not run.warning else _paused_detail(run),
         _("{name} is paused").format(name=run.name),
         can_run=True,
         can_step=True,
@@ -271,7 +271,7 @@ def _paused_view(run: RunState, _now: float) -> RunView:
         is_edited=run.is_edited,
         run_label=GO_ON,
         last_stop=run.last_stop_text or None,
-        last_stop_status=run.last_status,
+        last_stop_status=run.last_stop_status,
     )
 
 
@@ -306,7 +306,7 @@ def _stopping_view(run: RunState, now: float) -> RunView:
     detail = result = ""
     if waiting:
         detail = _("Waiting for {robots}, {seconds} s").format(
-            robots=format_list(waiting), seconds=number(now - run.pressed_s, ".1f")
+            robots=format_list(waiting), seconds=number(now - run.stop_pressed_s, ".1f")
         )
     if run.robots_to_stop:
         result = _stopped_count_text(len(done), len(run.robots_to_stop))
@@ -360,7 +360,7 @@ def _ended_title(run: RunState, name: str = "") -> str:
 def _unanswered_view(run: RunState, now: float) -> RunView:
     if run.report is None:
         return _proven_view(run, now)
-    title, detail, compact, confirm = unanswered_texts(run.report, run.motion_warnings)
+    title, detail, compact, confirm = unconfirmed_texts(run.report, run.motion_warnings)
     return RunView(
         "unanswered",
         title,
@@ -397,7 +397,7 @@ def result_text(report: StopReport) -> str:
     """
     names, still = report.names, report.stopped_names
     unsure = [robot.full_name for robot in report.robots if not robot.can_confirm]
-    if report.unproven:
+    if report.unconfirmed_robots:
         return _stopped_count_text(len(still), len(names))
     if not names:
         return _("nothing to stop")
@@ -418,7 +418,7 @@ def _stopped_count_text(stopped: int, count: int) -> str:
     return _("{stopped} of {count} robots stopped").format(stopped=stopped, count=count)
 
 
-def unanswered_texts(report: StopReport, doubts: Sequence[str] = ()) -> tuple[str, str, str, str]:
+def unconfirmed_texts(report: StopReport, doubts: Sequence[str] = ()) -> tuple[str, str, str, str]:
     """Return title, detail, compact text and button label for robots that have not confirmed a Stop.
 
     Messages of the robots themselves ("Arm may still move: the brake is stuck") come first, unchanged.
@@ -452,9 +452,9 @@ def unanswered_texts(report: StopReport, doubts: Sequence[str] = ()) -> tuple[st
 
 def _problem_text(report: StopReport) -> str:
     # First robots' own reports, then robots to which the Stop could not be sent, then silent robots.
-    refusals = [robot.problem for robot in report.unproven if robot.is_refused]
-    untold = [robot.problem for robot in report.unproven if robot.error and not robot.is_refused]
-    silent = [robot.full_name for robot in report.unproven if not robot.error]
+    refusals = [robot.problem for robot in report.unconfirmed_robots if robot.has_failed]
+    untold = [robot.problem for robot in report.unconfirmed_robots if robot.error and not robot.has_failed]
+    silent = [robot.full_name for robot in report.unconfirmed_robots if not robot.error]
     if len(silent) > MAX_NAMED:
         silent = [*silent[:MAX_NAMED], _("{count} more").format(count=len(silent) - MAX_NAMED)]
     wrong = [*refusals, *untold]

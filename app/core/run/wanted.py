@@ -37,12 +37,12 @@ class RequestedRun:
     """
 
     document: Document
-    paused: bool = False
+    starts_paused: bool = False
     stack: Stack | None = None
 
     def program(self) -> Program | None:
         """Return the program to run; None if the stack no longer exists."""
-        return self.document.program() if self.stack is None else self.document.trial_program(self.stack)
+        return self.document.program() if self.stack is None else self.document.compile_trial(self.stack)
 
     @property
     def has_value(self) -> bool:

@@ -40,18 +40,18 @@ class StepReport:
     name: str
     description: str
     timeout_s: float
-    began_ms: int
-    ended_ms: int | None = None
-    ok: bool = False
+    start_ms: int
+    duration_ms: int | None = None
+    is_ok: bool = False
     details: str = ""
 
     def to_json(self) -> dict[str, object]:
         """Return the step as a JSON object for the report."""
         return {
             "name": self.name,
-            "ok": self.ok,
-            "ms": self.ended_ms,
-            "began_ms": self.began_ms,
+            "ok": self.is_ok,
+            "ms": self.duration_ms,
+            "began_ms": self.start_ms,
             "bound_s": self.timeout_s,
             "words": self.description,
             "said": self.details,
@@ -103,14 +103,14 @@ class Report:
         """Step in progress, or None."""
         with self._lock:
             newest = self._steps[-1] if self._steps else None
-            return newest if newest is not None and newest.ended_ms is None else None
+            return newest if newest is not None and newest.duration_ms is None else None
 
-    def add_computer(self, **facts: object) -> None:
+    def add_computer_info(self, **facts: object) -> None:
         """Add facts about this computer."""
         with self._lock:
             self._facts.update(facts)
 
-    def mark(self, name: str) -> None:
+    def record_time(self, name: str) -> None:
         """Record the current time under the key ``NAME_ms``.
 
         Only the first call for each name has an effect.
@@ -139,7 +139,7 @@ class Report:
         with self._lock:
             step = self.current_step
             if step is not None:
-                step.ended_ms, step.ok, step.details = self.now_ms(), True, said
+                step.duration_ms, step.is_ok, step.details = self.now_ms(), True, said
                 self._write()
 
     def fail(self, why: str) -> None:
@@ -147,7 +147,7 @@ class Report:
         with self._lock:
             step = self.current_step
             if step is not None:
-                step.ended_ms, step.details = self.now_ms(), why
+                step.duration_ms, step.details = self.now_ms(), why
             self._why = self._why or why
             self._write()
 
@@ -155,7 +155,7 @@ class Report:
         """Complete the report; return True if the test has succeeded."""
         with self._lock:
             self._over = True
-            self.mark("total")
+            self.record_time("total")
             self._write()
             return not self._why
 

@@ -20,9 +20,9 @@ from app.core.self_test.report import Report
 from app.core.self_test.surroundings import CRASH, REPORT, TestEnvironment, remove_home
 from nep.i18n import _, format_list
 
-FAILED = 1
-WEB_PROCESS = "qtwebengineprocess"
-KILL_S = 5.0
+FAILED_EXIT_CODE = 1
+WEB_PROCESS_NAME = "qtwebengineprocess"
+KILL_TIMEOUT_S = 5.0
 
 
 class SelfTest:
@@ -93,7 +93,7 @@ class SelfTest:
         self._end_processes()
         well = self.report.finish()
         self._finish()
-        return 0 if well else FAILED
+        return 0 if well else FAILED_EXIT_CODE
 
     def _finish(self) -> None:
         # The watchdog continues until the process ends.
@@ -117,8 +117,8 @@ class SelfTest:
             kill_children()
             return
         self.start_step("processes", _("every process of the test exits"))
-        family = [each for each in children() if not is_web(each) and not is_windows_program(each)]
-        masters = [each for each in family if is_master(each)]
+        family = [each for each in children() if not is_web_process(each) and not is_windows_program(each)]
+        masters = [each for each in family if is_master_process(each)]
         for each in masters:
             with suppress(psutil.Error):
                 each.terminate()
@@ -149,7 +149,7 @@ class SelfTest:
         with suppress(OSError, ValueError):  # closed at the very end
             faulthandler.dump_traceback(self._crash, all_threads=True)
         kill_children()
-        os._exit(FAILED)
+        os._exit(FAILED_EXIT_CODE)
 
 
 def children() -> list[psutil.Process]:
@@ -168,16 +168,16 @@ def command(process: psutil.Process) -> list[str]:
         return []
 
 
-def is_master(process: psutil.Process) -> bool:
+def is_master_process(process: psutil.Process) -> bool:
     """Return True if a process is a master with an owner process, after whose exit it exits as well."""
     words = command(process)
     return "master" in words and "--owner-pid" in words
 
 
-def is_web(process: psutil.Process) -> bool:
+def is_web_process(process: psutil.Process) -> bool:
     """Return True if a process belongs to the web view. Such processes exit with their parent."""
     try:
-        return process.name().lower().startswith(WEB_PROCESS[:15])
+        return process.name().lower().startswith(WEB_PROCESS_NAME[:15])
     except (psutil.Error, OSError):  # raised on Windows, where psutil has no own exception
         return False
 
@@ -204,4 +204,4 @@ def kill_children() -> None:
     for each in family:
         with suppress(psutil.Error):
             each.kill()
-    psutil.wait_procs(family, timeout=KILL_S)
+    psutil.wait_procs(family, timeout=KILL_TIMEOUT_S)

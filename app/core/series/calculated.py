@@ -18,7 +18,7 @@ BATCH_SIZE = 200_000
 """Maximum number of samples that are calculated in one tick."""
 
 
-class Calculated:
+class CalculatedSamples:
     """Samples that are calculated from other samples. `advance` processes new input."""
 
     def __init__(self, inputs: Sequence[Samples]) -> None:
@@ -31,7 +31,7 @@ class Calculated:
     def advance(self) -> None:
         """Calculate all samples for which the inputs are available."""
         base = self._inputs[0]
-        changed = [each.rewritten_from(seen) for each, seen in zip(self._inputs, self._seen, strict=True)]
+        changed = [each.earliest_change_s(seen) for each, seen in zip(self._inputs, self._seen, strict=True)]
         self._seen = [each.rewritten for each in self._inputs]
         change_s = min((each for each in changed if each is not None), default=None)
         if change_s is not None:
@@ -40,21 +40,21 @@ class Calculated:
         if self._next < base.begun:
             self.samples.break_line()
         first = max(self._next, base.begun) - base.begun
-        end = min(self._ready(base), first + BATCH_SIZE)
+        end = min(self._ready_count(base), first + BATCH_SIZE)
         if end > first:
             with np.errstate(all="ignore"):  # undefined results become gaps
-                self.samples.extend(*self._calculated(base, first, end))
+                self.samples.extend(*self._compute(base, first, end))
             self._next = base.begun + end
 
-    def _ready(self, base: Samples) -> int:
+    def _ready_count(self, base: Samples) -> int:
         # Number of the first input's samples that need not wait for other inputs.
         return len(base)
 
-    def _calculated(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    def _compute(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         raise NotImplementedError
 
 
-class WindowCurve(Calculated):
+class WindowCurve(CalculatedSamples):
     """Difference, derivative, integral or moving average of another curve."""
 
     def __init__(self, kind: WindowFunction, of: Samples, window_s: float) -> None:
@@ -62,7 +62,7 @@ class WindowCurve(Calculated):
         super().__init__([of])
         self._kind, self._window_s = kind, window_s
 
-    def _calculated(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    def _compute(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         times, gaps = base.times[first:end].copy(), base.gaps[first:end].copy()
         if self._kind == "mean":
             return times, self._means(base, first, end), gaps
@@ -93,7 +93,7 @@ class WindowCurve(Calculated):
         return means
 
 
-class ExpressionCurve(Calculated):
+class ExpressionCurve(CalculatedSamples):
     """Curve calculated by an expression from several curves.
 
     The expression is evaluated at the times of the first input, with the newest sample of each other
@@ -104,7 +104,7 @@ class ExpressionCurve(Calculated):
         super().__init__(inputs)
         self._calculate = calculate
 
-    def _ready(self, base: Samples) -> int:
+    def _ready_count(self, base: Samples) -> int:
         last_s = base.last_s
         if last_s is None:
             return 0
@@ -112,7 +112,7 @@ class ExpressionCurve(Calculated):
         until_s = max(min(theirs, default=last_s), last_s - MAX_WAIT_S)
         return int(np.searchsorted(base.times, until_s, side="right"))
 
-    def _calculated(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    def _compute(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         times = base.times[first:end].copy()
         arrays = [base.values[first:end], *(held_values(each, times) for each in self._inputs[1:])]
         values = np.broadcast_to(np.asarray(self._calculate(arrays), dtype=float), times.shape).copy()

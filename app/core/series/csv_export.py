@@ -11,7 +11,7 @@ import numpy as np
 
 from app.core.series.curves import Curve
 from app.core.series.samples import Floats
-from app.core.storage.csv_text import csv_text, escape_formula
+from app.core.storage.csv_text import escape_formula, format_csv
 
 ROWS_PER_CHUNK = 5000
 
@@ -46,16 +46,16 @@ def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = in
         first, end = curve.samples.index_range(begin_s, end_s)
         runs = curve.states.runs(begin_s, end_s) if curve.states is not None else ()
         states = tuple(
-            (run.begin_s, run.value)
+            (run.start_s, run.value)
             for run in runs
-            if run.value is not None and begin_s <= run.begin_s <= end_s
+            if run.value is not None and begin_s <= run.start_s <= end_s
         )
         times, values = curve.samples.times[first:end].copy(), curve.samples.values[first:end].copy()
         columns.append(CsvColumn(curve.text, times, values, states))
     return columns
 
 
-def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
+def csv_chunks(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
     """Yield a CSV file (RFC 4180) in chunks: the header, then the rows by time.
 
     Times are written in nanoseconds since 1970, and as ISO 8601 in UTC. A state is written in the row
@@ -65,7 +65,7 @@ def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
         columns: Snapshots of the curves.
         origin_ns: Time 0 of the curves, in ns since 1970.
     """
-    yield csv_text([["stamp_ns", "time_utc", *(escape_formula(column.name) for column in columns)]])
+    yield format_csv([["stamp_ns", "time_utc", *(escape_formula(column.name) for column in columns)]])
     states = [np.array([time_s for time_s, _word in column.states]) for column in columns]
     times = np.unique(np.concatenate([np.empty(0), *states, *(column.times for column in columns)]))
     for begin in range(0, len(times), ROWS_PER_CHUNK):
@@ -77,8 +77,8 @@ def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
         rows = []
         for time_s in part.tolist():
             stamp_ns = origin_ns + round(time_s * 1e9)
-            rows.append([str(stamp_ns), _iso(stamp_ns), *(each.get(time_s, "") for each in cells)])
-        yield csv_text(rows)
+            rows.append([str(stamp_ns), _format_iso(stamp_ns), *(each.get(time_s, "") for each in cells)])
+        yield format_csv(rows)
 
 
 def _cells_of(column: CsvColumn, states: Floats, begin_s: float, end_s: float) -> dict[float, str]:
@@ -95,7 +95,7 @@ def _index_range(times: Floats, begin_s: float, end_s: float) -> tuple[int, int]
     return int(first), int(last)
 
 
-def _iso(stamp_ns: int) -> str:
+def _format_iso(stamp_ns: int) -> str:
     try:
         at = datetime.fromtimestamp(stamp_ns // 10**9, timezone.utc)
     except (OverflowError, ValueError, OSError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from app.core.series.calculated import Calculated, ExpressionCurve, WindowCurve
+from app.core.series.calculated import CalculatedSamples, ExpressionCurve, WindowCurve
 from app.core.series.feed import SeriesFeed
 from app.core.series.field_path import (
     MISSING,
@@ -87,7 +87,7 @@ class _SharedSamples:
     user_count: int = 0
     dependencies: list[str] = field(default_factory=list)
     series: FieldSeries | None = None
-    calculated: Calculated | None = None
+    calculated: CalculatedSamples | None = None
 
 
 class Curves:
@@ -242,17 +242,17 @@ class Curves:
         name = str(source)
         shared = self._shared.get(name)
         if shared is None:
-            shared = self._make(source)
+            shared = self._create_samples(source)
             self._shared[name] = shared
         shared.user_count += 1
         return shared
 
-    def _make(self, source: Source) -> _SharedSamples:
+    def _create_samples(self, source: Source) -> _SharedSamples:
         if isinstance(source, FieldSource):
-            return self._make_field(source)
+            return self._create_field_samples(source)
         if isinstance(source, WindowSource):
             of = self._acquire(source.source)
-            calculated: Calculated = WindowCurve(source.kind, of.samples, source.window_s)
+            calculated: CalculatedSamples = WindowCurve(source.kind, of.samples, source.window_s)
             return _SharedSamples(
                 calculated.samples, dependencies=[str(source.source)], calculated=calculated
             )
@@ -263,7 +263,7 @@ class Curves:
             calculated.samples, dependencies=[str(each) for each in source.inputs], calculated=calculated
         )
 
-    def _make_field(self, source: FieldSource) -> _SharedSamples:
+    def _create_field_samples(self, source: FieldSource) -> _SharedSamples:
         topic = self._topics.get(source.topic)
         if topic is None:
             topic = self._topics[source.topic] = TopicSeries(source.topic, self._feed.origin_ns)

@@ -24,7 +24,7 @@ class SeriesReceiver(Protocol):
                 stamp.
         """
 
-    def rewind(self) -> None:
+    def reset(self) -> None:
         """Remove all messages without counting them as lost. Called when the source seeks to another time."""
 
 
@@ -93,11 +93,11 @@ class SeriesFeed:
                 del self._deep[topic]
                 self._set_room(topic, None)
 
-    def rewind(self, topics: Iterable[str] | None = None) -> None:
+    def reset(self, topics: Iterable[str] | None = None) -> None:
         """Reset the receivers of topics (None: all topics). Called when the source seeks to another time."""
         for topic in list(self._takers) if topics is None else topics:
             for taker in self._takers.get(topic, ()):
-                taker.rewind()
+                taker.reset()
 
     def add(self, batches: Mapping[str, Batch]) -> None:
         """Pass the messages received since the last tick to the receivers."""

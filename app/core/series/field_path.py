@@ -26,11 +26,11 @@ A key with this text is written in quotes.
 MAX_STEPS, MAX_EVERY, MAX_FIELDS = 32, 65, 2000
 MAX_LENGTH = 400
 BARE_VALUE_KEY = "value"
-_STEP = re.compile(
+_STEP_PATTERN = re.compile(
     r"""\.?(?P<name>[^.\[\]"\s]+)|\[(?P<index>-?\d{1,9})\]"""
     r"""|\[(?P<every>\*)\]|\[(?P<key>"(?:[^"\\]|\\.)*")\]"""
 )
-_PLAIN = re.compile(r"""[^.\[\]"\s,()+*/%^-]+\Z""")
+_PLAIN_KEY_PATTERN = re.compile(r"""[^.\[\]"\s,()+*/%^-]+\Z""")
 """Pattern of keys that can't be confused with a calculation.
 
 The key `head-yaw`, for example, looks like a difference, so it is written as `["head-yaw"]`.
@@ -77,7 +77,7 @@ class FieldPath:
         steps: list[Step] = []
         at = 0
         while at < len(text):
-            found = _STEP.match(text, at)
+            found = _STEP_PATTERN.match(text, at)
             bare = found is not None and found["name"] is not None and bool(steps) and text[at] != "."
             if found is None or bare or len(steps) >= MAX_STEPS or len(text) > MAX_LENGTH:
                 raise CurveError(
@@ -158,7 +158,7 @@ def _format_step(step: Step) -> str:
         return "[*]"
     if isinstance(step, int):
         return f"[{step}]"
-    return f".{step}" if _PLAIN.match(step) else f"[{json.dumps(step, ensure_ascii=False)}]"
+    return f".{step}" if _PLAIN_KEY_PATTERN.match(step) else f"[{json.dumps(step, ensure_ascii=False)}]"
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,7 +69,7 @@ class FieldSeries:
             kind = type(value)
             if kind is float or kind is int:
                 times.append(time_s)
-                values.append(value if kind is float else number_of(value))  # type: ignore[arg-type]
+                values.append(value if kind is float else to_float(value))  # type: ignore[arg-type]
                 marks.append(number_gap)
                 number_gap = False
                 if has_states:
@@ -90,7 +90,7 @@ class FieldSeries:
         if number_gap:
             self.numbers.break_line()
 
-    def rewind(self) -> None:
+    def reset(self) -> None:
         """Remove all values."""
         self.numbers.clear()
         self.states.clear()
@@ -98,7 +98,7 @@ class FieldSeries:
         self.missing = 0
 
 
-def number_of(value: object) -> float:
+def to_float(value: object) -> float:
     """Convert a number to float. Numbers that are too large become infinite and are not drawn."""
     try:
         return float(value)  # type: ignore[arg-type]
@@ -144,7 +144,7 @@ class TopicSeries:
         gaps: list[bool] = []
         pending = self._gap or batch.dropped > 0
         for message in batch.messages:
-            jump, publisher = self._missing_before(message), message.publisher
+            jump, publisher = self._missing_count(message), message.publisher
             if publisher not in seen:
                 seen.add(publisher)
                 first_jumps += jump
@@ -167,16 +167,16 @@ class TopicSeries:
         for field in self.fields:
             field.add_values(times, payloads, gaps)
 
-    def rewind(self) -> None:
+    def reset(self) -> None:
         """Remove all values. Called when the source seeks to another time."""
         self._seqs.clear()
         self._gap, self._last_s, self._usual_s, self._silences = False, None, None, 0
         self.received = self.lost = self.unread = self.unplaced = 0
         self.payload = MISSING
         for field in self.fields:
-            field.rewind()
+            field.reset()
 
-    def _missing_before(self, message: Message) -> int:
+    def _missing_count(self, message: Message) -> int:
         # Number of messages of its publisher missing immediately before this one.
         seq, publisher = message.seq, message.publisher
         if seq is None:

@@ -45,10 +45,10 @@ OPERATORS: dict[type[ast.operator], Callable[[Floats, Floats], Floats]] = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide, ast.Mod: np.mod,
     ast.Pow: np.power,
 }  # fmt: skip
-_FIELD = re.compile(r"""(?:\.[^.\[\]"\s,()+*/%^-]+|\[-?\d+\]|\[\*\]|\["(?:[^"\\]|\\.)*"\])+""")
-_UNKNOWN_TOPIC = re.compile(r"/[\w/]+")
-_DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|min)\b")
-_UNITS = {"ms": 0.001, "s": 1.0, "min": 60.0}
+_FIELD_PATTERN = re.compile(r"""(?:\.[^.\[\]"\s,()+*/%^-]+|\[-?\d+\]|\[\*\]|\["(?:[^"\\]|\\.)*"\])+""")
+_UNKNOWN_TOPIC_PATTERN = re.compile(r"/[\w/]+")
+_DURATION_PATTERN = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|min)\b")
+_UNIT_SECONDS = {"ms": 0.001, "s": 1.0, "min": 60.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def parse_field(text: str, topics: Sequence[str]) -> FieldSource | None:
     if topic is None:
         return None
     rest = text[len(topic) :]
-    if rest and not _FIELD.fullmatch(rest):
+    if rest and not _FIELD_PATTERN.fullmatch(rest):
         return None
     return FieldSource(topic, FieldPath.parse(rest.removeprefix(".")))
 
@@ -166,7 +166,7 @@ class _Parser:
             raise CurveError(_("'{text}' isn't a valid formula").format(text=self._text[:80])) from None
         if sum(1 for _node in ast.walk(tree)) > MAX_NODES:
             raise CurveError(_("this is too complex for one curve; use several curves"))
-        source = self._source(tree.body)
+        source = self._parse_source(tree.body)
         if source is None:
             raise CurveError(_("the formula has no field, so its value never changes"))
         return source
@@ -178,13 +178,13 @@ class _Parser:
         while place < len(self._text):
             letter = self._text[place]
             if wants_value and (letter == "/" or _topic_at(self._text[place:], self._topics)):
-                end = self._field(place)
+                end = self._parse_field(place)
                 out.append(f"_{len(self._fields) - 1}")
                 place, wants_value = end, False
                 continue
-            duration = _DURATION.match(self._text, place) if wants_value else None
+            duration = _DURATION_PATTERN.match(self._text, place) if wants_value else None
             if duration is not None:
-                out.append(repr(float(duration[1]) * _UNITS[duration[2]]))
+                out.append(repr(float(duration[1]) * _UNIT_SECONDS[duration[2]]))
                 place, wants_value = duration.end(), False
                 continue
             if letter == "_" and wants_value:
@@ -195,14 +195,14 @@ class _Parser:
             place += 1
         return "".join(out)
 
-    def _field(self, place: int) -> int:
+    def _parse_field(self, place: int) -> int:
         # Adds the field at this position; returns its end.
         rest = self._text[place:]
         topic = _topic_at(rest, self._topics)
         if topic is None:
-            unknown = _UNKNOWN_TOPIC.match(rest)
-            raise unknown_topic(unknown[0] if unknown is not None else rest[:40], self._topics)
-        path = _FIELD.match(rest, len(topic))
+            unknown = _UNKNOWN_TOPIC_PATTERN.match(rest)
+            raise unknown_topic_error(unknown[0] if unknown is not None else rest[:40], self._topics)
+        path = _FIELD_PATTERN.match(rest, len(topic))
         if path is None:
             raise CurveError(_("the field after {topic} is missing").format(topic=topic))
         found = FieldSource(topic, FieldPath.parse(path[0].removeprefix(".")))
@@ -211,7 +211,7 @@ class _Parser:
         self._fields.append(found)
         return place + path.end()
 
-    def _source(self, node: ast.expr) -> Source | None:
+    def _parse_source(self, node: ast.expr) -> Source | None:
         # None for a number.
         if isinstance(node, ast.Name) and node.id[1:].isdigit() and node.id.startswith("_"):
             return self._fields[int(node.id[1:])]
@@ -222,7 +222,7 @@ class _Parser:
         ):
             return self._parse_window(node, node.func.id)
         inputs: list[Source] = []
-        calculate = self._calculation(node, inputs)
+        calculate = self._parse_calculation(node, inputs)
         return ExpressionSource(self._source_text(node), tuple(inputs), calculate) if inputs else None
 
     def _parse_window(self, node: ast.Call, kind: str) -> WindowSource:
@@ -232,7 +232,7 @@ class _Parser:
             raise CurveError(
                 _("wrong arguments for {name}; use {example}").format(name=kind, example=example)
             )
-        of = self._source(node.args[0])
+        of = self._parse_source(node.args[0])
         if of is None:
             raise CurveError(_("the formula has no field, so its value never changes"))
         window_s = 0.0
@@ -244,7 +244,7 @@ class _Parser:
                 raise CurveError(_("the duration of a mean must be greater than 0 and at most 600 s"))
         return WindowSource(next(each for each in WINDOW_FUNCTIONS if each == kind), of, window_s)
 
-    def _calculation(self, node: ast.expr, inputs: list[Source]) -> Calculation:
+    def _parse_calculation(self, node: ast.expr, inputs: list[Source]) -> Calculation:
         # Adds the needed sources to `inputs`.
         if isinstance(node, ast.Constant) and type(node.value) in {int, float}:
             number = _constant(node.value)
@@ -253,27 +253,30 @@ class _Parser:
             known = np.float64(CONSTANTS[node.id])
             return lambda _arrays: known  # type: ignore[return-value]
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
-            inner = self._calculation(node.operand, inputs)
+            inner = self._parse_calculation(node.operand, inputs)
             sign = -1.0 if isinstance(node.op, ast.USub) else 1.0
             return lambda arrays: sign * inner(arrays)
         if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
             operator = OPERATORS[type(node.op)]
-            left, right = self._calculation(node.left, inputs), self._calculation(node.right, inputs)
+            left, right = (
+                self._parse_calculation(node.left, inputs),
+                self._parse_calculation(node.right, inputs),
+            )
             return lambda arrays: operator(left(arrays), right(arrays))
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
-            return self._call(node, node.func.id, inputs)
+            return self._parse_call(node, node.func.id, inputs)
         if isinstance(node, (ast.Name, ast.Call)):
-            return self._input(node, inputs)
+            return self._parse_input(node, inputs)
         raise CurveError(_("'{text}' can't be evaluated").format(text=self._source_text(node)[:80]))
 
-    def _call(self, node: ast.Call, name: str, inputs: list[Source]) -> Calculation:
+    def _parse_call(self, node: ast.Call, name: str, inputs: list[Source]) -> Calculation:
         wanted, function = FUNCTIONS[name]
         if len(node.args) != wanted or node.keywords:
             raise CurveError(_("{name} needs {count} numbers").format(name=name, count=wanted))
-        given = [self._calculation(each, inputs) for each in node.args]
+        given = [self._parse_calculation(each, inputs) for each in node.args]
         return lambda arrays: function(*(each(arrays) for each in given))
 
-    def _input(self, node: ast.Name | ast.Call, inputs: list[Source]) -> Calculation:
+    def _parse_input(self, node: ast.Name | ast.Call, inputs: list[Source]) -> Calculation:
         # A field, or a function that needs more than the samples of one time.
         called = node.func if isinstance(node, ast.Call) else node
         name = called.id if isinstance(called, ast.Name) else self._source_text(called)
@@ -287,7 +290,7 @@ class _Parser:
                 else _("topics begin with a slash, such as /odom.speed")
             )
             raise CurveError(template.format(name=name[:40], hint=hint))
-        source = self._source(node)
+        source = self._parse_source(node)
         assert source is not None  # noqa: S101  a field, or a function of one
         if source not in inputs:
             inputs.append(source)
@@ -306,7 +309,7 @@ def _constant(value: object) -> Floats:
         raise CurveError(_("'{text}' can't be evaluated").format(text=str(value)[:40])) from None
 
 
-def unknown_topic(name: str, topics: Sequence[str]) -> CurveError:
+def unknown_topic_error(name: str, topics: Sequence[str]) -> CurveError:
     """Return an error for an unknown topic, which suggests the existing topic with the most similar name."""
     near = nearest(name, list(topics))
     if near is None:

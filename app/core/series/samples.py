@@ -24,13 +24,13 @@ MAX_LATENESS_S = 1.0
 
 A later sample means that the clock was set back.
 """
-SHIFTS = (4, 7, 10)
-RAW_PER_COLUMN = 4
+LEVEL_SHIFTS = (4, 7, 10)
+MAX_SAMPLES_PER_PIXEL = 4
 """Maximum number of samples per pixel for which each sample is drawn."""
 FEW_RANGES, FEW_NUMBERS = 8, 4096
 """Numbers of ranges and samples up to which a Python loop is faster than a vectorized reduction."""
 _INITIAL_CAPACITY = 1024
-_EVICTION_UNIT = 1 << SHIFTS[-1]
+_EVICTION_UNIT = 1 << LEVEL_SHIFTS[-1]
 _MAX_REWRITES = 256
 
 
@@ -45,7 +45,7 @@ class RangeStats:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class Polyline:
     """Polyline to draw.
 
     Attributes:
@@ -105,7 +105,7 @@ class _Pixels:
     keys: Floats = field(default_factory=lambda: np.empty(0))
     times: Floats = field(default_factory=lambda: np.empty(0))
     values: Floats = field(default_factory=lambda: np.empty(0))
-    broken: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
+    gaps: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
 
     def part(self, first: float, end: float) -> _Pixels:
         # Views, not copies.
@@ -115,7 +115,7 @@ class _Pixels:
         low, high = np.searchsorted(self.keys, (first, end))
         both = slice(2 * low, 2 * high)
         return _Pixels(
-            first, end, self.keys[low:high], self.times[both], self.values[both], self.broken[low:high]
+            first, end, self.keys[low:high], self.times[both], self.values[both], self.gaps[low:high]
         )
 
     @classmethod
@@ -134,8 +134,8 @@ class _PixelCache:
     """
 
     width_s: float = 0.0
-    rewritten: int = 0
-    begun: int = 0
+    rewrite_count: int = 0
+    evicted_count: int = 0
     pixels: _Pixels = field(default_factory=_Pixels)
 
 
@@ -155,7 +155,7 @@ class Samples:
         self._count = 0
         self._times, self._values = np.empty(_INITIAL_CAPACITY), np.empty(_INITIAL_CAPACITY)
         self._gaps = np.zeros(_INITIAL_CAPACITY, dtype=bool)
-        self._levels = tuple(_Level(shift) for shift in SHIFTS)
+        self._levels = tuple(_Level(shift) for shift in LEVEL_SHIFTS)
         self._render_cache = _PixelCache()
         self._rewrites: deque[tuple[int, float]] = deque(maxlen=_MAX_REWRITES)
         self.rewritten = 0
@@ -226,7 +226,7 @@ class Samples:
             self._append(times, values, gaps)
         else:
             for time_s, value, gap in zip(times.tolist(), values.tolist(), gaps.tolist(), strict=True):
-                self._add_one(time_s, value, gap=gap)
+                self._add_sample(time_s, value, gap=gap)
         if trailing:
             self.break_line()
         self._evict_old()
@@ -249,7 +249,7 @@ class Samples:
         self._gap_pending = False
         self._count += len(times)
 
-    def _add_one(self, time_s: float, value: float, *, gap: bool) -> None:
+    def _add_sample(self, time_s: float, value: float, *, gap: bool) -> None:
         last = self.last_s
         one = np.array([time_s]), np.array([value]), np.array([gap])
         if last is None or time_s >= last:
@@ -270,7 +270,7 @@ class Samples:
         self._gaps[place] = self._gaps[place + 1]
         self._gaps[place + 1] = False
         self._count += 1
-        self._rewrite(place, time_s)
+        self._record_rewrite(place, time_s)
 
     def truncate(self, time_s: float) -> None:
         """Remove the samples at and after a time.
@@ -281,7 +281,7 @@ class Samples:
         if place < self._count:
             self.undone += self._count - place
             self._count = place
-            self._rewrite(place, time_s)
+            self._record_rewrite(place, time_s)
         self._gap_pending = self._gap_pending and self._count > 0
 
     def clear(self) -> None:
@@ -289,13 +289,13 @@ class Samples:
         self.truncate(-np.inf)
         self.begun = self.undone = 0
 
-    def _rewrite(self, place: int, time_s: float) -> None:
+    def _record_rewrite(self, place: int, time_s: float) -> None:
         for level in self._levels:
             level.built = min(level.built, place >> level.shift)
         self.rewritten += 1
         self._rewrites.append((self.rewritten, time_s))
 
-    def rewritten_from(self, seen: int) -> float | None:
+    def earliest_change_s(self, seen: int) -> float | None:
         """Return the earliest time at which samples were changed, other than by appending.
 
         Returns None if there was no such change.
@@ -383,7 +383,7 @@ class Samples:
         mean = float(total[0]) / (end - first)
         return RangeStats(end - first, float(low[0]), float(high[0]), mean if isfinite(mean) else None)
 
-    def line(self, begin_s: float, end_s: float, columns: int) -> Line:
+    def line(self, begin_s: float, end_s: float, columns: int) -> Polyline:
         """Return the polyline of a time range.
 
         The polyline contains all samples, or the minimum and the maximum in each pixel column. One
@@ -398,9 +398,9 @@ class Samples:
         points = end - first
         first, end = max(0, first - 1), min(self._count, end + 1)
         columns = max(1, columns)
-        if end - first <= RAW_PER_COLUMN * columns or end_s <= begin_s:
+        if end - first <= MAX_SAMPLES_PER_PIXEL * columns or end_s <= begin_s:
             pixel_s = max(0.0, end_s - begin_s) / columns
-            return Line(*self._all_samples(first, end, pixel_s), points, is_complete=True)
+            return Polyline(*self._all_samples(first, end, pixel_s), points, is_complete=True)
         return self._peak_line(begin_s, end_s, columns, (first, end))
 
     def _all_samples(self, first: int, end: int, pixel_s: float) -> tuple[Floats, Floats]:
@@ -419,7 +419,7 @@ class Samples:
             np.insert(values, places, np.concatenate([values[alone], np.full(len(broken), np.nan)])),
         )
 
-    def _peak_line(self, begin_s: float, end_s: float, columns: int, part: tuple[int, int]) -> Line:
+    def _peak_line(self, begin_s: float, end_s: float, columns: int, part: tuple[int, int]) -> Polyline:
         width = (end_s - begin_s) / columns
         if 1e-30 < width < 1e30:  # rounded, so that the edges of pixels stay the same while the plot moves
             width = float(np.float32(width))
@@ -437,11 +437,11 @@ class Samples:
         kept = pixels.part(first, max(first, min(sure, end - 1)))
         self._render_cache = _PixelCache(width, self.rewritten, self.begun, kept)
         times, values = pixels.times, pixels.values
-        broken = 2 * np.flatnonzero(pixels.broken)
+        broken = 2 * np.flatnonzero(pixels.gaps)
         broken = broken[broken > 0]
         if len(broken):
             times, values = np.insert(times, broken, times[broken]), np.insert(values, broken, np.nan)
-        return Line(times, values, part[1] - part[0], is_complete=False)
+        return Polyline(times, values, part[1] - part[0], is_complete=False)
 
     def _valid_pixels(self, width_s: float) -> _Pixels:
         # The part of the last rendering that is still valid.
@@ -449,10 +449,10 @@ class Samples:
         if drawn.width_s != width_s:
             return _Pixels()
         pixels = drawn.pixels
-        changed_s = self.rewritten_from(drawn.rewritten)
+        changed_s = self.earliest_change_s(drawn.rewrite_count)
         if changed_s is not None:
             pixels = pixels.part(-np.inf, float(np.floor(changed_s / width_s)) - 1)
-        if drawn.begun != self.begun:
+        if drawn.evicted_count != self.begun:
             pixels = pixels.part(float(np.floor(self._times[0] / width_s)) + 2, np.inf)
         return pixels
 

@@ -21,7 +21,7 @@ class StateRun:
         value: Value; None if it is unknown.
     """
 
-    begin_s: float
+    start_s: float
     end_s: float
     value: str | None
 

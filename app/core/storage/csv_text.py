@@ -6,15 +6,15 @@ import csv
 import io
 from collections.abc import Iterable, Sequence
 
-_START = ("=", "+", "-", "@", "\t", "\r")
+_FORMULA_PREFIXES = ("=", "+", "-", "@", "\t", "\r")
 
 
 def escape_formula(text: str) -> str:
     """Return a text with an apostrophe in front if a spreadsheet would evaluate the text as a formula."""
-    return f"'{text}" if text.startswith(_START) else text
+    return f"'{text}" if text.startswith(_FORMULA_PREFIXES) else text
 
 
-def csv_text(rows: Iterable[Sequence[str]]) -> str:
+def format_csv(rows: Iterable[Sequence[str]]) -> str:
     """Return the rows as CSV; each row ends with a line break."""
     out = io.StringIO(newline="")
     csv.writer(out).writerows(rows)

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-POLL_S = 0.01
+POLL_INTERVAL_S = 0.01
 
 if sys.platform == "win32":
     import ctypes
@@ -62,7 +62,7 @@ def _acquire(file: IO[bytes], until: float) -> bool:
                 return False
         else:
             return True
-        pause.wait(POLL_S)
+        pause.wait(POLL_INTERVAL_S)
 
 
 def _open_lock_file(path: Path) -> IO[bytes]:

@@ -18,14 +18,14 @@ from app.errors import SettingsError
 from nep.i18n import _
 from nep.system.replace_file import replace_file
 
-FORMAT = 1
+FORMAT_VERSION = 1
 """Format version, increased when older versions of Studio can't read newer settings.
 
 New keys need no new version. The states of layouts (`app.ui.shell.docking.workbench.STATE_VERSION`) are
 part of the format.
 """
-_OWN_FILE_NAME = f"settings.format-{FORMAT}.json"
-RECENT_LIMIT = 12
+_OWN_FILE_NAME = f"settings.format-{FORMAT_VERSION}.json"
+MAX_RECENT_FILES = 12
 _MAX_TIME_S = 1e12
 """Latest valid time in seconds since 1970.
 
@@ -75,7 +75,7 @@ def saved_language(folder: Path | None = None) -> str:
     """
     place = folder if folder is not None else home()
     values = _read_values(place / "settings.json")
-    if _format_of(values) > FORMAT:
+    if _format_version(values) > FORMAT_VERSION:
         values = _read_values(place / _OWN_FILE_NAME) or values
     chosen = values.get("language")
     return chosen if isinstance(chosen, str) else ""
@@ -174,12 +174,12 @@ class Settings:
         return dict(self._values)
 
     @property
-    def recent(self) -> list[RecentFile]:
+    def recent_files(self) -> list[RecentFile]:
         """Recent files that exist, newest first."""
-        return [file for file in self.all_recent if file.exists]
+        return [file for file in self.all_recent_files if file.exists]
 
     @property
-    def all_recent(self) -> list[RecentFile]:
+    def all_recent_files(self) -> list[RecentFile]:
         """Recent files, newest first, including files that are missing."""
         found = []
         entries: list[object] = self.get("recent", [])
@@ -202,14 +202,14 @@ class Settings:
         """
         path = path.resolve()
         self._values = self._merged_values()
-        kept = [file for file in self.all_recent if file.path != path]
+        kept = [file for file in self.all_recent_files if file.path != path]
         self.set_recent([RecentFile(path, name or path.stem, self._clock()), *kept])
 
     def rename_recent(self, old: Path, new: Path) -> None:
         """Rename a recent file without changing its position. Raises SettingsError."""
         old, new = old.resolve(), new.resolve()
         self._values = self._merged_values()
-        kept = [file for file in self.all_recent if file.path != new]
+        kept = [file for file in self.all_recent_files if file.path != new]
         named = [replace(file, path=new, name=new.stem) if file.path == old else file for file in kept]
         self.set_recent(named)
 
@@ -217,7 +217,7 @@ class Settings:
         """Set the list of recent files, newest first. Raises SettingsError."""
         recent = [
             {"path": str(file.path), "name": file.name, "opened_s": file.opened_s}
-            for file in files[:RECENT_LIMIT]
+            for file in files[:MAX_RECENT_FILES]
         ]
         self.set("recent", recent)
 
@@ -237,7 +237,7 @@ class Settings:
             return self._rename_damaged_file()
         if not isinstance(values, dict):
             return self._rename_damaged_file()
-        if _format_of(values) <= FORMAT:
+        if _format_version(values) <= FORMAT_VERSION:
             return values
         return (
             self._rename_damaged_file() if self.path == self._own_path() else self._switch_to_own_file(values)
@@ -256,7 +256,7 @@ class Settings:
         self.notice = _(
             "The settings in “{file}” belong to a newer NEP Studio (format {format}) and are "
             "unchanged. Settings you change here are saved separately."
-        ).format(file=found, format=_format_of(newer))
+        ).format(file=found, format=_format_version(newer))
         return {name: value for name, value in newer.items() if name != "format"}
 
     def _merged_values(self) -> dict[str, object]:
@@ -267,7 +267,7 @@ class Settings:
             return self._values
         if not isinstance(values, dict):
             return self._values
-        if _format_of(values) > FORMAT:  # a newer Studio also runs on this computer
+        if _format_version(values) > FORMAT_VERSION:  # a newer Studio also runs on this computer
             self._switch_to_own_file(values)
             return self._values
         return {**values, **self._unwritten}
@@ -285,7 +285,7 @@ class Settings:
         return {}
 
     def _write(self) -> None:
-        values = {**self._values, "format": FORMAT}
+        values = {**self._values, "format": FORMAT_VERSION}
         text = json.dumps(values, indent=1, ensure_ascii=False, sort_keys=True)
         # A file name that is not UTF-8 has lone surrogates, which JSON represents by backslash, u and four
         # digits.
@@ -300,7 +300,7 @@ class Settings:
         self._unwritten.clear()
 
 
-def _format_of(values: Mapping[str, object]) -> int:
+def _format_version(values: Mapping[str, object]) -> int:
     # 1 for settings from before there were versions.
     found = values.get("format", 1)
     return found if isinstance(found, int) and not isinstance(found, bool) else 1

@@ -97,7 +97,7 @@ def default_topics(name: str, *, virtual: bool = False) -> RobotTopics:
     return RobotTopics(
         description=topic_of(name, "description"),
         command=topic_of(name, "command"),
-        answer=topic_of(name, "answer"),
+        reply=topic_of(name, "answer"),
         state=topic_of(name, "state") if virtual else None,
         world=topic_of(name, "world") if virtual else None,
     )
@@ -128,7 +128,7 @@ def thing_description(model: Mapping[str, object], name: str) -> dict[str, objec
         "rb:robot": {**kind, "title": text(kind.get("title")) or str(model["title"])},
         "rb:topics": {leaf: topic for leaf, topic in vars(topics).items() if topic is not None},
     }
-    asked = _form(topics.command, "invokeaction", "cancelaction") | {"rb:answer": f"nep:{topics.answer}"}
+    asked = _form(topics.command, "invokeaction", "cancelaction") | {"rb:answer": f"nep:{topics.reply}"}
     kept["properties"] = {
         leaf: {**as_object(sensor), "forms": [_sensor_form(topic_of(name, leaf), as_object(sensor))]}
         for leaf, sensor in object_member(described, "properties").items()

@@ -32,7 +32,7 @@ _MAX_DEPTH = 40
 _MAX_WORD_LENGTH = 100
 _MAX_UNKNOWN_REPORTED = 5  # a similarity search takes 20 µs, and untrusted input may have any number of names
 NUMBER_KINDS = frozenset({"number", "integer", "angle"})
-_UNITS = {"deg": "°", "deg/s": "°/s", "Cel": "°C", "degC": "°C", "um": "µm"}
+_UNIT_SYMBOLS = {"deg": "°", "deg/s": "°/s", "Cel": "°C", "degC": "°C", "um": "µm"}
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Parameter:
 
 def display_unit(unit: str | None) -> str | None:
     """Return a unit as displayed, such as "°" for "deg"; None for None."""
-    return None if unit is None else _UNITS.get(unit, unit)
+    return None if unit is None else _UNIT_SYMBOLS.get(unit, unit)
 
 
 def format_number(value: float) -> str:

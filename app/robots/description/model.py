@@ -159,7 +159,7 @@ class RobotTopics:
 
     description: str
     command: str
-    answer: str
+    reply: str
     state: str | None = None
     world: str | None = None
 
@@ -186,7 +186,7 @@ class Robot:
     resources: tuple[str, ...]
     topics: RobotTopics
     source: Mapping[str, object] = field(compare=False, repr=False)
-    beat_s: float | None = None
+    heartbeat_interval_s: float | None = None
 
     def action(self, name: str) -> Action | None:
         """Return the action with this name, or None."""

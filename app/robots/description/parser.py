@@ -9,7 +9,7 @@ from app.robots.description.json_access import as_object, display_text, names, n
 from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
 from nep.i18n import ENGLISH, language, translate
 
-_SCHEME = "nep:"
+_TOPIC_SCHEME = "nep:"
 _ICONS = {"moves": "move", "locomotes": "footprints"}
 
 
@@ -24,7 +24,7 @@ def read(document: Mapping[str, object], topics: RobotTopics) -> Robot:
     topics = RobotTopics(
         description=text(own.get("description")) or topics.description,
         command=text(own.get("command")) or topics.command,
-        answer=text(own.get("answer")) or topics.answer,
+        reply=text(own.get("answer")) or topics.reply,
         state=text(own.get("state")) or topics.state,
         world=text(own.get("world")) or topics.world,
     )
@@ -50,7 +50,7 @@ def read(document: Mapping[str, object], topics: RobotTopics) -> Robot:
         resources=names(document.get("rb:resources")),
         topics=topics,
         source=document,
-        beat_s=number(document.get("rb:beat")),
+        heartbeat_interval_s=number(document.get("rb:beat")),
     )
 
 
@@ -81,7 +81,7 @@ def _action(name: str, action: Mapping[str, object], topics: RobotTopics) -> Act
         text=_with_robot_placeholder(_block_text(block, "text") or _default_text(title, parameters)),
         says=_with_robot_placeholder(_block_text(block, "says")) or None,
         topic=_topic(action, topics.command),
-        reply_topic=_topic(action, topics.answer, "rb:answer"),
+        reply_topic=_topic(action, topics.reply, "rb:answer"),
         risk=risk,
         cancellable=action.get("rb:cancel") is True,
         timeout_s=number(action.get("rb:timeout")),
@@ -188,6 +188,6 @@ def _topic(owner: Mapping[str, object], otherwise: str, member: str = "href") ->
     forms = owner.get("forms")
     for form in forms if isinstance(forms, (list, tuple)) else ():
         href = text(as_object(form).get(member))
-        if href is not None and href.startswith(_SCHEME):
-            return href.removeprefix(_SCHEME)
+        if href is not None and href.startswith(_TOPIC_SCHEME):
+            return href.removeprefix(_TOPIC_SCHEME)
     return otherwise

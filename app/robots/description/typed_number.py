@@ -12,12 +12,12 @@ import unicodedata
 
 from nep.i18n import _, lazy
 
-NOT_A_NUMBER = lazy("Enter a number.")
-AMBIGUOUS_SEPARATORS = lazy(
+NOT_A_NUMBER_MESSAGE = lazy("Enter a number.")
+AMBIGUOUS_SEPARATORS_MESSAGE = lazy(
     "Enter a number with at most one decimal comma or point, such as 1234.5 or 1234,5."
 )
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
-_GROUPED = re.compile("[+-]?[0-9][0-9.,' _\N{RIGHT SINGLE QUOTATION MARK}]*", re.ASCII)
+_GROUPED_NUMBER = re.compile("[+-]?[0-9][0-9.,' _\N{RIGHT SINGLE QUOTATION MARK}]*", re.ASCII)
 
 
 class TypedNumberError(ValueError):
@@ -28,7 +28,7 @@ class TypedNumberError(ValueError):
     """
 
     def __init__(self, *, has_separators: bool) -> None:
-        super().__init__(_(AMBIGUOUS_SEPARATORS if has_separators else NOT_A_NUMBER))
+        super().__init__(_(AMBIGUOUS_SEPARATORS_MESSAGE if has_separators else NOT_A_NUMBER_MESSAGE))
         self.has_separators = has_separators
 
 
@@ -46,4 +46,4 @@ def parse_number(text: str) -> float:
         number = float(typed.replace(",", "."))
         if math.isfinite(number):
             return number
-    raise TypedNumberError(has_separators=_GROUPED.fullmatch(typed) is not None)
+    raise TypedNumberError(has_separators=_GROUPED_NUMBER.fullmatch(typed) is not None)

@@ -29,14 +29,14 @@ _MAX_PROBLEMS = 20
 _MAX_DEPTH = 40
 MAX_VALUES = 20_000
 """Maximum number of values in a description. Checking a value takes about 0.05 ms; Pepper has 900 values."""
-_BLOCK = "rb:block"
-_TEXT_MEMBERS = frozenset({"title", "description", "unit", "vendor", _BLOCK})
+_BLOCK_MEMBER = "rb:block"
+_TEXT_MEMBERS = frozenset({"title", "description", "unit", "vendor", _BLOCK_MEMBER})
 """Members of a description that are texts for the user or contain such texts."""
 _VALUE_MEMBERS = frozenset({"default", "enum", "const"})
 _MAX_NUMBER = 1e15
 _accepted_descriptions: deque[str] = deque(maxlen=8)
 """JSON texts of recently accepted descriptions, because a robot publishes the same description repeatedly."""
-_RESERVED = {"description", "command", "answer", "state", "world"}
+_RESERVED_NAMES = {"description", "command", "answer", "state", "world"}
 
 
 @lru_cache(maxsize=1)
@@ -84,7 +84,7 @@ def without_control_characters(document: Mapping[str, object]) -> dict[str, obje
         if place in _VALUE_MEMBERS:
             return value
         if isinstance(value, Mapping):
-            return {key: clean(item, place if place == _BLOCK else key) for key, item in value.items()}
+            return {key: clean(item, place if place == _BLOCK_MEMBER else key) for key, item in value.items()}
         if isinstance(value, (list, tuple)):
             return [clean(item, "") for item in value]
         return strip_controls(value) if isinstance(value, str) and place in _TEXT_MEMBERS else value
@@ -196,9 +196,9 @@ def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
     elif object_member(object_member(actions, stop), "input").get("required"):
         yield _("'{stop}' is the safe stop, so its input must not have required fields").format(stop=stop)
     resources_named = set(names(model.get("rb:resources")))
-    for name in (set(properties) | _RESERVED) & set(object_member(model, "events")) | set(
+    for name in (set(properties) | _RESERVED_NAMES) & set(object_member(model, "events")) | set(
         properties
-    ) & _RESERVED:
+    ) & _RESERVED_NAMES:
         yield _(
             "'{name}' is reserved or used twice; each sensor and event needs a name of its own, "
             "because the name becomes a topic"

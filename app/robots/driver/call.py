@@ -61,7 +61,7 @@ def _run_callbacks(callbacks: Sequence[Callable[[], object]]) -> None:
             _log.warning("an on_cancel callback failed", exc_info=True)
 
 
-def _in_event_loop() -> bool:
+def _is_in_event_loop() -> bool:
     asyncio = sys.modules.get("asyncio")  # without the import no loop is running
     if asyncio is None:
         return False
@@ -99,7 +99,7 @@ class Link(Protocol):
             data: Fields of the event.
         """
 
-    def wrong_in(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
+    def event_problems(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
         """Validate the data of an event; return one sentence per problem, empty if the data are valid.
 
         Args:
@@ -107,7 +107,7 @@ class Link(Protocol):
             data: Fields of the event.
         """
 
-    def tell(self, leaf: str, value: object) -> None:
+    def publish_value(self, leaf: str, value: object) -> None:
         """Publish a value on a topic that is not in the description, such as ``state``.
 
         Args:
@@ -115,7 +115,7 @@ class Link(Protocol):
             value: Payload.
         """
 
-    def watchers(self, leaf: str) -> int:
+    def subscriber_count(self, leaf: str) -> int:
         """Return the number of subscribers of a sensor's topic.
 
         Use this method to skip expensive work while there are no subscribers.
@@ -131,7 +131,7 @@ class Link(Protocol):
             changed: Called in a background thread with the payload of each message.
         """
 
-    def share(
+    def open_shared_topic(
         self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
     ) -> Callable[[Mapping[str, object]], None]:
         """Publish and subscribe to a topic that several robots share.
@@ -222,7 +222,7 @@ class Call:
             Canceled: The action was cancelled.
             RuntimeError: Called in an ``async def`` action, whose event loop would be blocked.
         """
-        if _in_event_loop():
+        if _is_in_event_loop():
             raise RuntimeError("call.wait holds an async function up; use `await asyncio.sleep` there")
         if self.clock.wait(self._ended, seconds):
             raise Canceled

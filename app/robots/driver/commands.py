@@ -18,7 +18,7 @@ from app.robots.driver.call import Call, Failed
 from app.robots.driver.declare import ActionSpec
 from app.robots.driver.schema_values import from_json
 from app.robots.driver.task import ProgramId, Task, TaskReply
-from app.robots.driver.tasks import NO_SUCH_TASK, Tasks
+from app.robots.driver.tasks import NO_SUCH_TASK_MESSAGE, Tasks
 from app.robots.identity import program_of
 from nep.i18n import _
 from nep.text import bounded_str, quotable
@@ -262,12 +262,12 @@ class CommandHandler:
 
     def _cancel(self, wanted: str, name: str, publisher: int | None) -> None:
         error = self._tasks.cancel(lambda task: task.id == wanted and task.publisher == publisher)
-        if error is not None and wanted in self._open_ids and error == NO_SUCH_TASK:
+        if error is not None and wanted in self._open_ids and error == NO_SUCH_TASK_MESSAGE:
             error = _(
                 "only the program that started “{action}” can cancel it; any program can stop the robot"
             ).format(action=name or wanted)
         if error is not None:
-            error = _(error) if error == NO_SUCH_TASK else error
+            error = _(error) if error == NO_SUCH_TASK_MESSAGE else error
             self._reply_callback(wanted, "cancel", name)(TaskReply("failed", error=error))
 
     def _reply_callback(self, wanted: str, operation: str, name: str) -> Callable[[TaskReply], None]:

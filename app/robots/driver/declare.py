@@ -34,7 +34,7 @@ from nep.system.syntax import parse_module
 
 Function = TypeVar("Function", bound=Callable[..., object])
 DeclaredType = TypeVar("DeclaredType")
-Busy: TypeAlias = Literal["queue", "replace", "reject"]
+BusyPolicy: TypeAlias = Literal["queue", "replace", "reject"]
 Risk: TypeAlias = Literal["moves", "locomotes"]
 FromRize: TypeAlias = Callable[[str, Mapping[str, object]], Mapping[str, object]]
 ToRize: TypeAlias = Callable[[Mapping[str, object]], tuple[str, Mapping[str, object]]]
@@ -84,7 +84,7 @@ class action:  # noqa: N801 - used as a decorator
     says: str | None = None
     title: str | None = None
     uses: tuple[str, ...] = ()
-    on_busy: Busy = "queue"
+    on_busy: BusyPolicy = "queue"
     timeout_s: float | None = None
     risk: Risk | None = None
     cancellable: bool = True

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 RIZE_COMMANDS, RIZE_ANSWERS, RIZE_EVENTS = "robot_action", "action_state", "rize_event"
-BLACKBOARD = "/blackboard"
+BLACKBOARD_TOPIC = "/blackboard"
 MAX_WORLD_BYTES = 1_000_000
 _CLOSE_TIMEOUT_S, _JOIN_TIMEOUT_S = 2.0, 2.0
 _log = logging.getLogger(__name__)
@@ -107,16 +107,16 @@ class Driver:
             self._open_publisher(topic_of(self.name, name), msg_type, latched=not spec.is_image)
         for name in self.kind.events:
             self._open_publisher(topic_of(self.name, name))
-        self._open_publisher(self.robot.topics.answer, "robot/answer")
+        self._open_publisher(self.robot.topics.reply, "robot/answer")
         self._open_publisher(RIZE_ANSWERS)
         self._open_publisher(RIZE_EVENTS, latched=True)
         if any(spec.to_rize for spec in self.kind.events.values()):
-            self._open_publisher(BLACKBOARD)
+            self._open_publisher(BLACKBOARD_TOPIC)
 
     def _start_commands(self, body: object) -> None:
         stop, timing = self.kind.stop
         stop_function: Callable[[], object] = getattr(body, stop)
-        answer = partial(self._publish, self.robot.topics.answer)
+        answer = partial(self._publish, self.robot.topics.reply)
 
         def publish_heartbeat(not_ended: tuple[str, ...], error: str | None) -> None:
             desk.publish_heartbeat(
@@ -206,9 +206,11 @@ class Driver:
         self._publish(topic_of(self.name, event), data)
         if spec.to_rize is not None:
             primitive, given = spec.to_rize(data)
-            self._publish(BLACKBOARD, {"primitive": primitive, "input": dict(given), "robot": self.name})
+            self._publish(
+                BLACKBOARD_TOPIC, {"primitive": primitive, "input": dict(given), "robot": self.name}
+            )
 
-    def wrong_in(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
+    def event_problems(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
         """Validate the data of an event; return one sentence per problem, empty if the data are valid.
 
         Every described field must be present with a valid value; other fields are not allowed.
@@ -222,14 +224,14 @@ class Driver:
             *(_("{place} is missing").format(place=field.title) for field in missing),
         )
 
-    def tell(self, leaf: str, value: object) -> None:
+    def publish_value(self, leaf: str, value: object) -> None:
         """Publish a value on a topic that is not in the description; see `Link.tell`."""
         topic = topic_of(self.name, leaf)
         if topic not in self._publishers:
             self._open_publisher(topic)
         self._publish(topic, value)
 
-    def watchers(self, leaf: str) -> int:
+    def subscriber_count(self, leaf: str) -> int:
         """Return the number of subscribers of a topic of the robot; 0 if the topic isn't open.
 
         Args:
@@ -252,7 +254,7 @@ class Driver:
         """
         self._subscribe(topic_of(self.name, "world"), changed)
 
-    def share(
+    def open_shared_topic(
         self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
     ) -> Callable[[Mapping[str, object]], None]:
         """Publish and subscribe to a topic that several robots share.

@@ -23,8 +23,8 @@ MAX_COMMAND_BYTES = 64_000
 _MAX_BACKLOG = 2_000
 _MAX_BACKLOG_BYTES = 16_000_000
 _SEARCH_WINDOW_BYTES = 2_048
-_ID = re.compile(rb'"id"\s*:\s*"([\w .:/-]{1,200})"', re.ASCII)
-_OPERATION = re.compile(rb'"op"\s*:\s*"(\w{1,20})"', re.ASCII)
+_ID_PATTERN = re.compile(rb'"id"\s*:\s*"([\w .:/-]{1,200})"', re.ASCII)
+_OPERATION_PATTERN = re.compile(rb'"op"\s*:\s*"(\w{1,20})"', re.ASCII)
 _log = logging.getLogger(__name__)
 
 
@@ -185,7 +185,7 @@ class CommandReceiver:
 
     def _is_stop(self, message: Message) -> bool:
         if message.size_bytes > MAX_COMMAND_BYTES:
-            return _search(_OPERATION, message) == "stop"
+            return _search(_OPERATION_PATTERN, message) == "stop"
         raw = bytes(message.raw)
         if not any(needle in raw for needle in self._needles):
             return False
@@ -196,14 +196,14 @@ class CommandReceiver:
 
     def _stop(self, message: Message) -> None:
         if message.size_bytes > MAX_COMMAND_BYTES:
-            self._dialect.stop({"op": "stop", "id": _search(_ID, message)})
+            self._dialect.stop({"op": "stop", "id": _search(_ID_PATTERN, message)})
         else:
             self._dialect.stop(message.payload)
 
     def _enqueue(self, message: Message, epoch: int) -> None:
         if self._queue.put(message, partial(self._receive, message.publisher, epoch)):
             return
-        wanted, operation = _search(_ID, message), _search(_OPERATION, message)
+        wanted, operation = _search(_ID_PATTERN, message), _search(_OPERATION_PATTERN, message)
         if wanted and operation == "invoke" and self._tasks.backlog < _MAX_BACKLOG:
             error = self._queue.too_large_message(message)
             self._tasks.call_soon(partial(self._dialect.reject, wanted, operation, error))

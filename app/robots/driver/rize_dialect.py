@@ -27,7 +27,7 @@ _MAX_PRIMITIVES = 100
 
 
 @dataclass(eq=False)
-class _Group:
+class _PrimitiveGroup:
     """Primitives of one command, to which the driver replies once."""
 
     command: Mapping[str, object]
@@ -88,7 +88,7 @@ class RizeDialect:
         if not self._is_for_robot(command):
             return
         if command.get("node") == "cancel":
-            self._tasks.cancel(lambda task: task.id.startswith(_PREFIX))
+            self._tasks.cancel(lambda task: task.id.startswith(_TASK_ID_PREFIX))
         elif command.get("node") == "action":
             self._run(command, epoch)
 
@@ -105,14 +105,14 @@ class RizeDialect:
 
     def _run(self, command: Mapping[str, object], epoch: int | None) -> None:
         primitives = _primitives(command)
-        group = _Group(command, open_count=len(primitives))
+        group = _PrimitiveGroup(command, open_count=len(primitives))
         if not primitives or len(primitives) > _MAX_PRIMITIVES:
             self._publish({**command, "state": "failure"})
             return
         for primitive in primitives:
             self._start(as_object(primitive), lambda answer: self._record_reply(group, answer), epoch)
 
-    def _record_reply(self, group: _Group, answer: TaskReply) -> None:
+    def _record_reply(self, group: _PrimitiveGroup, answer: TaskReply) -> None:
         if not answer.is_final:
             return
         group.open_count -= 1
@@ -125,7 +125,7 @@ class RizeDialect:
         self, primitive: Mapping[str, object], answer: Callable[[TaskReply], None], epoch: int | None
     ) -> None:
         name, given = text(primitive.get("primitive")) or "", _as_text(primitive.get("input"))
-        wanted = f"{_PREFIX}{next(self._numbers)}"
+        wanted = f"{_TASK_ID_PREFIX}{next(self._numbers)}"
         known, spec = self._specs.get(name, (name, None))
         action = self._robot.action(known)
         if action is not None and action.name == self._robot.safe_stop.action:
@@ -146,7 +146,7 @@ class RizeDialect:
             self._tasks.submit(task)
 
 
-_PREFIX = "rize:"
+_TASK_ID_PREFIX = "rize:"
 
 
 def _primitives(command: Mapping[str, object]) -> Sequence[object]:

@@ -68,7 +68,7 @@ class Text:
 class Words:
     """Texts shown for the values of a ``Literal``, by value."""
 
-    shown: Mapping[str, str]
+    labels: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def _schema_of(annotation: object, inside: tuple[object, ...]) -> Schema:
     if may_be_none:
         schema["rb:nullable"] = True
     for note in notes:
-        schema.update(_note_schema(note, schema))
+        schema.update(_annotation_schema(note, schema))
     return schema
 
 
@@ -194,7 +194,7 @@ def _object_schema(fields: Mapping[str, tuple[object, bool]], inside: tuple[obje
     return _without_none({"type": "object", "required": required or None, "properties": properties})
 
 
-def _note_schema(note: object, schema: Schema) -> Schema:
+def _annotation_schema(note: object, schema: Schema) -> Schema:
     if isinstance(note, Range):
         _check_unit(note.unit)
         step = "multipleOf" if schema.get("type") == "integer" else "rb:step"
@@ -208,7 +208,7 @@ def _note_schema(note: object, schema: Schema) -> Schema:
             named = schema.get("oneOf")
             values = [as_object(each).get("const") for each in named] if isinstance(named, list) else []
         names = values if isinstance(values, list) else []
-        return {"oneOf": [{"const": value, "title": note.shown.get(value, str(value))} for value in names]}
+        return {"oneOf": [{"const": value, "title": note.labels.get(value, str(value))} for value in names]}
     if isinstance(note, Title):
         return {"title": note.text}
     if isinstance(note, Suggested):

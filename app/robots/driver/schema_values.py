@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 from app.errors import RobotValueError
 from nep.i18n import _, format_list, lazy
 
-_MAX_SHOWN_LENGTH = 40
+_MAX_DISPLAYED_LENGTH = 40
 _TYPE_MESSAGES = {
     bool: lazy("{place} must be True or False, not {value}"),
     str: lazy("{place} must be text, not {value}"),
@@ -332,4 +332,4 @@ def _from_numpy(value: object) -> object:
 
 def _format_value(value: object) -> str:
     words = repr(value) if isinstance(value, (str, int, float, bool, type(None))) else type(value).__name__
-    return words if len(words) <= _MAX_SHOWN_LENGTH else f"{words[:_MAX_SHOWN_LENGTH]}…"
+    return words if len(words) <= _MAX_DISPLAYED_LENGTH else f"{words[:_MAX_DISPLAYED_LENGTH]}…"

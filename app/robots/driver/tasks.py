@@ -36,7 +36,7 @@ _MAX_QUEUED = 50
 _MAX_RUNNING = 50
 """Maximum number of running actions. Actions without resources run in parallel, each in a separate thread."""
 STOP_LABEL = lazy("the stop function")
-NO_SUCH_TASK = lazy("no running task has this id")
+NO_SUCH_TASK_MESSAGE = lazy("no running task has this id")
 _MAX_PENDING_STOPS = 2_000
 _JOIN_TIMEOUT_S = 2.0
 _log = logging.getLogger(__name__)
@@ -283,7 +283,7 @@ class Tasks:
         """
         found = [task for task in (*self._running, *self._queue) if wanted(task)]
         if not found:
-            return NO_SUCH_TASK
+            return NO_SUCH_TASK_MESSAGE
         stubborn = [task for task in found if task in self._running and not task.cancellable]
         if stubborn:
             return _("{action} can't be cancelled; it ends on its own").format(action=stubborn[0].action)

@@ -122,7 +122,7 @@ class SimulatedActions(SensorDeclarations):
             self._simulation.body.head_yaw.set_target(yaw)
             self._simulation.body.head_pitch.set_target(pitch)
         self._wait_until(
-            call, lambda: self._simulation.body.are_joints_at_target, self._simulation.body.hold_joints
+            call, lambda: self._simulation.body.are_joints_at_target, self._simulation.body.stop_joints
         )
 
     def _head_angles_to(self, target: str) -> tuple[float, float]:

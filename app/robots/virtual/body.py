@@ -105,11 +105,11 @@ class Body:
     is_lifted: bool = False
     """True while the user has lifted the robot, so that its base doesn't move."""
     events: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
-    _base: Motion | None = field(default=None, repr=False)
+    _base_motion: Motion | None = field(default=None, repr=False)
     _is_turning: bool = field(default=False, repr=False)
     sound: Sound | None = None
     """Sound that is being played, or None."""
-    _sounds: int = field(default=0, repr=False)
+    _sound_count: int = field(default=0, repr=False)
     _speech: Speech | None = field(default=None, repr=False)
     _waves: list[Wave] = field(default_factory=list, repr=False)
     _ending_touches: set[str] = field(default_factory=set, repr=False)
@@ -135,9 +135,9 @@ class Body:
         return self._start(Motion.turn(angle_deg, speed_deg), turning=True)
 
     def _start(self, motion: Motion, *, turning: bool) -> Motion:
-        if self._base is not None:
-            self._base.block()
-        self._base, self._is_turning = motion, turning
+        if self._base_motion is not None:
+            self._base_motion.block()
+        self._base_motion, self._is_turning = motion, turning
         return motion
 
     def speak(self, text: str, speed_percent: float = 100.0) -> Speech:
@@ -163,8 +163,8 @@ class Body:
             notes: Notes to play.
         """
         self.stop_audio()
-        self._sounds += 1
-        self.sound = Sound(self._sounds, title, notes)
+        self._sound_count += 1
+        self.sound = Sound(self._sound_count, title, notes)
         return self.sound
 
     def wave(self, side: str) -> Wave:
@@ -188,25 +188,25 @@ class Body:
 
         The emotion becomes neutral.
         """
-        if self._base is not None:
-            self._base.halt()
+        if self._base_motion is not None:
+            self._base_motion.halt()
         for wave in self._waves:
             wave.halt()
-        self.hold_joints()
+        self.stop_joints()
         self.stop_audio()
         self.emotion = "neutral"
 
-    def hold_joints(self) -> None:
+    def stop_joints(self) -> None:
         """Stop head and arms at their current angles."""
         for joint in self._joints():
-            joint.hold()
+            joint.stop()
 
     def reset(self, room: Room) -> None:
         """Stop everything, enter a room, and return to the start position or the nearest free one."""
         self.halt()
-        if self._base is not None:
-            self._base.block()
-        self._base = None
+        if self._base_motion is not None:
+            self._base_motion.block()
+        self._base_motion = None
         self.room, self.is_lifted = room, False
         self.x, self.y = room.nearest_free(*START_POSE[:2], RADIUS)
         self.theta_deg = START_POSE[2]
@@ -234,7 +234,7 @@ class Body:
     @property
     def is_rolling(self) -> bool:
         """True while the base moves."""
-        return self._base is not None and not self._base.done
+        return self._base_motion is not None and not self._base_motion.done
 
     @property
     def is_still(self) -> bool:
@@ -317,8 +317,8 @@ class Body:
 
     def _step(self, dt: float) -> None:
         self.since_last_word_s += dt
-        if self._base is not None and not (self.is_lifted and self._base.pause()):
-            self._advance_base(self._base, dt)
+        if self._base_motion is not None and not (self.is_lifted and self._base_motion.pause()):
+            self._advance_base(self._base_motion, dt)
         for wave in self._waves:
             wave.step()
         self._waves = [wave for wave in self._waves if not wave.done]
@@ -351,7 +351,7 @@ class Body:
                 motion.block()
                 self.events.append(BodyEvent("bumped", {"side": "front" if way > 0 else "back"}))
         if motion.done:
-            self._base = None
+            self._base_motion = None
 
     def _joints(self) -> tuple[Joint, ...]:
         return (self.head_yaw, self.head_pitch, *self.arms.values(), *self.elbows.values())

@@ -16,7 +16,7 @@ from app.robots.virtual.lens import Lens, Matrix
 from app.robots.virtual.room import WALLS, Ball, Box, Marker, OtherRobot, Person, Room
 
 EYE_FORWARD = 0.09
-_BOOKS = ("#b5594e", "#4e79b8", "#d7a94a", "#5f8f63", "#8a6aa8", "#d4d0c8")
+_BOOK_COLOURS = ("#b5594e", "#4e79b8", "#d7a94a", "#5f8f63", "#8a6aa8", "#d4d0c8")
 
 
 def lens_of(body: Body) -> Lens:
@@ -193,7 +193,7 @@ def _paint_leaf(canvas: Canvas, foot: tuple[float, float, float], lean: float, o
     middle = (start + tip) / 2
     side = right_vector(canvas.lens, foot[0], foot[1]) * 0.045
     shade = "#4f9a5f" if math.sin(lean) > 0 else "#5fae6e"
-    canvas.fill(np.array([start, middle + side, tip, middle - side]), scenery.bgr(shade))
+    canvas.fill(np.array([start, middle + side, tip, middle - side]), scenery.to_bgr(shade))
 
 
 def _paint_shelf(canvas: Canvas, box: Box) -> None:
@@ -215,7 +215,7 @@ def _paint_shelf(canvas: Canvas, box: Box) -> None:
                 front + 0.002,
                 (book, book + 0.07),
                 (low, tall),
-                _BOOKS[(place * 5 + level) % len(_BOOKS)],
+                _BOOK_COLOURS[(place * 5 + level) % len(_BOOK_COLOURS)],
             )
 
 
@@ -224,7 +224,7 @@ def _paint_upright(
 ) -> None:
     (left, right), (low, high) = across, up
     corners = [(left, y, low), (right, y, low), (right, y, high), (left, y, high)]
-    canvas.fill(np.array(corners), scenery.bgr(colour))
+    canvas.fill(np.array(corners), scenery.to_bgr(colour))
 
 
 def _paint_block(
@@ -242,7 +242,7 @@ def _paint_block(
     ]
     for seen, shade, corners in faces:
         if seen:
-            b, g, r = (min(255, round(part * shade)) for part in scenery.bgr(colour))
+            b, g, r = (min(255, round(part * shade)) for part in scenery.to_bgr(colour))
             canvas.fill(np.array(corners), (b, g, r))
 
 

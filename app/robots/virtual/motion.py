@@ -126,7 +126,7 @@ class Joint:
         """Set the target angle in degrees, clamped to the limits."""
         self.target = min(max(target, self.low), self.high)
 
-    def hold(self) -> None:
+    def stop(self) -> None:
         """Stop the joint at its current angle."""
         self.target = self.angle
 
@@ -169,6 +169,6 @@ class Wave:
 
     def halt(self) -> None:
         """Stop the arm at its current angles and end the wave."""
-        self.arm.hold()
-        self.elbow.hold()
+        self.arm.stop()
+        self.elbow.stop()
         self.done = True

@@ -13,7 +13,7 @@ PRESENCE_TIMEOUT_S = 1.5
 """Time in seconds without messages after which a robot counts as gone."""
 IDLE_PUBLISH_INTERVAL_S = 0.2
 """Interval in seconds of the position messages of a robot that doesn't move."""
-MAX_COUNT = 12
+MAX_NEIGHBOURS = 12
 
 
 class Neighbours:
@@ -37,7 +37,7 @@ class Neighbours:
         other = _parse_position(message)
         if other is None or other.name == self._name:
             return
-        if other.name not in self._seen and len(self._seen) >= MAX_COUNT:
+        if other.name not in self._seen and len(self._seen) >= MAX_NEIGHBOURS:
             return
         began = message.get("began_ns")
         self._seen[other.name] = (other, self._clock.now(), began if isinstance(began, int) else 0)

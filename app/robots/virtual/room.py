@@ -146,7 +146,7 @@ class OtherRobot:
 
 
 Thing: TypeAlias = Ball | Person | Marker | Box
-_Round: TypeAlias = Person | OtherRobot
+_RoundObject: TypeAlias = Person | OtherRobot
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,7 @@ class Room:
             and self.y_min + radius <= y <= self.y_max - radius
         ):
             return False
-        rounds: tuple[_Round, ...] = (*self.people, *self.other_robots)
+        rounds: tuple[_RoundObject, ...] = (*self.people, *self.other_robots)
         for each in rounds:
             gap = math.hypot(x - each.x, y - each.y)
             if gap < radius + each.radius and (
@@ -241,7 +241,7 @@ class Room:
     def distance_ahead(self, x: float, y: float, theta_deg: float) -> float:
         """Return the distance from a point to the nearest wall, person, robot or furniture in a direction."""
         dx, dy = math.cos(math.radians(theta_deg)), math.sin(math.radians(theta_deg))
-        rounds: tuple[_Round, ...] = (*self.people, *self.other_robots)
+        rounds: tuple[_RoundObject, ...] = (*self.people, *self.other_robots)
         hits = [
             self._distance_to_walls(x, y, dx, dy),
             *(_distance_to_circle(x, y, dx, dy, each) for each in rounds),
@@ -374,7 +374,7 @@ def _with_replaced(things: tuple[T, ...], old: T, new: T) -> tuple[T, ...]:
     return tuple(new if thing is old else thing for thing in things)
 
 
-def _distance_to_circle(x: float, y: float, dx: float, dy: float, round_one: _Round) -> float:
+def _distance_to_circle(x: float, y: float, dx: float, dy: float, round_one: _RoundObject) -> float:
     along = (round_one.x - x) * dx + (round_one.y - y) * dy
     aside = abs((round_one.x - x) * dy - (round_one.y - y) * dx)
     if along <= 0 or aside > round_one.radius:

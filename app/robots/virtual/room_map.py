@@ -17,7 +17,7 @@ from app.robots.virtual.room import Ball, Box, Marker, Person, Room, Thing
 TOPIC = "/room"
 ROBOTS_TOPIC = "/room/robots"
 KINDS = ("ball", "person", "marker", "table", "shelf")
-MAX_COUNT = 60
+MAX_OBJECTS = 60
 MAX_PER_KIND = 8
 MAX_NAME_LENGTH = 40
 BALL_COLOURS = ("#e0474c", "#e2b33c", "#4f8fd0", "#4aa564")
@@ -118,7 +118,7 @@ class RoomMap:
         self._set_entry(replace(known, gone=True))
         return True
 
-    def restore_start(self) -> None:
+    def reset(self) -> None:
         """Restore the room at the start; added objects are removed."""
         first = {thing.name: thing for thing in self.start.things}
         for known in list(self._things.values()):
@@ -146,7 +146,7 @@ class RoomMap:
         changed = False
         for thing in _parse_entries(told if isinstance(told, Sequence) and not isinstance(told, str) else ()):
             known = self._things.get(thing.name)
-            if known is None and len(self._things) >= MAX_COUNT:
+            if known is None and len(self._things) >= MAX_OBJECTS:
                 continue
             if known is None or (thing.kind == known.kind and thing.merge_key > known.merge_key):
                 self._things[thing.name] = thing
@@ -221,7 +221,7 @@ def _names(kind: str) -> Sequence[str]:
 
 
 def _parse_entries(told: Sequence[object]) -> Iterator[MapEntry]:
-    for one in told[:MAX_COUNT]:
+    for one in told[:MAX_OBJECTS]:
         if not isinstance(one, Mapping):
             continue
         name, kind, x, y = (one.get(key) for key in ("name", "kind", "x", "y"))

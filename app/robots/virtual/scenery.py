@@ -20,7 +20,7 @@ FACE_ROWS = (0.0, 0.21)  # face from hair to chin, as parts of the figure's heig
 FIGURE_ASPECT_RATIO = FIGURE_SIZE_PX[0] / FIGURE_SIZE_PX[1]  # of its height
 
 
-def bgr(colour: str) -> Colour:
+def to_bgr(colour: str) -> Colour:
     """Convert a colour "#rrggbb" to a BGR tuple."""
     return int(colour[5:7], 16), int(colour[3:5], 16), int(colour[1:3], 16)
 
@@ -28,12 +28,14 @@ def bgr(colour: str) -> Colour:
 def gradient(height: int, width: int, top: str, bottom: str) -> Picture:
     """Return an image with a vertical gradient between two colours ("#rrggbb")."""
     part = np.linspace(0.0, 1.0, height)[:, None, None]
-    rows = np.array(bgr(top)) * (1 - part) + np.array(bgr(bottom)) * part
+    rows = np.array(to_bgr(top)) * (1 - part) + np.array(to_bgr(bottom)) * part
     return np.repeat(rows, width, axis=1).astype(np.uint8)
 
 
 def _paint_rect(picture: Picture, left: float, top: float, right: float, bottom: float, colour: str) -> None:
-    cv2.rectangle(picture, (round(left), round(top)), (round(right), round(bottom)), bgr(colour), cv2.FILLED)
+    cv2.rectangle(
+        picture, (round(left), round(top)), (round(right), round(bottom)), to_bgr(colour), cv2.FILLED
+    )
 
 
 # ---- walls ----------------------------------------------------------------------------------------
@@ -83,7 +85,7 @@ def _paint_door(picture: Picture, left: float, top: float, right: float, bottom:
         _paint_rect(picture, left + 13, y0, right - 13, y1, "#7b5d42")
         _paint_rect(picture, left + 16, y0 + 3, right - 15, y1 - 2, "#86684b")
     middle = (round(left + 10), round((top + bottom) / 2 + 6))
-    cv2.circle(picture, middle, 5, bgr("#d9c48c"), cv2.FILLED, cv2.LINE_AA)
+    cv2.circle(picture, middle, 5, to_bgr("#d9c48c"), cv2.FILLED, cv2.LINE_AA)
 
 
 def _paint_board(picture: Picture, left: float, top: float, right: float, bottom: float) -> None:
@@ -95,7 +97,7 @@ def _paint_board(picture: Picture, left: float, top: float, right: float, bottom
     chart = [(0.70, 0.72), (0.78, 0.50), (0.86, 0.60), (0.93, 0.32)]
     points = [(round(left + (right - left) * x), round(top + (bottom - top) * y)) for x, y in chart]
     for start, end in itertools.pairwise(points):
-        cv2.line(picture, start, end, bgr("#3a9a62"), 3, cv2.LINE_AA)
+        cv2.line(picture, start, end, to_bgr("#3a9a62"), 3, cv2.LINE_AA)
     _paint_rect(picture, left + 10, bottom + 1, right - 10, bottom + 8, "#a9aeb2")
 
 
@@ -109,7 +111,7 @@ def _paint_window(picture: Picture, left: float, top: float, right: float, botto
             (round(width * x), round(height * y)),
             (round(width * size), round(height * size * 0.8)),
         )
-        cv2.ellipse(view, middle, radii, 0, 0, 360, bgr(colour), cv2.FILLED, cv2.LINE_AA)
+        cv2.ellipse(view, middle, radii, 0, 0, 360, to_bgr(colour), cv2.FILLED, cv2.LINE_AA)
     picture[y0:y1, x0:x1] = view
     _paint_rect(picture, (left + right) / 2 - 4, top, (left + right) / 2 + 4, bottom, "#fbfaf7")
     _paint_rect(picture, left, (top + bottom) / 2 - 4, right, (top + bottom) / 2 + 4, "#fbfaf7")
@@ -124,7 +126,7 @@ def _paint_picture(picture: Picture, left: float, top: float, right: float, bott
         tip = (left + (right - left) * x, top + (bottom - top) * peak)
         wide = (right - left) * 0.25
         corners = np.array([tip, (tip[0] + wide, base), (tip[0] - wide, base)]).round().astype(np.int32)
-        cv2.fillConvexPoly(picture, corners, bgr("#e6a94b"), cv2.LINE_AA)
+        cv2.fillConvexPoly(picture, corners, to_bgr("#e6a94b"), cv2.LINE_AA)
 
 
 # ---- floor, ceiling -------------------------------------------------------------------------------
@@ -144,11 +146,11 @@ def floor(room: Room) -> Texture:
         while start < width:
             length = int(shades.integers(170, 300))
             shade = float(shades.uniform(0.95, 1.04))
-            colour = tuple(min(255.0, part * shade) for part in bgr("#a68763"))
+            colour = tuple(min(255.0, part * shade) for part in to_bgr("#a68763"))
             cv2.rectangle(picture, (start, row), (start + length, row + board - 1), colour, cv2.FILLED)
-            cv2.line(picture, (start, row), (start, row + board - 1), bgr("#957757"), 1)
+            cv2.line(picture, (start, row), (start, row + board - 1), to_bgr("#957757"), 1)
             start += length
-        cv2.line(picture, (0, row), (width, row), bgr("#8f7152"), 2)
+        cv2.line(picture, (0, row), (width, row), to_bgr("#8f7152"), 2)
     x = np.minimum(np.arange(width), np.arange(width)[::-1])[None, :] / PIXELS_PER_M
     y = np.minimum(np.arange(depth), np.arange(depth)[::-1])[:, None] / PIXELS_PER_M
     light = 1.04 - 0.24 * np.exp(-np.minimum(x, y) / 0.35)
@@ -165,7 +167,7 @@ def shadow() -> Texture:
     y, x = np.mgrid[-1:1:64j, -1:1:64j]
     alpha = np.clip(1.0 - np.hypot(x, y), 0.0, 1.0) ** 1.2 * 150
     picture = np.zeros((64, 64, 4), dtype=np.uint8)
-    picture[:, :, :3] = bgr("#2b2117")
+    picture[:, :, :3] = to_bgr("#2b2117")
     picture[:, :, 3] = alpha.astype(np.uint8)
     return Texture(picture)
 
@@ -198,7 +200,7 @@ class _Painter:
     def _point(self, x: float, y: float) -> tuple[int, int]:
         return round(x * self.width), round(y * self.height)
 
-    def oval(
+    def paint_oval(
         self,
         middle: tuple[float, float],
         size: tuple[float, float],
@@ -206,21 +208,21 @@ class _Painter:
         part: tuple[int, int] = (0, 360),
     ) -> None:
         radii = (round(size[0] * self.width), round(size[1] * self.height))
-        for target, value in ((self.colour, bgr(colour)), (self.alpha, (255,))):
+        for target, value in ((self.colour, to_bgr(colour)), (self.alpha, (255,))):
             cv2.ellipse(target, self._point(*middle), radii, 0, *part, value, cv2.FILLED, cv2.LINE_AA)
 
-    def arc(
+    def paint_arc(
         self, middle: tuple[float, float], radii: tuple[float, float], colour: str, part: tuple[int, int]
     ) -> None:
         thick = round(0.014 * self.width)
         across, down = round(radii[0] * self.width), round(radii[1] * self.height)
         cv2.ellipse(
-            self.colour, self._point(*middle), (across, down), 0, *part, bgr(colour), thick, cv2.LINE_AA
+            self.colour, self._point(*middle), (across, down), 0, *part, to_bgr(colour), thick, cv2.LINE_AA
         )
 
     def shape(self, points: list[tuple[float, float]], colour: str) -> None:
         corners = np.array([self._point(x, y) for x, y in points], dtype=np.int32)
-        for target, value in ((self.colour, bgr(colour)), (self.alpha, (255,))):
+        for target, value in ((self.colour, to_bgr(colour)), (self.alpha, (255,))):
             cv2.fillPoly(target, [corners], value, cv2.LINE_AA)
 
     def done(self) -> Picture:
@@ -234,40 +236,40 @@ def person() -> Texture:
     paint = _Painter(*FIGURE_SIZE_PX)
     for x in (0.40, 0.60):  # legs and shoes
         paint.shape([(x - 0.1, 0.62), (x + 0.1, 0.62), (x + 0.075, 0.97), (x - 0.075, 0.97)], "#3b4658")
-        paint.oval((x, 0.975), (0.1, 0.022), "#e8e6e1")
+        paint.paint_oval((x, 0.975), (0.1, 0.022), "#e8e6e1")
     for side in (-1, 1):  # arms and hands behind the body
         shoulder, hand = 0.5 + side * 0.27, 0.5 + side * 0.36
         paint.shape(
             [(shoulder - 0.07, 0.322), (shoulder + 0.05, 0.322), (hand + 0.06, 0.55), (hand - 0.06, 0.55)],
             "#3972a8",
         )
-        paint.oval((shoulder + 0.008 * side, 0.322), (0.06, 0.03), "#3972a8")
-        paint.oval((hand, 0.565), (0.055, 0.03), "#e0ab85")
-    paint.oval((0.5, 0.33), (0.325, 0.09), "#3f7db8")
+        paint.paint_oval((shoulder + 0.008 * side, 0.322), (0.06, 0.03), "#3972a8")
+        paint.paint_oval((hand, 0.565), (0.055, 0.03), "#e0ab85")
+    paint.paint_oval((0.5, 0.33), (0.325, 0.09), "#3f7db8")
     paint.shape([(0.175, 0.33), (0.825, 0.33), (0.76, 0.66), (0.24, 0.66)], "#3f7db8")
     paint.shape([(0.42, 0.18), (0.58, 0.18), (0.6, 0.255), (0.4, 0.255)], "#d99f78")
-    paint.oval((0.5, 0.247), (0.125, 0.024), "#d99f78")
+    paint.paint_oval((0.5, 0.247), (0.125, 0.024), "#d99f78")
     _paint_head(paint)
     return Texture(paint.done())
 
 
 def _paint_head(paint: _Painter) -> None:
     for x in (0.315, 0.685):
-        paint.oval((x, 0.125), (0.035, 0.022), "#dca27b")
-    paint.oval((0.5, 0.085), (0.205, 0.085), "#4b2f24")
-    paint.oval((0.5, 0.118), (0.185, 0.092), "#e9b690")
-    paint.oval((0.5, 0.075), (0.2, 0.07), "#4b2f24", (180, 360))
+        paint.paint_oval((x, 0.125), (0.035, 0.022), "#dca27b")
+    paint.paint_oval((0.5, 0.085), (0.205, 0.085), "#4b2f24")
+    paint.paint_oval((0.5, 0.118), (0.185, 0.092), "#e9b690")
+    paint.paint_oval((0.5, 0.075), (0.2, 0.07), "#4b2f24", (180, 360))
     paint.shape([(0.302, 0.074), (0.31, 0.118), (0.335, 0.085), (0.42, 0.07)], "#4b2f24")
     paint.shape([(0.698, 0.074), (0.69, 0.118), (0.665, 0.085), (0.58, 0.07)], "#4b2f24")
     for x in (0.425, 0.575):
-        paint.oval((x, 0.116), (0.03, 0.0095), "#fdfbf8")
-        paint.oval((x, 0.1165), (0.019, 0.0095), "#33241d")
-        paint.oval((x + 0.006, 0.1135), (0.006, 0.003), "#ffffff")
-        paint.arc((x, 0.106), (0.042, 0.012), "#4b2f24", (205, 335))
-    paint.arc((0.5, 0.139), (0.022, 0.009), "#c98c67", (20, 160))
+        paint.paint_oval((x, 0.116), (0.03, 0.0095), "#fdfbf8")
+        paint.paint_oval((x, 0.1165), (0.019, 0.0095), "#33241d")
+        paint.paint_oval((x + 0.006, 0.1135), (0.006, 0.003), "#ffffff")
+        paint.paint_arc((x, 0.106), (0.042, 0.012), "#4b2f24", (205, 335))
+    paint.paint_arc((0.5, 0.139), (0.022, 0.009), "#c98c67", (20, 160))
     for x in (0.37, 0.63):
-        paint.oval((x, 0.15), (0.036, 0.013), "#e6a688")
-    paint.arc((0.5, 0.154), (0.085, 0.024), "#a8493f", (18, 162))
+        paint.paint_oval((x, 0.15), (0.036, 0.013), "#e6a688")
+    paint.paint_arc((0.5, 0.154), (0.085, 0.024), "#a8493f", (18, 162))
 
 
 def robot(small: bool, *, faces: bool) -> Texture:
@@ -284,37 +286,37 @@ def robot(small: bool, *, faces: bool) -> Texture:
 
 def _paint_large_robot(paint: _Painter, *, faces: bool) -> None:
     paint.shape([(0.3, 0.55), (0.7, 0.55), (0.86, 0.97), (0.14, 0.97)], "#e9edf4")
-    paint.oval((0.5, 0.965), (0.36, 0.03), "#c8ccd8")
+    paint.paint_oval((0.5, 0.965), (0.36, 0.03), "#c8ccd8")
     for side in (-1, 1):
         shoulder, hand = 0.5 + side * 0.33, 0.5 + side * 0.4
         paint.shape(
             [(shoulder - 0.06, 0.33), (shoulder + 0.06, 0.33), (hand + 0.05, 0.6), (hand - 0.05, 0.6)],
             "#dfe4ee",
         )
-        paint.oval((hand, 0.61), (0.065, 0.032), "#f3f5fa")
-    paint.oval((0.5, 0.43), (0.31, 0.15), "#f7f8fb")
-    paint.oval((0.5, 0.155), (0.36, 0.155), "#f4f6fa")
+        paint.paint_oval((hand, 0.61), (0.065, 0.032), "#f3f5fa")
+    paint.paint_oval((0.5, 0.43), (0.31, 0.15), "#f7f8fb")
+    paint.paint_oval((0.5, 0.155), (0.36, 0.155), "#f4f6fa")
     if not faces:
         paint.shape([(0.36, 0.36), (0.64, 0.36), (0.64, 0.5), (0.36, 0.5)], "#d9dee8")
         return
     paint.shape([(0.33, 0.36), (0.67, 0.36), (0.67, 0.48), (0.33, 0.48)], "#20232e")
     for x in (0.37, 0.63):
-        paint.oval((x, 0.16), (0.1, 0.045), "#1b1e2a")
-        paint.oval((x, 0.16), (0.07, 0.032), "#8fc3e6")
-        paint.oval((x, 0.16), (0.035, 0.016), "#1b1e2a")
-    paint.arc((0.5, 0.21), (0.1, 0.03), "#4e5566", (20, 160))
+        paint.paint_oval((x, 0.16), (0.1, 0.045), "#1b1e2a")
+        paint.paint_oval((x, 0.16), (0.07, 0.032), "#8fc3e6")
+        paint.paint_oval((x, 0.16), (0.035, 0.016), "#1b1e2a")
+    paint.paint_arc((0.5, 0.21), (0.1, 0.03), "#4e5566", (20, 160))
 
 
 def _paint_small_robot(paint: _Painter, *, faces: bool) -> None:
     for x in (0.1, 0.9):
-        paint.oval((x, 0.78), (0.07, 0.2), "#2b2d33")
+        paint.paint_oval((x, 0.78), (0.07, 0.2), "#2b2d33")
     paint.shape([(0.1, 0.5), (0.9, 0.5), (0.9, 0.88), (0.1, 0.88)], "#5a7f76")
-    paint.oval((0.5, 0.88), (0.4, 0.1), "#5a7f76")
-    paint.oval((0.5, 0.5), (0.4, 0.13), "#7d9f95")
+    paint.paint_oval((0.5, 0.88), (0.4, 0.1), "#5a7f76")
+    paint.paint_oval((0.5, 0.5), (0.4, 0.13), "#7d9f95")
     paint.shape([(0.46, 0.2), (0.54, 0.2), (0.54, 0.5), (0.46, 0.5)], "#c8ccd8")
     paint.shape([(0.34, 0.06), (0.66, 0.06), (0.66, 0.28), (0.34, 0.28)], "#e9edf4")
     if faces:
-        paint.oval((0.5, 0.17), (0.08, 0.09), "#1b1e2a")
+        paint.paint_oval((0.5, 0.17), (0.08, 0.09), "#1b1e2a")
 
 
 def ball(colour: str) -> Texture:
@@ -329,7 +331,7 @@ def ball(colour: str) -> Texture:
     light = np.clip(1.18 - 0.4 * np.hypot(x + 0.35, y + 0.42), 0.5, 1.15)
     shine = np.exp(-((x + 0.36) ** 2 + (y + 0.44) ** 2) / 0.035) * 130
     picture = np.zeros((side, side, 4), dtype=np.uint8)
-    shaded = np.array(bgr(colour))[None, None, :] * light[:, :, None] + shine[:, :, None]
+    shaded = np.array(to_bgr(colour))[None, None, :] * light[:, :, None] + shine[:, :, None]
     picture[:, :, :3] = np.clip(shaded, 0, 255).astype(np.uint8)
     picture[:, :, 3] = np.clip((1.0 - radius) * side / 2, 0, 1) * 255
     return Texture(picture)

@@ -57,8 +57,8 @@ class SharedRoom:
         self._arrives_until_s = clock.now() + ARRIVAL_PERIOD_S
         self._start = body.x, body.y
         self._went_back_with: frozenset[str] = frozenset()
-        self._tell_room = link.share(TOPIC, self._receive_room, latched=True)
-        self._tell_robots = link.share(ROBOTS_TOPIC, self._receive_robot)
+        self._tell_room = link.open_shared_topic(TOPIC, self._receive_room, latched=True)
+        self._tell_robots = link.open_shared_topic(ROBOTS_TOPIC, self._receive_robot)
 
     def _receive_room(self, message: Mapping[str, object]) -> None:
         with self._lock:
@@ -117,9 +117,9 @@ class SharedRoom:
         room = replace(body.room, other_robots=staying)
         body.set_position(*room.nearest_free(*self._start, self._like.radius))
 
-    def restore_start(self) -> Room:
+    def reset(self) -> Room:
         """Reset the room to its initial state and return it. Call this with the lock held."""
-        self._map.restore_start()
+        self._map.reset()
         self._is_new = True
         self.update_body()
         return self._body.room

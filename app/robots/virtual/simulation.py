@@ -25,10 +25,10 @@ BODY_HZ = 30.0
 CAMERA_HZ = 15.0
 _DETECTION_PERIOD_IMAGES = 3  # images; people and balls don't change faster
 _SLOW_PERIOD_STEPS = 3  # steps between two values of pose and distance
-_CALM_PERIOD_STEPS = 30  # steps between two values of slowly changing sensors
+_SLOW_SENSOR_PERIOD_STEPS = 30  # steps between two values of slowly changing sensors
 _MAX_STEP_S = 0.25  # after a suspend the simulation continues from where it was
 _SMALL_STEP_S = 0.004  # used while a stop waits for the body to stand still
-_LOST_AFTER_S = 0.5
+_FACE_LOST_TIMEOUT_S = 0.5
 _JOIN_TIMEOUT_S = 2.0
 ROBOT_ITSELF = "robot"
 """Name in ``move`` messages for the robot instead of an object."""
@@ -144,11 +144,11 @@ class Simulation:
         with self.changed:
             state, distance = drawing_state(self.body), self.body.distance
             pose = {"x": state["x"], "y": state["y"], "theta": state["theta_deg"]}
-        self._link.tell("state", state)
+        self._link.publish_value("state", state)
         if step % _SLOW_PERIOD_STEPS == 0:
             self._link.sense("pose", pose)
             self._link.sense("distance", round(distance, 2))
-        if step % _CALM_PERIOD_STEPS == 0:
+        if step % _SLOW_SENSOR_PERIOD_STEPS == 0:
             self._link.sense("battery", int(self.body.battery))
             self._link.sense("head_touched", "head" in self.body.touched)
             self._link.sense("heard_word", self.body.last_word)
@@ -157,7 +157,7 @@ class Simulation:
 
     def _run_camera(self) -> None:
         for count, _ in enumerate(self._ticker(CAMERA_HZ)):
-            is_watched = self._link.watchers("camera") > 0
+            is_watched = self._link.subscriber_count("camera") > 0
             is_turn = count % _DETECTION_PERIOD_IMAGES == 0
             # subscribers get boxes that belong to the same image
             if is_watched or is_turn:
@@ -202,7 +202,7 @@ class Simulation:
             if self._face != name:
                 self._face = name
                 self._link.happen("face_seen", name=name)
-        elif self._face is not None and now - self._face_seen_s >= _LOST_AFTER_S:
+        elif self._face is not None and now - self._face_seen_s >= _FACE_LOST_TIMEOUT_S:
             gone, self._face = self._face, None
             self._link.happen("face_lost", name=gone)
 
@@ -233,7 +233,7 @@ class Simulation:
             if isinstance(word, str) and word.strip():
                 self.body.hear(word.strip())
             if change.get("reset") is True:
-                self.body.reset(self._shared.restore_start())
+                self.body.reset(self._shared.reset())
             if "start" in change:
                 self._shared.return_to_start(change["start"])
         if isinstance(change.get("happen"), str):
@@ -296,7 +296,7 @@ def parse_event(change: Mapping[str, object]) -> tuple[str, dict[str, object]]:
 
 def is_valid_event(link: Link, event: str, data: Mapping[str, object]) -> bool:
     """Return True if a simulated event matches the description; otherwise log the problems."""
-    wrong = link.wrong_in(event, data)
+    wrong = link.event_problems(event, data)
     if wrong:
         _log.warning("%s: it can't notice '%s': %s", link.name, quotable(event), "; ".join(wrong))
     return not wrong

@@ -23,7 +23,7 @@ _MIN_FACE_WIDTH_PX = 8  # pixels across
 _MIN_VISIBLE_FACE = 0.6
 
 MIN_AREA = 0.004
-_HUES: dict[str, tuple[tuple[int, int], ...]] = {
+_HUE_RANGES: dict[str, tuple[tuple[int, int], ...]] = {
     "red": ((0, 8), (172, 180)),
     "green": ((45, 85),),
     "blue": ((98, 125),),
@@ -166,7 +166,7 @@ def colours_in(picture: Picture) -> dict[str, ColourPatch]:
     height, width = picture.shape[:2]
     hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
     found = {}
-    for name, ranges in _HUES.items():
+    for name, ranges in _HUE_RANGES.items():
         mask = np.zeros((height, width), np.uint8)
         for low, high in ranges:
             least = np.array([low, _MIN_SATURATION, _MIN_VALUE], np.uint8)

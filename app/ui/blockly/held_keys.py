@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QCoreApplication, QEvent, QObject
 
-_KEYS = (QEvent.Type.KeyPress, QEvent.Type.KeyRelease)
+_KEY_EVENTS = (QEvent.Type.KeyPress, QEvent.Type.KeyRelease)
 _RELEASE_EVENTS = (QEvent.Type.MouseButtonPress, QEvent.Type.FocusOut)
 
 
-class HeldKeys:
+class KeyBuffer:
     """Buffer for key presses between a command that focuses a field and the page's reply.
 
     Commands and keys reach the page by different channels, and keys are faster: letters typed immediately
@@ -22,19 +22,19 @@ class HeldKeys:
         self._keyboard = keyboard
         self._kept: list[QEvent] | None = None
 
-    def hold(self) -> None:
+    def start(self) -> None:
         """Start buffering key presses."""
         if self._kept is None:
             self._kept = []
 
-    def hold_event(self, event: QEvent) -> bool:
+    def buffer_event(self, event: QEvent) -> bool:
         """Buffer a key press and return True; return False for other events and while buffering is off.
 
         A click or the loss of focus sends the buffered keys.
         """
         if self._kept is None:
             return False
-        if event.type() in _KEYS:
+        if event.type() in _KEY_EVENTS:
             self._kept.append(event.clone())
             return True
         if event.type() in _RELEASE_EVENTS:

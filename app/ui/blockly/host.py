@@ -21,7 +21,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app import resources
 from app.core.reports.crash import crash_extra
 from app.ui.blockly.bridge import BlocklyBridge, Json
-from app.ui.blockly.held_keys import HeldKeys
+from app.ui.blockly.held_keys import KeyBuffer
 from app.ui.blockly.scheme import PAGE_URL, SCHEME, RequestBlocker, SchemeHandler, register_scheme
 from app.ui.widgets.keyboard import focus_proxy, is_keyboard_navigation
 from nep import i18n
@@ -98,7 +98,7 @@ class BlocklyWeb:
         self.view.deleteLater()
         self._profile.deleteLater()
 
-    def keyboard(self) -> QObject | None:
+    def keyboard_target(self) -> QObject | None:
         """Return the widget that receives key presses while the page has the focus; None before it exists."""
         return focus_proxy(self.view)
 
@@ -123,7 +123,7 @@ class BlocklyHost(QWidget):
         self._up_since = 0.0
         self._bridge = BlocklyBridge(self._initial_settings, self)
         self._bridge.page_ready.connect(self._on_page_ready)
-        self._keys = HeldKeys(lambda: self._web.keyboard() if self._web is not None else None)
+        self._keys = KeyBuffer(lambda: self._web.keyboard_target() if self._web is not None else None)
         self._asked_for = ""  # requested field: "find" or "search"; "" when it has the focus
         self._bridge.field_opened.connect(self._on_field_opened)
         self._on_block = False
@@ -183,7 +183,7 @@ class BlocklyHost(QWidget):
             return
         self._asked_for = field
         self._install_key_filter()
-        self._keys.hold()
+        self._keys.start()
         self._send_command(field, None)
 
     # -- page -------------------------------------------------------------------------------------
@@ -196,19 +196,19 @@ class BlocklyHost(QWidget):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ChildAdded:
             self._install_key_filter()
-        if self._keys.hold_event(event):
+        if self._keys.buffer_event(event):
             return True
         if event.type() == QEvent.Type.FocusIn and is_keyboard_navigation():
             self._send_command("keyboard", None)
         overrides = event.type() == QEvent.Type.ShortcutOverride and self._on_block
-        if overrides and _is_help(cast("QKeyEvent", event)):
+        if overrides and _is_help_key(cast("QKeyEvent", event)):
             event.accept()  # on a block, F1 shows the block's help instead of the window's
             return True
         if event.type() == QEvent.Type.KeyPress:
             key = cast("QKeyEvent", event)
             # A shortcut of the window is handled before the key press arrives here.
             if key.key() in _FUNCTION_KEYS and key.modifiers() == Qt.KeyboardModifier.NoModifier:
-                if self._on_block and _is_help(key):
+                if self._on_block and _is_help_key(key):
                     self._send_command("help", None)
                 else:
                     self.key_pressed.emit(QKeySequence(key.key()).toString())
@@ -218,7 +218,7 @@ class BlocklyHost(QWidget):
     def _create_page(self) -> None:
         if self._web is not None or not self.isVisible():
             return
-        self._web = BlocklyWeb(self._bridge, self._background(), self)
+        self._web = BlocklyWeb(self._bridge, self._background_colour(), self)
         self._layout.addWidget(self._web.view)
         self.setFocusProxy(self._web.view)
         self._web.view.installEventFilter(self)
@@ -237,14 +237,14 @@ class BlocklyHost(QWidget):
 
     def _apply_theme(self, web: BlocklyWeb) -> None:
         # Styles outside the page's control: background before the first paint, text size.
-        web.page.setBackgroundColor(self._background())
+        web.page.setBackgroundColor(self._background_colour())
         tokens = cast("Mapping[str, object]", self._theme["tokens"])
         percent = tokens.get("textPercent")
         web.view.setZoomFactor(percent / 100 if isinstance(percent, int | float) else 1.0)
 
     def _install_key_filter(self) -> None:
         # The web engine creates the widget that receives keys, and a new one for each process.
-        keyboard = self._web.keyboard() if self._web is not None else None
+        keyboard = self._web.keyboard_target() if self._web is not None else None
         if self._web is not None:
             self._web.view.setAcceptDrops(False)
         if keyboard is not None:
@@ -267,7 +267,7 @@ class BlocklyHost(QWidget):
             "theme": self._theme,
         }
 
-    def _background(self) -> QColor:
+    def _background_colour(self) -> QColor:
         tokens = cast("Mapping[str, Mapping[str, object]]", self._initial_settings()["theme"])["tokens"]
         colours = cast("Mapping[str, object]", tokens["colour"])
         mode = colours.get("dark" if self._theme["dark"] else "light", colours)
@@ -315,5 +315,5 @@ class BlocklyHost(QWidget):
             QTimer.singleShot(delay, self._web.page, self._web.start)
 
 
-def _is_help(key: QKeyEvent) -> bool:
+def _is_help_key(key: QKeyEvent) -> bool:
     return key.key() == Qt.Key.Key_F1 and key.modifiers() == Qt.KeyboardModifier.NoModifier

@@ -47,7 +47,7 @@ def register_scheme() -> None:
     QWebEngineUrlScheme.registerScheme(scheme)
 
 
-def content(path: str, folder: Path | None = None) -> tuple[str, bytes] | None:
+def read_content(path: str, folder: Path | None = None) -> tuple[str, bytes] | None:
     """Return the media type and the content of a file of the page; None if the file doesn't exist.
 
     Paths can't leave the editor's folder, except to the bundled fonts under ``/fonts/``.
@@ -96,7 +96,7 @@ class SchemeHandler(QWebEngineUrlSchemeHandler):
         if url.host() != HOST or job.requestMethod() != b"GET":
             job.fail(QWebEngineUrlRequestJob.Error.RequestDenied)
             return
-        found = content(url.path())
+        found = read_content(url.path())
         if found is None:
             job.fail(QWebEngineUrlRequestJob.Error.UrlNotFound)
             return

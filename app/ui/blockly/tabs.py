@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from app.core.documents.workspace_json import EMPTY, WorkspaceJson
+from app.core.documents.workspace_json import EMPTY_WORKSPACE, WorkspaceJson
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Tabs:
     def __init__(self) -> None:
         self._generations = 0
         self._tabs: dict[str, Tab] = {}
-        self.shown = self._create_tab("", WorkspaceJson.from_blocks(EMPTY))
+        self.shown = self._create_tab("", WorkspaceJson.from_blocks(EMPTY_WORKSPACE))
 
     def __getitem__(self, key: str) -> Tab | None:
         return self._tabs.get(key)
@@ -63,7 +63,7 @@ class Tabs:
         """Remove a tab; return False if it doesn't exist. The placeholder replaces the shown tab."""
         gone = self._tabs.pop(key, None)
         if gone is not None and gone is self.shown:
-            self.shown = self._create_tab("", WorkspaceJson.from_blocks(EMPTY))
+            self.shown = self._create_tab("", WorkspaceJson.from_blocks(EMPTY_WORKSPACE))
         return gone is not None
 
     def replace(self, program: WorkspaceJson) -> None:

@@ -31,7 +31,7 @@ def remaining_text(seconds: float) -> str:
 class ArmedStrip(QWidget):
     """Strip at the top of a panel that sends messages: switch for arming, and the armed targets."""
 
-    for_replay = False
+    is_for_replay = False
     """True if sending can be armed while a recording is open; overridden in subclasses."""
 
     def __init__(self, context: PanelContext) -> None:
@@ -94,7 +94,7 @@ class ArmedStrip(QWidget):
         self._seen = facts
         self._is_on = arming.is_on
         self.switch.setChecked(arming.is_on)
-        can_arm = self.for_replay or not replaying
+        can_arm = self.is_for_replay or not replaying
         self.switch.setEnabled(can_arm or arming.is_on)
         nothing = self.disarmed_text() if can_arm else _("Sending is off while a recording is open")
         self.words.setText(_("{time} left").format(time=left) if arming.is_on else nothing)
@@ -151,7 +151,7 @@ class ArmedStrip(QWidget):
         else:
             why_not = self.arm()
             if why_not:
-                self._context.toast(why_not)
+                self._context.show_toast(why_not)
         self._seen = ()
         self.refresh()
 
@@ -162,7 +162,7 @@ class ArmedStrip(QWidget):
             painter.end()
 
 
-class ArmedMinutes(Menu):
+class ArmDurationMenu(Menu):
     """Menu for choosing the time after which sending is disarmed automatically."""
 
     def __init__(self, theme: Theme, parent: QWidget, acting: SessionActing) -> None:

@@ -72,7 +72,7 @@ class PanelContext:
     session: Session
     theme: Theme
     open_topic: Callable[[str], None]
-    toast: ShowToast
+    show_toast: ShowToast
     run: Callable[[str], None]
     files: FileDialogs
     focus_question: Callable[[], None] = lambda: None
@@ -151,7 +151,7 @@ class Panel:
     name: str
     title: str
     icon: str
-    accepts: tuple[str, ...]
+    accepted_types: tuple[str, ...]
     make: Callable[[PanelContext], PanelWidget]
     allows_multiple: bool = False
 

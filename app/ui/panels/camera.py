@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QSize
 
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.panels.no_robot import NoRobotState
+from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.pictures.boxes import boxes_in_camera, camera_of
 from app.ui.pictures.view import STALE_AFTER_S, PictureView, RateText
@@ -54,7 +54,7 @@ class CameraPanel(OneRobotPanel):
         )
         start = EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot")
         self.empty = EmptyState(self.theme, "camera", title, text, [start])
-        self._no_robot = NoRobotState(self.empty, title, text, [start])
+        self._no_robot = NoRobotController(self.empty, title, text, [start])
         self._no_robot.set_starting(self.session.starting_robots)
         self.pages = self.make_page_stack(self.empty, self.view)
 

@@ -25,9 +25,9 @@ from nep.errors import nearest
 from nep.i18n import _, lazy, ngettext, number
 from nep.programs.doctor import Finding, report_text, sort_findings
 
-STATUS = {"error": "error", "warning": "warn", "info": "info", "ok": "ok"}
-BAD_SEVERITIES = frozenset({"error", "warning"})
-WAIT_REPORT_S = 2.0
+STATUS_BY_SEVERITY = {"error": "error", "warning": "warn", "info": "info", "ok": "ok"}
+PROBLEM_SEVERITIES = frozenset({"error", "warning"})
+WAIT_REPORT_DELAY_S = 2.0
 """Time in s that a panel waits for messages before the doctor reports it."""
 MAX_TOPICS = 500
 """Maximum number of topics to choose from, and to search for a similar name."""
@@ -107,20 +107,20 @@ class DoctorPanel(PanelWidget):
 
     # -- display ------------------------------------------------------------------------------------------
 
-    def check_panel(self, asker: PanelWidget | None) -> None:
+    def set_stalled_panel(self, asker: PanelWidget | None) -> None:
         """Report findings about a panel too. The topic of the doctor must be set before.
 
         Args:
             asker: Panel that shows no new data; None for no panel.
         """
         if self._asker is not None:
-            self._asker.destroyed.disconnect(self._clear_asker)
+            self._asker.destroyed.disconnect(self._clear_stalled_panel)
         self._asker = asker
         if asker is not None:
-            asker.destroyed.connect(self._clear_asker)
+            asker.destroyed.connect(self._clear_stalled_panel)
         self.refresh()
 
-    def _clear_asker(self) -> None:
+    def _clear_stalled_panel(self) -> None:
         self._asker = None
 
     def refresh(self) -> None:
@@ -161,7 +161,7 @@ class DoctorPanel(PanelWidget):
 
     def _blockers(self) -> Iterator[Blocker]:
         session, topic = self.session, self.session.doctor.expected_topic
-        libraries = session.alerts.get(not_installed.ALERT)
+        libraries = session.alerts.get(not_installed.ALERT_ID)
         if libraries is not None:
             yield Blocker(libraries.title, libraries.detail, "", lambda: None)
         if session.replay is not None and (topic or self._asker is not None):
@@ -180,7 +180,7 @@ class DoctorPanel(PanelWidget):
         waiting = {(panel, topic) for panel in shown if (topic := panel.awaited_topic()) and topic != missed}
         self._waits = {each: self._waits.get(each, now) for each in waiting}
         for panel, topic in sorted(waiting, key=lambda each: (each[0].title(), each[1])):
-            if now - self._waits[panel, topic] >= WAIT_REPORT_S:
+            if now - self._waits[panel, topic] >= WAIT_REPORT_DELAY_S:
                 yield self._waiting_blocker(panel, topic)
 
     def _waiting_blocker(self, panel: PanelWidget, topic: str) -> Blocker:
@@ -241,7 +241,7 @@ class DoctorPanel(PanelWidget):
             self.looked.setText(_("Checking: {done} of {count}").format(done=done, count=count))
             return
         words = ngettext("{count} check done", "{count} checks done", doctor.looked_at)
-        if all(each.severity not in BAD_SEVERITIES for each in self.shown):
+        if all(each.severity not in PROBLEM_SEVERITIES for each in self.shown):
             words = ngettext("{count} check passed", "All {count} checks passed", doctor.looked_at)
         self.looked.setText(words.format(count=done))
 
@@ -257,18 +257,18 @@ class DoctorPanel(PanelWidget):
             self.pages.insert_row(place, row)
 
     def _show_chip(self, *, is_done: bool) -> None:
-        bad = [each.severity for each in self.shown if each.severity in BAD_SEVERITIES]
+        bad = [each.severity for each in self.shown if each.severity in PROBLEM_SEVERITIES]
         if bad:
-            self.chip.set(str(len(bad)), STATUS[bad[0]])
+            self.chip.set(str(len(bad)), STATUS_BY_SEVERITY[bad[0]])
         elif is_done:
             self.chip.set(_("no problems"), "ok")
         else:
             self.chip.set("", "info")
 
     def _row(self, finding: Finding, step: NextStep | None) -> AlertRow:
-        row = AlertRow(self.theme, framed=finding.severity in BAD_SEVERITIES)
+        row = AlertRow(self.theme, framed=finding.severity in PROBLEM_SEVERITIES)
         row.set_texts(
-            STATUS[finding.severity],
+            STATUS_BY_SEVERITY[finding.severity],
             finding.sentence,
             finding.fix,
             command=finding.command,
@@ -300,7 +300,7 @@ class DoctorPanel(PanelWidget):
         }.get(finding.id)
         if run is not None:
             return NextStep(
-                run[0], lambda: self.context.run(run[1]), is_fix=finding.severity in BAD_SEVERITIES
+                run[0], lambda: self.context.run(run[1]), is_fix=finding.severity in PROBLEM_SEVERITIES
             )
         if finding.id == "master:none":
             return NextStep(_("Start the master"), self._start_master)
@@ -314,7 +314,7 @@ class DoctorPanel(PanelWidget):
         step.run()
         if finding.id.startswith("studio:"):
             self.session.doctor.start()
-            self.context.toast(_("Done. Checking again"))
+            self.context.show_toast(_("Done. Checking again"))
 
     def _use_topic(self, topic: str) -> None:
         if self._asker is not None:
@@ -322,26 +322,26 @@ class DoctorPanel(PanelWidget):
         else:
             self.context.open_topic(topic)
         self.session.doctor.expect_topic(topic)
-        self.context.toast(_("Opened {topic}. Checking again").format(topic=topic))
+        self.context.show_toast(_("Opened {topic}. Checking again").format(topic=topic))
 
     def _start_master(self) -> None:
         self.session.launcher.ensure_master()
-        self.context.toast(_("Starting the master"))
+        self.context.show_toast(_("Starting the master"))
 
     def _copy_command(self, command: str) -> None:
         QGuiApplication.clipboard().setText(command)
-        self.context.toast(_("Copied “{command}”").format(command=command))
+        self.context.show_toast(_("Copied “{command}”").format(command=command))
 
     def _set_missed_topic(self) -> None:
         self.session.doctor.expect_topic(self.missed.value)
-        self.check_panel(None)
+        self.set_stalled_panel(None)
 
     def copy_report(self) -> None:
         """Copy all findings to the clipboard as a report."""
         missed = self.session.doctor.expected_topic
         about = _("Missing: {topic}").format(topic=topic_label(missed)) + "\n" if missed else ""
         QGuiApplication.clipboard().setText(about + report_text(self.shown))
-        self.context.toast(_("Copied the report"))
+        self.context.show_toast(_("Copied the report"))
 
     def more_actions(self) -> Sequence[QAction]:
         return (self._copy,)

@@ -9,9 +9,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.core.robots.health_facts import HealthFact, facts_of
+from app.core.robots.health_facts import HealthItem, health_items
 from app.ui.panels.base import Density, Panel, PanelContext
-from app.ui.panels.no_robot import NoRobotState
+from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.text.numbers import age_text
 from app.ui.theme.theme import Theme
@@ -34,7 +34,7 @@ class HealthRow(QWidget):
     def __init__(self, theme: Theme, density: Density) -> None:
         super().__init__()
         self._theme = theme
-        self.fact: HealthFact | None = None
+        self.fact: HealthItem | None = None
         self.title = label("", TEXT_FONTS[density])
         self.words = label("", TEXT_FONTS[density], role="textSecondary", wrap=True)
         line = paint.height_of(theme.font(TEXT_FONTS[density]))
@@ -62,7 +62,7 @@ class HealthRow(QWidget):
         self._said.setDirection(way)
         self._said.setSpacing(10 if beside else 0)
 
-    def show_fact(self, fact: HealthFact) -> None:
+    def show_fact(self, fact: HealthItem) -> None:
         """Show the icon, title and text of a fact."""
         if fact == self.fact:
             return
@@ -79,7 +79,7 @@ class HealthPanel(OneRobotPanel):
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Health"))
-        self._facts: tuple[HealthFact, ...] = ()
+        self._facts: tuple[HealthItem, ...] = ()
         self.rows: list[HealthRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
@@ -89,7 +89,7 @@ class HealthPanel(OneRobotPanel):
             EmptyAction(_("Find the cause"), lambda: context.run("help.doctor"), "stethoscope"),
         ]
         self.empty = EmptyState(self.theme, "bot", title, text, steps)
-        self._no_robot = NoRobotState(self.empty, title, text, steps)
+        self._no_robot = NoRobotController(self.empty, title, text, steps)
         self._no_robot.set_starting(self.session.starting_robots)
         self.step = Button(self.theme, _("Restart it"), "rotate-ccw", size="small")
         self.step.clicked.connect(self._do_next_step)
@@ -124,12 +124,12 @@ class HealthPanel(OneRobotPanel):
             self.chip.set("")
             self._no_robot.set_starting(self.session.starting_robots)
             return
-        facts = facts_of(link, self.session.live.topics, time.monotonic(), _age_text)
+        facts = health_items(link, self.session.live.topics, time.monotonic(), _age_text)
         if facts != self._facts:
             self._facts = facts
             self._show(facts, link)
 
-    def _show(self, facts: tuple[HealthFact, ...], link: RobotLink) -> None:
+    def _show(self, facts: tuple[HealthItem, ...], link: RobotLink) -> None:
         self._make_rows(len(facts))
         for row, fact in zip(self.rows, facts, strict=True):
             row.show_fact(fact)
@@ -137,7 +137,7 @@ class HealthPanel(OneRobotPanel):
         worst = "error" if any(fact.status == "error" for fact in wrong) else "warn"
         said = ngettext("{count} warning", "{count} warnings", len(wrong)).format(count=len(wrong))
         self.chip.set(said if wrong else "", worst)
-        self.step.setText(_("Restart it") if link.virtual else _("Find the cause"))
+        self.step.setText(_("Restart it") if link.is_virtual else _("Find the cause"))
         self._below.setVisible(not link.is_connected or link.is_unresponsive)
 
     def _make_rows(self, count: int) -> None:
@@ -154,7 +154,7 @@ class HealthPanel(OneRobotPanel):
     def _do_next_step(self) -> None:
         link = self.session.fleet.link(self._robot)
         if link is not None:
-            self.context.run(f"connect:{link.name}" if link.virtual else "help.doctor")
+            self.context.run(f"connect:{link.name}" if link.is_virtual else "help.doctor")
 
     def set_density(self, density: Density) -> None:
         super().set_density(density)

@@ -9,7 +9,7 @@ from app.ui.widgets import EmptyAction, EmptyState
 from nep.i18n import _
 
 
-class NoRobotState:
+class NoRobotController:
     """Controller of an empty state that says "no robot" or "robot is starting".
 
     Args:

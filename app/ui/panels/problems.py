@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 from app.blocks import Problem
 from app.core.documents.problems import Fix, ProblemLine, problem_lines
 from app.core.reports import not_installed
-from app.core.robots.launcher import VIRTUAL_ROBOTS
+from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
@@ -23,7 +23,7 @@ from app.ui.widgets import Button, Chip, ContentScrollArea, label, paint
 from app.ui.widgets.cards import Tile
 from app.ui.widgets.indicators import StatusIcon
 from app.ui.widgets.keyboard import is_activation_key
-from app.ui.widgets.labels import BoldInLine
+from app.ui.widgets.labels import PartlyBoldLabel
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from nep.i18n import _, lazy, ngettext
 
@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from app.core.documents.document import Document
     from app.robots.description.description import Robot
 
-STATUS = {"error": "error", "warning": "warn", "info": "info"}
-SEVERITIES = {"error": lazy("error"), "warning": lazy("warning"), "info": lazy("info")}
+STATUS_BY_SEVERITY = {"error": "error", "warning": "warn", "info": "info"}
+SEVERITY_NAMES = {"error": lazy("error"), "warning": lazy("warning"), "info": lazy("info")}
 MAX_ROWS = 60
-NO_PROBLEMS = lazy("No problems.\nIf something needs fixing, it appears here.")
+NO_PROBLEMS_TEXT = lazy("No problems.\nIf something needs fixing, it appears here.")
 
 
 class ProblemRow(QWidget):
@@ -61,7 +61,7 @@ class ProblemRow(QWidget):
         problem = line.problem
         self._theme, self.line, self.problem, self._large = theme, line, problem, large
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        severity = _(SEVERITIES[problem.severity])
+        severity = _(SEVERITY_NAMES[problem.severity])
         said = _("{severity}: {sentence}").format(severity=severity, sentence=problem.message)
         self.setAccessibleName(said)
         self.setProperty("focusRadius", theme.radius("small"))
@@ -72,14 +72,14 @@ class ProblemRow(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(14, 0, 8, 0)
         row.setSpacing(10)
-        status = STATUS[problem.severity]
+        status = STATUS_BY_SEVERITY[problem.severity]
         row.addWidget(StatusIcon(theme, status, ink="text" if status == "info" else ""))
         category = problem.category or "values"
         icon = problem.icon or theme.block_icon(category)
         if problem.category:
             row.addWidget(Tile(theme, icon, category, 22))
         kind = "bodyLarge" if large else "body"
-        row.addWidget(BoldInLine(theme, problem.message, problem.subject, kind), 1)
+        row.addWidget(PartlyBoldLabel(theme, problem.message, problem.subject, kind), 1)
         self.buttons = [self._make_fix_button(fix) for fix in line.fixes]
         for button in self.buttons:
             row.addWidget(button)
@@ -89,7 +89,7 @@ class ProblemRow(QWidget):
         button.clicked.connect(lambda: self.fix_requested.emit(fix.action))
         return button
 
-    def holds_focus(self) -> bool:
+    def contains_focus(self) -> bool:
         """Return True if the row or one of its buttons has the focus."""
         return self.hasFocus() or any(button.hasFocus() for button in self.buttons)
 
@@ -142,7 +142,7 @@ class ProblemsPanel(PanelWidget):
         self.others.setContentsMargins(14, 6, 8, 6)
         self.others.hide()
         self._column.insertWidget(0, self.others)
-        self.nothing = label(_(NO_PROBLEMS), "bodyLarge", role="textSecondary", wrap=True)
+        self.nothing = label(_(NO_PROBLEMS_TEXT), "bodyLarge", role="textSecondary", wrap=True)
         self.nothing.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.pages = self.make_page_stack(ContentScrollArea(self.nothing), self._scroll)
 
@@ -152,7 +152,7 @@ class ProblemsPanel(PanelWidget):
         if program is None:
             self.checked.setText(_("Checking"))
             return
-        of_editor = self.session.alerts.get(not_installed.ALERT)
+        of_editor = self.session.alerts.get(not_installed.ALERT_ID)
         if program is self._program and of_editor == self._of_editor:
             return
         self._program, self._of_editor = program, of_editor
@@ -160,9 +160,9 @@ class ProblemsPanel(PanelWidget):
         found = problem_lines(
             program.problems,
             document.workspace if program.absent else {},  # parsed only if robots are missing
-            self._missing(document),
+            self._missing_robots(document),
             [link.robot for link in self.session.fleet.connected],
-            VIRTUAL_ROBOTS,
+            VIRTUAL_ROBOT_MODULES,
             program.absent,
         )
         if of_editor is not None:
@@ -172,7 +172,7 @@ class ProblemsPanel(PanelWidget):
             self._found = found
             self._show(found)
 
-    def _missing(self, document: Document) -> list[Robot]:
+    def _missing_robots(self, document: Document) -> list[Robot]:
         # As described in the behaviour, else as last reported on the network.
         seen = {link.name: link.robot for link in self.session.fleet.links if not link.is_connected}
         return list({**seen, **{robot.name: robot for robot in document.absent_robots}}.values())
@@ -183,7 +183,7 @@ class ProblemsPanel(PanelWidget):
         held = False
         for line, row in kept.items():
             if line not in found[:MAX_ROWS]:
-                held = held or row.holds_focus()
+                held = held or row.contains_focus()
                 self._column.removeWidget(row)
                 row.hide()
                 row.deleteLater()
@@ -199,16 +199,16 @@ class ProblemsPanel(PanelWidget):
         self.pages.setCurrentIndex(1 if found else 0)
         if held:  # the focus stays in the panel when the focused problem is fixed
             (self.rows[0] if self.rows else self).setFocus(Qt.FocusReason.OtherFocusReason)
-        self._count(found)
+        self._show_counts(found)
 
     def _row(self, line: ProblemLine) -> ProblemRow:
         row = ProblemRow(self.theme, line, large=self.density == "comfortable")
         row.pressed.connect(lambda block: self.context.run(f"block:{block}"))
         row.fix_requested.connect(self.context.run)
-        row.step_requested.connect(lambda step: self._step(row, step))
+        row.step_requested.connect(lambda step: self._step_focus(row, step))
         return row
 
-    def _step(self, row: ProblemRow, step: int) -> None:
+    def _step_focus(self, row: ProblemRow, step: int) -> None:
         place = self.rows.index(row) + step
         if 0 <= place < len(self.rows):
             self.rows[place].setFocus(Qt.FocusReason.TabFocusReason)
@@ -218,14 +218,14 @@ class ProblemsPanel(PanelWidget):
         self.refresh()  # hidden panels are not refreshed otherwise
         return (self.chip.text, self.chip.status) if self._found else None
 
-    def _count(self, found: tuple[ProblemLine, ...]) -> None:
+    def _show_counts(self, found: tuple[ProblemLine, ...]) -> None:
         if not found:
             self.chip.set(_("No problems"), "ok")
             return
         kinds = [each.severity for each in found]
         worst = next((kind for kind in ("error", "warning") if kind in kinds), "info")
-        self.chip.set(str(len(found)), STATUS[worst])
-        words = [_count_text(kind, kinds.count(kind)) for kind in SEVERITIES if kind in kinds]
+        self.chip.set(str(len(found)), STATUS_BY_SEVERITY[worst])
+        words = [_count_text(kind, kinds.count(kind)) for kind in SEVERITY_NAMES if kind in kinds]
         self.chip.setAccessibleName(", ".join(words))
         self.chip.setToolTip(plain.tip(", ".join(words)))
 

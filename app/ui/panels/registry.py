@@ -23,7 +23,7 @@ class PanelRegistry(Mapping[str, Panel]):
     def _panels(self) -> Mapping[str, Panel]:
         return discover(panels.__name__, "PANEL", Panel)
 
-    def steps(self) -> Sequence[Callable[[], object]]:
+    def import_steps(self) -> Sequence[Callable[[], object]]:
         """Return functions that import one panel module each, to divide the import into short steps."""
         names = [info.name for info in pkgutil.iter_modules(panels.__path__, f"{panels.__name__}.")]
         return [*(partial(importlib.import_module, name) for name in names), lambda: self._panels]

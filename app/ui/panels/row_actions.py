@@ -86,7 +86,7 @@ def copy_action(context: PanelContext, name: str) -> RowAction:
 
     def copy() -> None:
         QGuiApplication.clipboard().setText(name)
-        context.toast(_("Copied {path}").format(path=name))
+        context.show_toast(_("Copied {path}").format(path=name))
 
     return RowAction(_("Copy name"), "copy", copy)
 

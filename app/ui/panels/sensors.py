@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.robots.description.description import Sensor
 from app.ui.panels.base import Density, Panel, PanelContext
-from app.ui.panels.no_robot import NoRobotState
+from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.text.numbers import age_text
 from app.ui.text.sensor_values import ReadingText, reading_text
@@ -101,7 +101,7 @@ class SensorsPanel(OneRobotPanel):
         self._column = self._scroll.column
         title, text = _("No robot connected"), _("Connect a robot to see its sensors.")
         self.empty = EmptyState(self.theme, "eye", title, text)
-        self._no_robot = NoRobotState(self.empty, title, text)
+        self._no_robot = NoRobotController(self.empty, title, text)
         self._no_robot.set_starting(self.session.starting_robots)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)

@@ -37,7 +37,7 @@ def clock_text(record: SentRecord) -> str:
     return time.strftime("%H:%M:%S", time.localtime(record.at_s))
 
 
-def line_of(record: SentRecord) -> str:
+def format_line(record: SentRecord) -> str:
     """Format a log entry as a line for the clipboard."""
     asker = _(SENDERS[record.origin][1])
     often = f"{group_digits(record.count)} \u00d7 " if record.count > 1 else ""
@@ -158,7 +158,7 @@ class SentPanel(PanelWidget):
         record = self.selected()
         why_not = self.acting.repeat(record.number) if record is not None else ""
         if why_not:
-            self.context.toast(why_not)
+            self.context.show_toast(why_not)
         if self.acting.question is not None:
             self.context.run("panel:publish")  # this panel asks for confirmation
         self.refresh()
@@ -167,11 +167,11 @@ class SentPanel(PanelWidget):
         """Copy the selected entry to the clipboard."""
         record = self.selected()
         if record is not None:
-            self._copy_text(line_of(record), _("Copied the line"))
+            self._copy_text(format_line(record), _("Copied the line"))
 
     def _copy_text(self, text: str, said: str) -> None:
         QGuiApplication.clipboard().setText(text)
-        self.context.toast(said)
+        self.context.show_toast(said)
 
     def clear(self) -> None:
         """Clear the log."""

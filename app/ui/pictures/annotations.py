@@ -80,24 +80,24 @@ def _paint_text(painter: QPainter, theme: Theme, at: QPointF, high: float, drawn
     metrics = QFontMetricsF(font)
     room = QRectF(at.x(), at.y() - metrics.height(), metrics.horizontalAdvance(words) + 4, metrics.height())
     if drawn.fill is not None:
-        painter.fillRect(room, _colour(drawn.fill))
-    ink = _colour(drawn.outline) if drawn.outline is not None else QColor("white")
+        painter.fillRect(room, _to_qcolor(drawn.fill))
+    ink = _to_qcolor(drawn.outline) if drawn.outline is not None else QColor("white")
     paint.text_line(painter, room.adjusted(2, 0, 2, 0), words, font, ink)
 
 
 def _pen(colour: Colour | None, width: float) -> QPen:
     if colour is None:
         return QPen(Qt.PenStyle.NoPen)
-    pen = QPen(_colour(colour), min(max(width, MIN_PEN), MAX_PEN))
+    pen = QPen(_to_qcolor(colour), min(max(width, MIN_PEN), MAX_PEN))
     pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
     return pen
 
 
 def _brush(colour: Colour | None) -> QBrush:
-    return QBrush(_colour(colour)) if colour is not None else QBrush(Qt.BrushStyle.NoBrush)
+    return QBrush(_to_qcolor(colour)) if colour is not None else QBrush(Qt.BrushStyle.NoBrush)
 
 
-def _colour(colour: Colour) -> QColor:
+def _to_qcolor(colour: Colour) -> QColor:
     return QColor.fromRgbF(*colour)
 
 

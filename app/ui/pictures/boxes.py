@@ -50,7 +50,7 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
     """
     if not isinstance(detections, Mapping):
         return ()
-    width, height = _number(detections.get("width")), _number(detections.get("height"))
+    width, height = _float_or_none(detections.get("width")), _float_or_none(detections.get("height"))
     items = detections.get("items")
     if not width or not height or not isinstance(items, Sequence) or isinstance(items, str):
         return ()
@@ -58,10 +58,12 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
     for item in items:
         place = item.get("box") if isinstance(item, Mapping) else None
         if isinstance(item, Mapping) and isinstance(place, Sequence) and len(place) == 4:
-            x, y, w, h = (_number(part) or 0.0 for part in place)
+            x, y, w, h = (_float_or_none(part) or 0.0 for part in place)
             area = QRectF(x / width, y / height, w / width, h / height)
             found.append(
-                DetectionBox(bounded_str(item.get("name", "")), _number(item.get("confidence")), area, kind)
+                DetectionBox(
+                    bounded_str(item.get("name", "")), _float_or_none(item.get("confidence")), area, kind
+                )
             )
     return tuple(found)
 
@@ -120,6 +122,6 @@ def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: DetectionBox)
     paint.text_line(painter, tag.adjusted(6, 0, 0, 0), words, font, QColor(BOX_TEXT_COLOUR))
 
 
-def _number(value: object) -> float | None:
+def _float_or_none(value: object) -> float | None:
     good = isinstance(value, (int, float)) and not isinstance(value, bool)
     return float(value) if good else None  # type: ignore[arg-type]

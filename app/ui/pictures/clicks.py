@@ -18,7 +18,7 @@ RING_PX, REACH_PX = 7.0, 12.0
 LARGE_CURSOR_STEP_PX = 10  # cursor step with Shift, in image pixels
 KEYBOARD_HINT = lazy("Use the arrow keys to point at a pixel and Enter to publish it.")
 SCROLL_MARGINS = (16, 16, -16, -16)
-BUTTONS: dict[Qt.MouseButton, Button] = {
+BUTTON_NAMES: dict[Qt.MouseButton, Button] = {
     Qt.MouseButton.LeftButton: "left",
     Qt.MouseButton.MiddleButton: "middle",
 }
@@ -65,7 +65,7 @@ class ClickablePicture(ZoomablePicture):
             if takes:
                 announce(self, _(KEYBOARD_HINT))
 
-    def mark(self, point: PicturePoint) -> None:
+    def show_mark(self, point: PicturePoint) -> None:
         """Show a mark at a point for a short time."""
         self.marked = point
         self._fading.start(MARK_DURATION_MS)
@@ -108,7 +108,7 @@ class ClickablePicture(ZoomablePicture):
         self._pressed = (event.position(), point) if point is not None and alone else None
 
     def _point_at(self, event: QMouseEvent) -> PicturePoint | None:
-        button, picture = BUTTONS.get(event.button()), self.picture
+        button, picture = BUTTON_NAMES.get(event.button()), self.picture
         pixel = self.pixel_at(event.position()) if self._takes_clicks and button is not None else None
         if pixel is None or picture is None or button is None:
             return None

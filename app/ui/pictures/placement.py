@@ -13,7 +13,7 @@ from PySide6.QtCore import QPointF, QRectF, QSizeF
 from PySide6.QtGui import QTransform
 
 SMALLEST, MAX_SIZE = 0.02, 64.0
-FILL_LIMIT = 1.34
+MAX_FILL_RATIO = 1.34
 
 
 @dataclass(slots=True)
@@ -52,7 +52,7 @@ class PicturePlacement:
         seen = self.rotated_size(picture)
         across, down = view.width() / max(1.0, seen.width()), view.height() / max(1.0, seen.height())
         scale = min(across, down)
-        if fill and scale > 0 and max(across, down) / scale < FILL_LIMIT:
+        if fill and scale > 0 and max(across, down) / scale < MAX_FILL_RATIO:
             return max(across, down)
         return scale
 

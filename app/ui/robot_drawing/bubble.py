@@ -130,7 +130,7 @@ def paint_bubble(
         left = min(max(left, bounds.left() + EDGE), max(bounds.left() + EDGE, bounds.right() - EDGE - width))
         return QRectF(left, max(bounds.top() + EDGE, head.v - 39 * head.scale - height), width, height)
 
-    side, box = _choose_box([(side, box_at(side)), (-side, box_at(-side))], taken, bounds)
+    side, box = _pick_box([(side, box_at(side)), (-side, box_at(-side))], taken, bounds)
     _paint_box(p, box, min(max(head.u + side * 58 * head.scale, box.left() + 18), box.right() - 30), side)
     p.setFont(face)
     p.setPen(QColor("#1C1B19"))
@@ -143,7 +143,7 @@ def paint_bubble(
     return box
 
 
-def _choose_box(
+def _pick_box(
     places: Sequence[tuple[float, QRectF]], taken: Sequence[QRectF], bounds: QRectF
 ) -> tuple[float, QRectF]:
     # Tries places without overlap first, then below other bubbles, then the one with the smallest overlap.

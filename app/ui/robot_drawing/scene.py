@@ -16,11 +16,11 @@ from app.ui.robot_drawing.room import WIDTH, Spot, Stage, paint_room
 from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.robot_drawing.turtle import TOP_CENTRE, paint_turtle, side_at
 
-TURTLE = "turtle"
+TURTLE_FIGURE = "turtle"
 OtherRobots: TypeAlias = Sequence[tuple[str, RobotState]]
 
 # Shown before any robot has published its state.
-PREVIEW = RobotState(
+PREVIEW_STATE = RobotState(
     x=0.05,
     arm_left_deg=124.0,
     objects=(Thing("ball", 0.1, -1.65), Thing("table", -0.85, 1.95)),
@@ -39,7 +39,7 @@ class Marks:
 
     hovered: str | None = None
     selected: str | None = None
-    ink: QColor = field(default_factory=lambda: QColor("#3F7CB3"))
+    colour: QColor = field(default_factory=lambda: QColor("#3F7CB3"))
 
 
 NO_MARKS = Marks()
@@ -99,7 +99,7 @@ class RobotDrawing:
         bubbles: list[QRectF] = []
         for figure in figures:
             if figure.state.caption:
-                high = TOP_CENTRE.y() if figure.state.figure == TURTLE else HEAD_CENTRE.y()
+                high = TOP_CENTRE.y() if figure.state.figure == TURTLE_FIGURE else HEAD_CENTRE.y()
                 head = replace(figure.spot, v=figure.spot.v + high * figure.spot.scale)
                 bubble = paint_bubble(painter, stage.bounds(), head, figure.state, self._font, bubbles)
                 bubbles.append(bubble)
@@ -141,7 +141,7 @@ class RobotDrawing:
         """
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
-            if figure.part_name("body") == part and figure.state.figure == TURTLE:
+            if figure.part_name("body") == part and figure.state.figure == TURTLE_FIGURE:
                 return side_at(figure.to_own_units(stage.to_units(point)), figure.state.theta_deg)
         return None
 
@@ -161,7 +161,7 @@ class RobotDrawing:
         """Return the centre of a part (see `part_at`) in px, or None if there is no such part."""
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
-            small = figure.state.figure == TURTLE
+            small = figure.state.figure == TURTLE_FIGURE
             own = {} if small else {f"{limb.side}_hand": limb.hand for limb in limbs(figure.state)}
             own |= {"body": TOP_CENTRE} if small else {"head": HEAD_CENTRE, "body": QPointF(0, -50)}
             for name, place in own.items():
@@ -184,7 +184,7 @@ class RobotDrawing:
             area = areas.get(part or "")
             if area is not None:
                 p.setBrush(Qt.BrushStyle.NoBrush)
-                for ink, wide in ((QColor("#FFFFFF"), width + 1.6), (marks.ink, width)):
+                for ink, wide in ((QColor("#FFFFFF"), width + 1.6), (marks.colour, width)):
                     p.setPen(QPen(ink, wide))
                     p.drawRoundedRect(area.adjusted(-4, -4, 4, 4), 6, 6)
 
@@ -246,7 +246,7 @@ class Figure:
     @property
     def area(self) -> QRectF:
         """Bounding rectangle in stage units."""
-        large = QRectF(-42, -187, 84, 195) if self.state.figure != TURTLE else QRectF(-42, -62, 84, 78)
+        large = QRectF(-42, -187, 84, 195) if self.state.figure != TURTLE_FIGURE else QRectF(-42, -62, 84, 78)
         scale = self.spot.scale
         return QRectF(
             self.spot.u + large.x() * scale,
@@ -266,7 +266,7 @@ def _paint_figure(p: QPainter, figure: Figure) -> None:
     lifted = 9.0 if figure.state.is_lifted else 0.0
     p.translate(figure.spot.u, figure.spot.v - lifted)
     p.scale(figure.spot.scale, figure.spot.scale)
-    (paint_turtle if figure.state.figure == TURTLE else paint_figure)(p, figure.state)
+    (paint_turtle if figure.state.figure == TURTLE_FIGURE else paint_figure)(p, figure.state)
     p.restore()
 
 
@@ -285,7 +285,7 @@ def _paint_reach(painter: QPainter, robot: Spot, state: RobotState) -> None:
 
 def _part_at(own: QPointF, state: RobotState) -> str | None:
     # Only Pepper has parts that can be touched.
-    if state.figure == TURTLE:
+    if state.figure == TURTLE_FIGURE:
         return None
     for limb in limbs(state):
         if _is_near(own, limb.hand, 11.0):

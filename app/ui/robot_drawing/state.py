@@ -106,47 +106,47 @@ class RobotState:
         """Parse the payload of a state message; missing and malformed values have their defaults."""
         speech = data.get("speech")
         return cls(
-            x=_number(data.get("x")),
-            y=_number(data.get("y")),
-            theta_deg=_number(data.get("theta_deg")),
-            head_yaw_deg=_number(data.get("head_yaw_deg")),
-            head_pitch_deg=_number(data.get("head_pitch_deg")),
+            x=_parse_number(data.get("x")),
+            y=_parse_number(data.get("y")),
+            theta_deg=_parse_number(data.get("theta_deg")),
+            head_yaw_deg=_parse_number(data.get("head_yaw_deg")),
+            head_pitch_deg=_parse_number(data.get("head_pitch_deg")),
             speech=speech if isinstance(speech, str) and speech.strip() else None,
-            spoken_fraction=min(1.0, max(0.0, _number(data.get("spoken")))),
-            sound=_sound(data.get("sound")),
+            spoken_fraction=min(1.0, max(0.0, _parse_number(data.get("spoken")))),
+            sound=_parse_sound(data.get("sound")),
             heard_text=bounded_str(data.get("heard") or "")[:MAX_HEARD_CHARS],
-            eyes=_colour(data.get("eyes"), DEFAULT_EYE_COLOUR),
-            shoulders=_colour(data.get("shoulders"), DEFAULT_SHOULDER_COLOUR),
+            eyes=_parse_colour(data.get("eyes"), DEFAULT_EYE_COLOUR),
+            shoulders=_parse_colour(data.get("shoulders"), DEFAULT_SHOULDER_COLOUR),
             emotion=bounded_str(data.get("emotion") or "neutral"),
-            arm_left_deg=_number(data.get("arm_left_deg")),
-            arm_right_deg=_number(data.get("arm_right_deg")),
+            arm_left_deg=_parse_number(data.get("arm_left_deg")),
+            arm_right_deg=_parse_number(data.get("arm_right_deg")),
             is_moving=data.get("moving") is True,
             figure=bounded_str(data.get("figure") or "pepper"),
             pressed_bumper=bounded_str(data.get("bumped") or ""),
-            touched_parts=_touched_parts(data.get("touched", data.get("touch"))),
+            touched_parts=_parse_touched_parts(data.get("touched", data.get("touch"))),
             is_lifted=data.get("held") is True,
             is_room_shared=_is_shared(data.get("room")),
-            objects=_things(data.get("objects")),
-            room=_room(data.get("room")),
+            objects=_parse_things(data.get("objects")),
+            room=_parse_room(data.get("room")),
         )
 
 
-def _sound(value: object) -> str:
+def _parse_sound(value: object) -> str:
     return bounded_str(value.get("title") or "")[:40] if isinstance(value, Mapping) else ""
 
 
-def _number(value: object, default: float = 0.0) -> float:
+def _parse_number(value: object, default: float = 0.0) -> float:
     good = isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e6
     return float(value) if good else default  # type: ignore[arg-type]
 
 
-def _colour(value: object, default: str) -> str:
+def _parse_colour(value: object, default: str) -> str:
     if isinstance(value, str) and len(value) == 7 and value.startswith("#"):
         return value if all(sign in "0123456789abcdefABCDEF" for sign in value[1:]) else default
     return default
 
 
-def _touched_parts(value: object) -> tuple[str, ...]:
+def _parse_touched_parts(value: object) -> tuple[str, ...]:
     if isinstance(value, str):
         return (value,)
     if isinstance(value, Mapping):
@@ -156,23 +156,23 @@ def _touched_parts(value: object) -> tuple[str, ...]:
     return ()
 
 
-def _things(value: object) -> tuple[Thing, ...]:
+def _parse_things(value: object) -> tuple[Thing, ...]:
     if not isinstance(value, Sequence) or isinstance(value, str):
         return ()
-    return tuple(_thing(one) for one in value if isinstance(one, Mapping))
+    return tuple(_parse_thing(one) for one in value if isinstance(one, Mapping))
 
 
-def _thing(one: Mapping[str, object]) -> Thing:
+def _parse_thing(one: Mapping[str, object]) -> Thing:
     colour = one.get("colour", one.get("color"))
     size = one.get("radius", one.get("size"))
     return Thing(
         kind=bounded_str(one.get("kind") or "box"),
-        x=_number(one.get("x")),
-        y=_number(one.get("y")),
+        x=_parse_number(one.get("x")),
+        y=_parse_number(one.get("y")),
         name=bounded_str(one.get("name") or ""),
-        colour=_colour(colour, "") or None,
-        size_m=_number(size) if size is not None else None,
-        height_m=_number(one.get("height")) if one.get("height") is not None else None,
+        colour=_parse_colour(colour, "") or None,
+        size_m=_parse_number(size) if size is not None else None,
+        height_m=_parse_number(one.get("height")) if one.get("height") is not None else None,
     )
 
 
@@ -180,12 +180,12 @@ def _is_shared(room: object) -> bool:
     return isinstance(room, Mapping) and room.get("shared") is True
 
 
-def _room(value: object) -> RoomBounds:
+def _parse_room(value: object) -> RoomBounds:
     if not isinstance(value, Mapping):
         return RoomBounds()
     if "x_min" in value and "y_min" in value:
-        sides = [_number(value.get(side)) for side in ("x_min", "x_max", "y_min", "y_max")]
+        sides = [_parse_number(value.get(side)) for side in ("x_min", "x_max", "y_min", "y_max")]
         return RoomBounds(*sides) if sides[1] - sides[0] > 0.1 and sides[3] - sides[2] > 0.1 else RoomBounds()
-    wide = _number(value.get("width"), 6.0)
-    deep = _number(value.get("depth"), 5.0)
+    wide = _parse_number(value.get("width"), 6.0)
+    deep = _parse_number(value.get("depth"), 5.0)
     return RoomBounds(-wide / 2, wide / 2, -deep / 2, deep / 2) if min(wide, deep) > 0.1 else RoomBounds()

@@ -91,7 +91,7 @@ class DocumentController:
 
     def new(self) -> None:
         """Create an empty behaviour in a new tab."""
-        self.after_flush(lambda: self._open_tab(self._documents.new))
+        self.run_after_flush(lambda: self._open_tab(self._documents.new))
 
     def ask_open(self) -> None:
         """Ask for a behaviour file and open it."""
@@ -106,7 +106,7 @@ class DocumentController:
             self._documents.open(path)
             self._add_recent(path)
 
-        self.after_flush(lambda: self._open_tab(open_document))
+        self.run_after_flush(lambda: self._open_tab(open_document))
 
     def open_all(self, paths: Sequence[Path]) -> None:
         """Open files from the command line, from a drop, or from a later start of Studio.
@@ -129,7 +129,7 @@ class DocumentController:
 
     def open_example(self, path: Path) -> None:
         """Open a copy of an example in a new tab."""
-        self.after_flush(lambda: self._open_tab(lambda: self._documents.open_example(path)))
+        self.run_after_flush(lambda: self._open_tab(lambda: self._documents.open_example(path)))
 
     def copy(self, path: Path, name: str) -> None:
         """Open a copy of a saved version in a new tab, without writing a file.
@@ -143,11 +143,11 @@ class DocumentController:
             self._documents.copy(path, name)
             self._say(_("Opened {name} as a copy").format(name=name))
 
-        self.after_flush(lambda: self._open_tab(open_copy))
+        self.run_after_flush(lambda: self._open_tab(open_copy))
 
     def recover(self, left: Sequence[UnsavedWork]) -> None:
         """Open behaviours with unsaved changes in tabs, and show the most recently used one."""
-        self.after_flush(lambda: self._open_tab(lambda: self._session.tabs.recover(left)))
+        self.run_after_flush(lambda: self._open_tab(lambda: self._session.tabs.recover(left)))
 
     def close(self, *documents: Document) -> None:
         """Close the tabs of documents, stopping their programs.
@@ -170,7 +170,7 @@ class DocumentController:
             self._session.tabs.save()
             self._notify_closed([each for each in gone if each.words])
 
-        self.after_flush(close_documents)
+        self.run_after_flush(close_documents)
 
     def reopen(self) -> None:
         """Reopen the most recently closed tab."""
@@ -179,7 +179,7 @@ class DocumentController:
             if self._documents.reopen() is None:
                 self._say(_("No closed tabs"))
 
-        self.after_flush(lambda: self._open_tab(reopen_document))
+        self.run_after_flush(lambda: self._open_tab(reopen_document))
 
     def show(self, document: Document) -> None:
         """Show the tab of a document, without waiting for the next tick."""
@@ -190,7 +190,7 @@ class DocumentController:
 
     def duplicate(self, document: Document) -> None:
         """Open a copy of a document in a new tab."""
-        self.after_flush(lambda: self._open_tab(lambda: self._documents.duplicate(document)))
+        self.run_after_flush(lambda: self._open_tab(lambda: self._documents.duplicate(document)))
 
     def rename(self, document: Document, name: str) -> bool:
         """Rename a behaviour and its file; return False on failure, which is shown as an alert.
@@ -225,7 +225,7 @@ class DocumentController:
         if self._session.document.path is None:
             self.save_as()
         else:
-            self.after_flush(lambda: self._save(None))
+            self.run_after_flush(lambda: self._save(None))
 
     def save_as(self) -> None:
         """Ask for a file and save the current behaviour to it."""
@@ -233,7 +233,7 @@ class DocumentController:
         own = document.path
         folder = own.parent if own is not None and own.parent != closed_tabs_folder() else Path.home()
         suggestion = str(folder / f"{document.name}{SUFFIX}")
-        self.asks.save(suggestion, lambda path: self.after_flush(lambda: self._save(path)))
+        self.asks.save(suggestion, lambda path: self.run_after_flush(lambda: self._save(path)))
 
     def fix(self, action: str) -> bool:
         """Apply a fix to the blocks of the current behaviour.
@@ -251,10 +251,10 @@ class DocumentController:
         def apply_fix() -> None:
             document.fix(action)
 
-        self.after_flush(apply_fix)
+        self.run_after_flush(apply_fix)
         return True
 
-    def after_flush(self, then: Callable[[], None]) -> None:
+    def run_after_flush(self, then: Callable[[], None]) -> None:
         """Call a function after the pending edit of the block editor was applied to the document."""
         editor = self._editor()
         if isinstance(editor, SupportsFlush):

@@ -11,7 +11,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 
 OUT, HALO = 5, 5
-RADIUS = 12
+CORNER_RADIUS = 12
 POLL_MS = 100
 TIMEOUT_MS = 15_000
 
@@ -92,6 +92,6 @@ class HintRing(QWidget):
         halo = self._theme.colour("accent")
         halo.setAlphaF(0.28)
         rect = QRectF(self.rect())
-        paint.box(painter, rect.adjusted(0.5, 0.5, -0.5, -0.5), RADIUS + HALO, None, halo, HALO)
-        paint.box(painter, rect.adjusted(HALO, HALO, -HALO, -HALO), RADIUS, None, accent, 2)
+        paint.box(painter, rect.adjusted(0.5, 0.5, -0.5, -0.5), CORNER_RADIUS + HALO, None, halo, HALO)
+        paint.box(painter, rect.adjusted(HALO, HALO, -HALO, -HALO), CORNER_RADIUS, None, accent, 2)
         painter.end()

@@ -23,11 +23,11 @@ from app.ui.shell.bars.banner import AlertBanner
 from app.ui.shell.bars.developer_tools import DeveloperTools
 from app.ui.shell.bars.question_card import QuestionCard
 from app.ui.shell.bars.run_bar import RunBar, ToolBar
-from app.ui.shell.bars.status_bar import Fact, StatusBar, StatusFacts
+from app.ui.shell.bars.status_bar import StatusBar, StatusEntry, StatusFormatter
 from app.ui.shell.bars.toast import Toast
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.shell import START_PAGE
-from app.ui.shell.dialogs.motion_permission import MotionQuestion
+from app.ui.shell.dialogs.motion_permission import MotionPermissionCard
 from app.ui.shell.dialogs.studio_dialogs import StudioDialogs
 from app.ui.shell.docking.dock import Dock, dock_for_kinds
 from app.ui.shell.docking.layouts import LAYOUTS, Layout, layout_named
@@ -48,8 +48,8 @@ from nep.i18n import _, lazy
 
 TICK_MS = 33
 MIN_SIZE = QSize(960, 540)  # leaves room for the system's bars on a screen of 1024 x 600
-FIRST_SIZE = QSize(1440, 900)
-FACTS_REFRESH_TICKS = 8  # ticks between refreshes
+DEFAULT_SIZE = QSize(1440, 900)
+STATUS_REFRESH_TICKS = 8  # ticks between refreshes
 ALERTS_COMMAND = "panel:alerts"
 BLOCK_KEYS = {
     QKeySequence.StandardKey.Copy: "copy",
@@ -98,7 +98,7 @@ class MainWindow(QMainWindow):
         self._showing = self._left = ""
         self.benches: dict[str, Workbench] = {}
         self._ahead: dict[str, Workbench] = {}  # workbenches with panels created in advance
-        self._facts = StatusFacts(session)
+        self._facts = StatusFormatter(session)
         self._alerts_seen = (-1, False)
         self._source_seen = session.source_revision
         self._ticks = self._halves = 0
@@ -107,16 +107,16 @@ class MainWindow(QMainWindow):
         self._flush_before_close = FlushBeforeClose(self, self.editor, self.close)
         self._build(examples)
         files = asks if asks is not None else self._file_dialogs()
-        asked = self.asked.take_focus
+        asked = self.asked.focus_input
         self.context = PanelContext(
-            session, theme, self.open_topic, self.show_toast, self._run, files, asked, self.plot,
+            session, theme, self.open_topic, self.show_toast, self._run_command, files, asked, self.plot,
             partial(self.open_topic, beside=True), self._diagnose,
             lambda: self.bench.visible_panels() if self.bench is not None else (),
         )  # fmt: skip
         self.ring = FocusRing(theme, self)
         self.timer = QTimer(self)
         self.timer.setInterval(TICK_MS)
-        self.timer.timeout.connect(self._half_tick)
+        self.timer.timeout.connect(self._on_half_tick)
         self.gc_freeze = GcFreezeTimer(self)
         self.panel_focus = PanelFocus(lambda: None if self._shut else self.bench, self)
         self.commands = Commands(self, session, files)
@@ -130,7 +130,7 @@ class MainWindow(QMainWindow):
         theme = self.theme
         self.setWindowTitle("NEP Studio")
         self.setMinimumSize(MIN_SIZE)
-        self.resize(FIRST_SIZE)
+        self.resize(DEFAULT_SIZE)
         self.bar = AppBar(theme, LAYOUTS)
         self.setMenuWidget(self.bar)
         self.run_bar, self.tool_bar = RunBar(theme), ToolBar(theme)
@@ -154,10 +154,10 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
         self.asked = QuestionCard(theme, self, self.session.runs.asking.answer)
-        self.question = MotionQuestion(theme, self, self.session.fleet.permission, self.log_problem)
+        self.question = MotionPermissionCard(theme, self, self.session.fleet.permission, self.log_problem)
 
     def _connect(self) -> None:
-        commands, start, run = self.commands, self.start, self._run
+        commands, start, run = self.commands, self.start, self._run_command
         actions, files, shortcuts = commands.actions, commands.files, commands.shortcuts
         for bar in (self.bar, self.run_bar, self.tool_bar):
             bar.set_actions(actions)
@@ -180,16 +180,16 @@ class MainWindow(QMainWindow):
         self.banner.on_more = partial(run, ALERTS_COMMAND)
         self.pages.currentChanged.connect(self._page_changed)
         self.bench_created.connect(shortcuts.update_tooltips)
-        shortcuts.changed.connect(self._show_keys)
-        self._show_keys()
+        shortcuts.changed.connect(self._update_shortcut_texts)
+        self._update_shortcut_texts()
 
-    def _show_keys(self) -> None:
+    def _update_shortcut_texts(self) -> None:
         shortcuts = self.commands.shortcuts
         self.bar.search.show_key(shortcuts.first("palette.open"))
         shortcuts.update_tooltips()
 
     def _page_changed(self) -> None:
-        self.commands.view.show_keys()
+        self.commands.view.update_shortcuts()
         self.tools.refresh()
 
     def _file_dialogs(self) -> FileDialogs:
@@ -240,8 +240,8 @@ class MainWindow(QMainWindow):
         return "behaviour" if any(not each.is_blank for each in self.session.documents) else ""
 
     def _continue_work(self, key: str) -> None:
-        self._run(f"tab:{key}")
-        self._run("layout.behaviour")
+        self._run_command(f"tab:{key}")
+        self._run_command("layout.behaviour")
 
     def show_examples(self) -> None:
         """Show all examples on the start page and focus the first one."""
@@ -249,7 +249,7 @@ class MainWindow(QMainWindow):
 
     def show_recent(self) -> None:
         """Update the recent files on the start page."""
-        self.start.show_recent(recent_titles(self.session.settings.recent))
+        self.start.show_recent(recent_titles(self.session.settings.recent_files))
 
     def log_problem(self, sentence: str) -> None:
         """Log a sentence to the Console, about a problem that requires no action."""
@@ -310,7 +310,7 @@ class MainWindow(QMainWindow):
         self.tool_bar.setVisible(layout == "developer")
         self.status.setVisible(layout is not None)
         self._show_session()
-        self._show_facts()
+        self._update_status_bar()
 
     @property
     def bench(self) -> Workbench | None:
@@ -360,7 +360,7 @@ class MainWindow(QMainWindow):
         if dock is not None and isinstance(dock.panel, SupportsFields):
             dock.panel.plot_field(topic, path)
 
-    def _run(self, name: str) -> None:
+    def _run_command(self, name: str) -> None:
         self.commands.run(name)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -369,11 +369,11 @@ class MainWindow(QMainWindow):
         if event.keyCombination() == DUPLICATE_KEY:
             what = "duplicate"
         if what:
-            self._run(f"blocks.edit:{what}")
+            self._run_command(f"blocks.edit:{what}")
         elif event.key() == Qt.Key.Key_Space and self.session.replay is not None and not event.modifiers():
-            self._run("replay.play")
+            self._run_command("replay.play")
         elif event.keyCombination() == BOOKMARK_KEY and self.session.replay is not None:
-            self._run("replay.bookmark")
+            self._run_command("replay.bookmark")
         elif event.keyCombination() == MENU_KEY and (focus := QApplication.focusWidget()) is not None:
             # Qt itself handles only the Menu key, which many keyboards lack.
             place = focus.rect().center()
@@ -386,7 +386,7 @@ class MainWindow(QMainWindow):
         """Move the focus by Tab, skipping widgets that the user can't see."""
         return self.panel_focus.skip_hidden(self, forward=forward) or super().focusNextPrevChild(forward)
 
-    def _half_tick(self) -> None:
+    def _on_half_tick(self) -> None:
         # The timer runs 60 times a second while images are visible: at 30 Hz about every tenth image would
         # arrive together with another one and be dropped. Otherwise it runs at 30 Hz, the rate of the tick.
         self._halves += 1
@@ -452,13 +452,13 @@ class MainWindow(QMainWindow):
         else:
             self.tool_bar.show_view(view)
             self.use_robot.setVisible(not self.session.fleet.links)
-        if self._ticks % FACTS_REFRESH_TICKS == 0:
+        if self._ticks % STATUS_REFRESH_TICKS == 0:
             with self.session.guarded(lazy("update the status bar")):
-                self._show_facts()
+                self._update_status_bar()
         with self.session.guarded(lazy("show alerts")):
             self._show_alerts()
 
-    def _show_facts(self) -> None:
+    def _update_status_bar(self) -> None:
         # Called less often than the tick, because numbers can't be read at 30 Hz.
         facts, document = self._facts, self.session.document
         alerts = facts.alerts(for_developers=self.current_layout == "developer")
@@ -469,14 +469,20 @@ class MainWindow(QMainWindow):
             web[1]: "network.web",
         }
         if self.current_layout == "behaviour":
-            self.status.show_facts(
+            self.status.show_entries(
                 (facts.health(), facts.save_state()),
                 (facts.arming(), facts.recording(), web, facts.topics(), facts.remote_access_plain()),
             )
         elif self.current_layout == "developer":
-            left: tuple[Fact, ...] = (alerts, facts.master(), facts.remote_access(), web, facts.traffic())
+            left: tuple[StatusEntry, ...] = (
+                alerts,
+                facts.master(),
+                facts.remote_access(),
+                web,
+                facts.traffic(),
+            )
             left = (*left, facts.arming(), facts.lost())
-            right: tuple[Fact, ...] = (
+            right: tuple[StatusEntry, ...] = (
                 facts.recording(),
                 facts.flight_recorder(),
                 facts.displayed_messages(),
@@ -491,7 +497,7 @@ class MainWindow(QMainWindow):
                     facts.master(),
                     facts.window(),
                 )
-            self.status.show_facts(left, right)
+            self.status.show_entries(left, right)
         title = (
             "NEP Studio"
             if self.current_layout == START_PAGE

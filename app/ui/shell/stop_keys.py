@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.ui.widgets.menus import press_stop
 
-_KINDS = frozenset({QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress})
+_EVENT_TYPES = frozenset({QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress})
 
 
 class StopKeys(QObject):
@@ -30,17 +30,17 @@ class StopKeys(QObject):
         self._keys, self._stop = keys, stop
         application = QApplication.instance()
         if isinstance(application, QGuiApplication):
-            application.focusWindowChanged.connect(self._listen_to)
-        self._listen_to(QGuiApplication.focusWindow())
+            application.focusWindowChanged.connect(self._install_on)
+        self._install_on(QGuiApplication.focusWindow())
 
-    def _listen_to(self, window: QWindow | None) -> None:
+    def _install_on(self, window: QWindow | None) -> None:
         # Includes windows that open later: menus, dialogs, floating panels.
         if window is not None:
             window.removeEventFilter(self)
             window.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() in _KINDS and isinstance(event, QKeyEvent):
+        if event.type() in _EVENT_TYPES and isinstance(event, QKeyEvent):
             pressed = QKeySequence(event.keyCombination()).toString(QKeySequence.SequenceFormat.PortableText)
             if pressed in self._keys():
                 event.accept()
@@ -48,10 +48,10 @@ class StopKeys(QObject):
                     self._stop()
                 return True
         if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
-            return self._pressed(event)
+            return self._handle_press(event)
         return super().eventFilter(watched, event)
 
-    def _pressed(self, event: QMouseEvent) -> bool:
+    def _handle_press(self, event: QMouseEvent) -> bool:
         # If a click outside a popup hits a Stop button, stops and consumes the event.
         if event.button() != Qt.MouseButton.LeftButton or QApplication.activePopupWidget() is None:
             return False

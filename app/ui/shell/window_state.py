@@ -14,8 +14,8 @@ from app.errors import SettingsError
 from app.ui.theme.system import parse_preference
 from app.ui.theme.theme import MODES, Mode, Theme
 
-Saved = dict[str, object]
-FRAME = QSize(16, 48)  # approximate size of a window manager's frame
+SettingsDict = dict[str, object]
+FRAME_SIZE = QSize(16, 48)  # approximate size of a window manager's frame
 
 
 def initial_size(size: QSize, room: QSize) -> QSize:
@@ -28,7 +28,7 @@ def initial_size(size: QSize, room: QSize) -> QSize:
         room: Available size of the screen.
     """
     fits = size.width() <= room.width() and size.height() <= room.height()
-    return size if fits else size.boundedTo(room - FRAME)
+    return size if fits else size.boundedTo(room - FRAME_SIZE)
 
 
 class WindowState:
@@ -86,7 +86,7 @@ class WindowState:
 
     def layouts(self) -> Mapping[str, object]:
         """Return the saved arrangements of all layouts, by name."""
-        kept: Saved = self._settings.get("layouts", {})
+        kept: SettingsDict = self._settings.get("layouts", {})
         return kept
 
     def layout_state(self, name: str) -> Mapping[str, object]:
@@ -104,7 +104,7 @@ class WindowState:
         Args:
             base: Name of the workbench's built-in layout.
         """
-        kept: Saved = self._settings.get("chosen_layouts", {})
+        kept: SettingsDict = self._settings.get("chosen_layouts", {})
         name = kept.get(base)
         return name if isinstance(name, str) else ""
 
@@ -115,7 +115,7 @@ class WindowState:
             base: Name of the workbench's built-in layout.
             name: Name of the custom layout, or "" for the built-in one.
         """
-        kept: Saved = self._settings.get("chosen_layouts", {})
+        kept: SettingsDict = self._settings.get("chosen_layouts", {})
         self._set("chosen_layouts", {**kept, base: name})
 
     def save_layouts(self, found: Mapping[str, Mapping[str, object]]) -> bool:

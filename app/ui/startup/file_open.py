@@ -10,10 +10,10 @@ from PySide6.QtCore import QEvent, QMimeData, QObject
 from PySide6.QtGui import QDragMoveEvent, QDropEvent, QFileOpenEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
-DROPS = frozenset({QEvent.Type.DragEnter, QEvent.Type.DragMove, QEvent.Type.Drop})
+DROP_EVENTS = frozenset({QEvent.Type.DragEnter, QEvent.Type.DragMove, QEvent.Type.Drop})
 
 
-class IncomingFiles(QObject):
+class FileDropFilter(QObject):
     """Event filter that accepts files dropped on a window.
 
     Args:
@@ -29,7 +29,7 @@ class IncomingFiles(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
-        if kind in DROPS:
+        if kind in DROP_EVENTS:
             dropped = cast("QDropEvent | QDragMoveEvent", event)
             paths = paths_of(dropped.mimeData())
             if not paths:
@@ -54,7 +54,7 @@ class Application(QApplication):
         self._take: Callable[[Sequence[Path]], object] | None = None
         self._waiting: list[Path] = []
 
-    def open_files_with(self, take: Callable[[Sequence[Path]], object]) -> None:
+    def set_file_opener(self, take: Callable[[Sequence[Path]], object]) -> None:
         """Set the function that opens files, and call it with the files that have arrived before.
 
         Args:

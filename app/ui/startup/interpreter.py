@@ -22,8 +22,8 @@ import sys
 from PySide6.QtCore import QObject, Qt, QTimer
 
 SWITCH_INTERVAL_S = 0.0005
-SETTLE_MS = 1000
-COLLECT_MS = 250
+FREEZE_DELAY_MS = 1000
+COLLECT_INTERVAL_MS = 250
 NEW_OBJECTS, COLLECTIONS = 10_000, 20
 """Thresholds: new objects for a collection of generation 0, and collections for one of the next older."""
 
@@ -56,7 +56,7 @@ class GcTimer(QTimer):
         super().__init__(parent)
         gc.disable()
         self.setTimerType(Qt.TimerType.CoarseTimer)  # precise wake-ups of the computer are not needed
-        self.setInterval(COLLECT_MS)
+        self.setInterval(COLLECT_INTERVAL_MS)
         self.timeout.connect(collect_garbage)
 
 
@@ -69,5 +69,5 @@ class GcFreezeTimer(QTimer):
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         self.setSingleShot(True)
-        self.setInterval(SETTLE_MS)
+        self.setInterval(FREEZE_DELAY_MS)
         self.timeout.connect(freeze_objects)

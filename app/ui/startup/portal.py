@@ -11,8 +11,8 @@ from pathlib import Path
 
 THEME, CHOICE = "xdgdesktopportal", "QT_QPA_PLATFORMTHEME"
 NAME, OBJECT = "org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop"
-CHOOSER = "org.freedesktop.portal.FileChooser"
-MAX_MS = 300
+FILE_CHOOSER_INTERFACE = "org.freedesktop.portal.FileChooser"
+REPLY_TIMEOUT_MS = 300
 
 
 def has_bus(environ: MutableMapping[str, str]) -> bool:
@@ -32,8 +32,8 @@ def has_file_chooser() -> bool:
         if not bus.isConnected():
             return False
         ask = QDBusMessage.createMethodCall(NAME, OBJECT, "org.freedesktop.DBus.Properties", "Get")
-        ask.setArguments([CHOOSER, "version"])
-        return bus.call(ask, timeout=MAX_MS).type() == QDBusMessage.MessageType.ReplyMessage
+        ask.setArguments([FILE_CHOOSER_INTERFACE, "version"])
+        return bus.call(ask, timeout=REPLY_TIMEOUT_MS).type() == QDBusMessage.MessageType.ReplyMessage
     finally:
         QDBusConnection.disconnectFromBus("studio-portal")
 

@@ -20,12 +20,12 @@ from app.core import faults
 from app.core.faults import RepeatFilter
 from nep.system import terminal
 
-FLAGS = "QTWEBENGINE_CHROMIUM_FLAGS"
-QUIET = "--log-level=3"  # only fatal messages of Chromium
+FLAGS_VARIABLE = "QTWEBENGINE_CHROMIUM_FLAGS"
+QUIET_FLAG = "--log-level=3"  # only fatal messages of Chromium
 NO_PLATFORM_MESSAGE = "no Qt platform plugin could be initialized"
 MAX_RECORDS = 200
 
-NOISE = re.compile(
+NOISE_PATTERN = re.compile(
     r"Failed to load vulkan:|initInstance: No Vulkan library available$"
     r"|Failed to create (platform )?Vulkan instance(: -\d+)?$|QVulkanInstance: Failed to initialize Vulkan$"
     r"|Unable to detect GPU vendor|GBM is not supported with the current configuration"
@@ -48,9 +48,9 @@ _log = logging.getLogger("qt")
 
 def quiet_chromium(environ: MutableMapping[str, str]) -> None:
     """Disable Chromium's log, unless the flags in the environment configure it."""
-    flags = environ.get(FLAGS, "")
+    flags = environ.get(FLAGS_VARIABLE, "")
     if "--log-level" not in flags and "--enable-logging" not in flags:
-        environ[FLAGS] = f"{flags} {QUIET}".strip()
+        environ[FLAGS_VARIABLE] = f"{flags} {QUIET_FLAG}".strip()
 
 
 def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> None:
@@ -69,7 +69,7 @@ def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> 
         )
         logging.shutdown()
         os._exit(2)
-    if kind == QtMsgType.QtFatalMsg or NOISE.match(words) is None:
+    if kind == QtMsgType.QtFatalMsg or NOISE_PATTERN.match(words) is None:
         _log.log(LEVELS.get(kind, logging.WARNING), "%s", words)
 
 

@@ -16,14 +16,14 @@ import sys
 from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
-from app.ui.startup.qt_log import FLAGS
+from app.ui.startup.qt_log import FLAGS_VARIABLE
 
 NO_NAMESPACES_FLAG = "--disable-namespace-sandbox"
 DISABLE_VARIABLE = "QTWEBENGINE_DISABLE_SANDBOX"
 NEW_USER, NEW_PROCESSES = 0x10000000, 0x20000000
 EMPTY_ROOT = b"/proc/self/fdinfo"
 """Root folder of an isolated process; the folder is empty once the process that created it has ended."""
-MAX_S = 2.0
+TIMEOUT_S = 2.0
 
 _log = logging.getLogger("studio.editor")
 
@@ -54,7 +54,7 @@ class SandboxTrial:
         """
         if self._process < 0:
             return False
-        if not select.select([self._ended], [], [], MAX_S)[0]:
+        if not select.select([self._ended], [], [], TIMEOUT_S)[0]:
             os.kill(self._process, signal.SIGKILL)
         os.close(self._ended)
         return os.waitpid(self._process, 0)[1] == 0
@@ -73,7 +73,7 @@ def start_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | Non
     if (
         not platform.startswith("linux")
         or environ.get(DISABLE_VARIABLE)
-        or "sandbox" in environ.get(FLAGS, "")
+        or "sandbox" in environ.get(FLAGS_VARIABLE, "")
     ):
         return None
     return SandboxTrial()
@@ -90,7 +90,7 @@ def configure_sandbox(environ: MutableMapping[str, str], trial: SandboxTrial | N
         _log.info(
             "user namespaces are not permitted: the block editor's browser uses the system call filter only"
         )
-        environ[FLAGS] = f"{environ.get(FLAGS, '')} {NO_NAMESPACES_FLAG}".strip()
+        environ[FLAGS_VARIABLE] = f"{environ.get(FLAGS_VARIABLE, '')} {NO_NAMESPACES_FLAG}".strip()
 
 
 def try_isolation() -> bool:

@@ -34,12 +34,12 @@ if TYPE_CHECKING:
 else:
     QtNetwork = lazy_module("PySide6.QtNetwork")
 
-CONNECT_MS = 300
+CONNECT_TIMEOUT_MS = 300
 REPLY_TIMEOUT_MS = 3000
 START_S, POLL_S = 20.0, 0.05
-MAX_LENGTH = 1_000_000
+MAX_REQUEST_LENGTH = 1_000_000
 MAX_PATH_LENGTH = 100  # the path of a Unix socket has at most 108 bytes
-OK = b"ok\n"
+OK_REPLY = b"ok\n"
 
 
 @dataclass(frozen=True)
@@ -140,18 +140,18 @@ def send_request(name: str, asked: StartRequest) -> bool:
         return False  # checked on Unix before Qt's network module is loaded, which takes time
     line = QtNetwork.QLocalSocket()
     line.connectToServer(name)
-    if not line.waitForConnected(CONNECT_MS) or _belongs_to_other_user(line):
+    if not line.waitForConnected(CONNECT_TIMEOUT_MS) or _belongs_to_other_user(line):
         return False
     files = [str(path.absolute()) for path in asked.files]
     line.write(json.dumps({"files": files, "demo": asked.demo}).encode() + b"\n")
     line.flush()
     answer, until = b"", time.monotonic() + REPLY_TIMEOUT_MS / 1000
-    while len(answer) < len(OK) and (left_ms := int((until - time.monotonic()) * 1000)) > 0:
+    while len(answer) < len(OK_REPLY) and (left_ms := int((until - time.monotonic()) * 1000)) > 0:
         if not line.waitForReadyRead(left_ms):
             break
         answer += line.readAll().data()
     line.disconnectFromServer()
-    return answer == OK
+    return answer == OK_REPLY
 
 
 def pass_to_running(name: str, asked: StartRequest, turn: FileLock, within_s: float = START_S) -> bool:
@@ -211,7 +211,7 @@ class SingleInstanceServer(QObject):
         # On Unix a second listener replaces the first one silently, so check first whether there is one.
         probe = QtNetwork.QLocalSocket()
         probe.connectToServer(name)
-        if probe.waitForConnected(CONNECT_MS):
+        if probe.waitForConnected(CONNECT_TIMEOUT_MS):
             probe.disconnectFromServer()
             return False
         if self._server.listen(name):
@@ -235,7 +235,7 @@ class SingleInstanceServer(QObject):
             return
         self._received[socket] += socket.readAll().data()
         data = self._received[socket]
-        if len(data) > MAX_LENGTH:
+        if len(data) > MAX_REQUEST_LENGTH:
             socket.abort()
         elif data.endswith(b"\n"):
             self._received[socket] = b""
@@ -243,7 +243,7 @@ class SingleInstanceServer(QObject):
             if asked is None:
                 socket.abort()
                 return
-            socket.write(OK)
+            socket.write(OK_REPLY)
             socket.flush()
             self._do(asked)
 

@@ -6,7 +6,7 @@ from app.core.network.nodes import NodeEntry
 from app.core.networks.kinds import find_kind
 from nep.i18n import _, lazy, number
 
-GENERATIONS = {
+GENERATION_LABELS = {
     "native": lazy("native"),
     "A": lazy("NEP up to 0.5.4.5"),
     "B": "NEP 0.5.4.8",
@@ -18,7 +18,7 @@ def generation_text(node: NodeEntry) -> str:
     kind = find_kind(node.network)
     if kind is not None:
         return kind.product_name
-    return _(GENERATIONS.get(node.generation, f"NEP {node.generation}"))
+    return _(GENERATION_LABELS.get(node.generation, f"NEP {node.generation}"))
 
 
 def cpu_text(ratio: float | None) -> str:

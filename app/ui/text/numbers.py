@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from nep.i18n import _, number, plazy
 
 MAC_KEYS = {"Meta": "⌃", "Alt": "⌥", "Shift": "⇧", "Ctrl": "⌘"}
-KEYS = {
+KEY_LABELS = {
     "Alt": plazy("key", "Alt"),
     "Backspace": plazy("key", "Backspace"),
     "Ctrl": plazy("key", "Ctrl"),
@@ -33,8 +33,8 @@ KEYS = {
     "Up": plazy("key", "Up"),
 }
 """Labels of keys by Qt's names. Letters and function keys are the same in all languages."""
-_KEY = re.compile(r"[A-Z][A-Za-z]+")
-THIN = "\u2009"  # thin space, as thousands separator
+_KEY_NAME_PATTERN = re.compile(r"[A-Z][A-Za-z]+")
+THIN_SPACE = "\u2009"  # thin space, as thousands separator
 
 
 def rate_text(rate_hz: float | None) -> str:
@@ -83,7 +83,7 @@ def latency_text(latency_s: float) -> str:
 
 def group_digits(count: int) -> str:
     """Format a count with thin spaces as thousands separators, such as "18 204"."""
-    return f"{count:,}".replace(",", THIN)
+    return f"{count:,}".replace(",", THIN_SPACE)
 
 
 def seconds_text(value_s: float) -> str:
@@ -101,14 +101,14 @@ def shortcut_text(shortcut: str, platform: str = sys.platform) -> str:
         platform: Value of `sys.platform`.
     """
     if platform != "darwin":
-        return _named_keys(shortcut, {})
+        return _translate_keys(shortcut, {})
     return ", ".join(_mac_key(each) for each in shortcut.split(", "))
 
 
 def _mac_key(shortcut: str) -> str:
     # In the order of menus on a Mac.
     *held, key = re.split(r"\+(?=.)", shortcut)
-    return "".join(sign for name, sign in MAC_KEYS.items() if name in held) + _named_keys(key, MAC_KEYS)
+    return "".join(sign for name, sign in MAC_KEYS.items() if name in held) + _translate_keys(key, MAC_KEYS)
 
 
 def tip_with_key(tip: str, shortcut: str, platform: str = sys.platform) -> str:
@@ -122,8 +122,8 @@ def tip_with_key(tip: str, shortcut: str, platform: str = sys.platform) -> str:
     return f"{tip} ({shortcut_text(shortcut, platform)})" if shortcut else tip
 
 
-def _named_keys(shortcut: str, signs: Mapping[str, str]) -> str:
-    return _KEY.sub(lambda key: signs.get(key[0]) or _(KEYS.get(key[0], key[0])), shortcut)
+def _translate_keys(shortcut: str, signs: Mapping[str, str]) -> str:
+    return _KEY_NAME_PATTERN.sub(lambda key: signs.get(key[0]) or _(KEY_LABELS.get(key[0], key[0])), shortcut)
 
 
 def length_text(seconds: float) -> str:

@@ -17,10 +17,10 @@ ZERO_WIDTH_SPACE = "\u200b"  # zero-width space, at which a line may break
 
 def make_breakable(words: str) -> str:
     """Insert zero-width spaces into long words, so that a label can wrap instead of truncating them."""
-    return " ".join(_pieces(word) if len(word) > LONG_WORD else word for word in words.split(" "))
+    return " ".join(_break_word(word) if len(word) > LONG_WORD else word for word in words.split(" "))
 
 
-def _pieces(word: str) -> str:
+def _break_word(word: str) -> str:
     # Combining characters are not separated from their letter.
     result, since = "", 0
     for letter in word:

@@ -36,16 +36,16 @@ def reading_text(sensor: Sensor, value: object) -> ReadingText:
     if sensor.kind == "boolean" or isinstance(value, bool):
         return ReadingText(yes_no_text(value))
     if sensor.kind == "detections" and isinstance(value, Mapping):
-        return _detections(value)
+        return _detections_text(value)
     if isinstance(value, Mapping):
-        return _object(sensor, value)
+        return _object_text(sensor, value)
     if isinstance(value, (int, float)):
         return ReadingText(quantity_text(value, sensor.unit), fraction=_fraction(sensor, value))
     if isinstance(value, str):
         title = next((choice.title for choice in sensor.choices if choice.value == value), value)
         return ReadingText(title if sensor.kind == "choice" else f"“{title}”" if title else "")
     if isinstance(value, Sequence):
-        return ReadingText(str(len(value)), ", ".join(_name(item) for item in value))
+        return ReadingText(str(len(value)), ", ".join(_item_name(item) for item in value))
     return ReadingText(str(value))
 
 
@@ -80,7 +80,7 @@ def _fraction(sensor: Sensor, value: float) -> float | None:
     return min(1.0, max(0.0, (value - low) / (high - low)))
 
 
-def _detections(value: Mapping[str, object]) -> ReadingText:
+def _detections_text(value: Mapping[str, object]) -> ReadingText:
     items = value.get("items")
     found = [item for item in items if isinstance(item, Mapping)] if isinstance(items, list) else []
     count = value.get("count")
@@ -93,7 +93,7 @@ def _detections(value: Mapping[str, object]) -> ReadingText:
     return ReadingText(str(count if isinstance(count, int) else len(found)), names)
 
 
-def _object(sensor: Sensor, value: Mapping[str, object]) -> ReadingText:
+def _object_text(sensor: Sensor, value: Mapping[str, object]) -> ReadingText:
     # Fields with the same unit are combined ("1.3, 0.3 m"); others follow ("facing 31°").
     fields = sensor.fields or tuple(DataField(str(name), str(name), "number") for name in value)
     known = [(field, value.get(field.name)) for field in fields]
@@ -117,5 +117,5 @@ def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def _name(item: object) -> str:
+def _item_name(item: object) -> str:
     return bounded_str(item.get("name", item) if isinstance(item, Mapping) else item)

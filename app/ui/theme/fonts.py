@@ -11,7 +11,7 @@ from app import resources
 
 REJECTED_PROPERTY = "fontsRefused"
 """Application property with the names of the font files that Qt rejected; set by `load`."""
-FILES = (
+FONT_FILES = (
     "Inter-Regular.otf",
     "Inter-Medium.otf",
     "Inter-SemiBold.otf",
@@ -35,7 +35,7 @@ def load() -> tuple[str, ...]:
     if application is not None and application.property(REJECTED_PROPERTY) is not None:
         return tuple(application.property(REJECTED_PROPERTY))
     refused: list[str] = []
-    for name in FILES:
+    for name in FONT_FILES:
         number = QFontDatabase.addApplicationFont(str(resources.path("fonts", name)))
         if number < 0:
             refused.append(name)
@@ -44,7 +44,7 @@ def load() -> tuple[str, ...]:
     return tuple(refused)
 
 
-def make(families: Sequence[str], size_px: float, weight: int, *, spacing_em: float = 0.0) -> QFont:
+def make_font(families: Sequence[str], size_px: float, weight: int, *, spacing_em: float = 0.0) -> QFont:
     """Return a font with tabular digits.
 
     Args:

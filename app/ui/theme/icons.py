@@ -19,9 +19,9 @@ from app import resources
 from app.ui.overrides import guard
 
 THIN_FROM_PX = 20
-DOT_SHARE = 10 / 16
-UNKNOWN = "circle-question-mark"
-HEAD = (
+DOT_SIZE_RATIO = 10 / 16
+FALLBACK_ICON = "circle-question-mark"
+SVG_START_TAG = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="24" height="24" viewBox="0 0 24 24" fill="none"'
     ' stroke="currentColor" stroke-width="2" stroke-linecap="round" stroke-linejoin="round">'
 )
@@ -46,8 +46,8 @@ def _source(name: str) -> str:
     shape = _shapes().get(name)
     if shape is None:
         _log.warning("unknown icon '%s'%s; using a placeholder", name[:80], _suggestion(name))
-        shape = _shapes()[UNKNOWN]
-    return f"{HEAD}{shape}</svg>"
+        shape = _shapes()[FALLBACK_ICON]
+    return f"{SVG_START_TAG}{shape}</svg>"
 
 
 def _suggestion(name: str) -> str:
@@ -83,7 +83,7 @@ def paint_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor, *, fi
     if name == "dot":
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(colour)
-        radius = min(rect.width(), rect.height()) * DOT_SHARE / 2
+        radius = min(rect.width(), rect.height()) * DOT_SIZE_RATIO / 2
         painter.drawEllipse(rect.center(), radius, radius)
     else:
         thin = rect.width() >= THIN_FROM_PX

@@ -46,7 +46,7 @@ class ThemeValues(Protocol):
         """Return the font family for text or for code."""
 
 
-SHEET = """
+STYLE_SHEET_TEMPLATE = """
 QToolTip {{
     background: {tooltip}; color: {tooltipText}; border: 1px solid {tooltip}; padding: 1px 2px;
     font-size: {small_text}px;
@@ -126,7 +126,7 @@ Workbench > QTabBar::tab {{ width: 0; height: 0; margin: 0; padding: 0; border: 
 """
 
 
-def _labels(theme: ThemeValues) -> str:
+def _label_rules(theme: ThemeValues) -> str:
     kinds = {name: (kind.size_px, kind.weight) for name, kind in theme.text_kinds().items()} | EXTRA_KINDS
     rules = []
     for name, (size_px, weight) in kinds.items():
@@ -160,4 +160,4 @@ def build(theme: ThemeValues) -> str:
         field=theme.hex("sunken") if theme.dark else theme.hex("panel"),
         small_text=str(round(theme.scaled(theme.text_kinds()["small"].size_px))),
     )
-    return SHEET.format_map(roles) + _labels(theme)
+    return STYLE_SHEET_TEMPLATE.format_map(roles) + _label_rules(theme)

@@ -12,7 +12,7 @@ from PySide6.QtGui import QStyleHints
 
 Preference = Literal["system", "on", "off"]
 PREFERENCES: tuple[Preference, ...] = ("system", "on", "off")
-CLIENT_AREA_ANIMATION = 0x1042  # SPI_GETCLIENTAREAANIMATION of Windows
+SPI_GETCLIENTAREAANIMATION = 0x1042  # SPI_GETCLIENTAREAANIMATION of Windows
 
 
 def parse_preference(kept: object) -> Preference:
@@ -44,5 +44,5 @@ def prefers_reduced_motion(platform: str = sys.platform) -> bool:
         return False
     animated = ctypes.c_int(1)
     user32 = getattr(ctypes, "windll").user32  # noqa: B009  mypy knows that it exists only on Windows
-    succeeded = user32.SystemParametersInfoW(CLIENT_AREA_ANIMATION, 0, ctypes.byref(animated), 0)
+    succeeded = user32.SystemParametersInfoW(SPI_GETCLIENTAREAANIMATION, 0, ctypes.byref(animated), 0)
     return bool(succeeded) and animated.value == 0

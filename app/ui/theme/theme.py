@@ -183,7 +183,7 @@ class Theme(QObject):
     # -- colours ----------------------------------------------------------------------------------
 
     @property
-    def _scheme(self) -> str:
+    def _colour_scheme(self) -> str:
         return "dark" if self._dark else "light"
 
     def hex(self, role: str) -> str:
@@ -197,7 +197,7 @@ class Theme(QObject):
                 role = "controlBorder"
             elif role in HC_FLAT_ROLES:
                 role = "panel"
-        return self._tokens.colours[self._scheme][role]
+        return self._tokens.colours[self._colour_scheme][role]
 
     def colour(self, role: str) -> QColor:
         """Return the colour of a role.
@@ -209,7 +209,7 @@ class Theme(QObject):
 
     def series(self, index: int) -> QColor:
         """Return the colour of the curve with this index; the colours repeat."""
-        colours = self._tokens.series[self._scheme]
+        colours = self._tokens.series[self._colour_scheme]
         return QColor(colours[index % len(colours)])
 
     def block_colour(self, category: str, part: str = "primary") -> QColor:
@@ -220,7 +220,7 @@ class Theme(QObject):
             part: "primary", "secondary" or "tertiary".
         """
         block = self._tokens.blocks.get(category, self._tokens.blocks["values"])
-        return QColor(block[self._scheme][part])
+        return QColor(block[self._colour_scheme][part])
 
     def block_text(self, category: str) -> QColor:
         """Return the colour of text and icons on blocks of a category."""
@@ -263,7 +263,7 @@ class Theme(QObject):
             raise KeyError("/".join(path))
         return round(value)
 
-    def pair(self, *path: str) -> QSize:
+    def size_pair(self, *path: str) -> QSize:
         """Return a width and height in px by their path in the tokens, such as ``pair("stop", "runBar")``.
 
         Raises:
@@ -301,7 +301,7 @@ class Theme(QObject):
         if kind not in self._fonts:
             text = self._tokens.texts["body" if kind == "mono" else kind]
             family = self._tokens.families["mono" if kind in MONO_KINDS else "text"]
-            self._fonts[kind] = fonts.make(
+            self._fonts[kind] = fonts.make_font(
                 (family, *self._tokens.fallback),
                 self.scaled(text.size_px),
                 text.weight,

@@ -118,7 +118,7 @@ def parse(raw: Mapping[str, object]) -> Tokens:
             for theme, roles in colours.items()
         },
         series={theme: tuple(roles["series"]) for theme, roles in colours.items()},
-        status=_status(cast("Mapping[str, object]", raw["status"])),
+        status=_parse_statuses(cast("Mapping[str, object]", raw["status"])),
         blocks={
             name: cast("Mapping[str, Mapping[str, str]]", {mode: block[mode] for mode in ("light", "dark")})
             for name, block in blocks.items()
@@ -127,7 +127,7 @@ def parse(raw: Mapping[str, object]) -> Tokens:
         block_text={name: str(block["text"]) for name, block in blocks.items()},
         sizes=cast("Numbers", raw["size_px"]),
         radii=cast("Mapping[str, int]", raw["radius_px"]),
-        texts=_texts(cast("Mapping[str, Mapping[str, int]]", raw["type"])),
+        texts=_parse_text_kinds(cast("Mapping[str, Mapping[str, int]]", raw["type"])),
         motion_ms={
             name: value
             for name, value in cast("Mapping[str, int | str]", raw["motion_ms"]).items()
@@ -139,7 +139,7 @@ def parse(raw: Mapping[str, object]) -> Tokens:
     )
 
 
-def _status(raw: Mapping[str, object]) -> Mapping[str, Status]:
+def _parse_statuses(raw: Mapping[str, object]) -> Mapping[str, Status]:
     found: dict[str, Status] = {}
     for name, value in raw.items():
         if isinstance(value, dict):
@@ -151,7 +151,7 @@ def _status(raw: Mapping[str, object]) -> Mapping[str, Status]:
     return found
 
 
-def _texts(raw: Mapping[str, Mapping[str, int]]) -> Mapping[str, TextKind]:
+def _parse_text_kinds(raw: Mapping[str, Mapping[str, int]]) -> Mapping[str, TextKind]:
     return {name: TextKind(kind["size_px"], kind["line_px"], kind["weight"]) for name, kind in raw.items()}
 
 

@@ -12,7 +12,7 @@ from app.ui.widgets.buttons import MenuButton as MenuButton
 from app.ui.widgets.buttons import RunButton as RunButton
 from app.ui.widgets.buttons import StopButton as StopButton
 from app.ui.widgets.buttons import ToggleButton as ToggleButton
-from app.ui.widgets.buttons import name_command as name_command
+from app.ui.widgets.buttons import assign_command as assign_command
 from app.ui.widgets.cards import Card as Card
 from app.ui.widgets.empty_state import EmptyAction as EmptyAction
 from app.ui.widgets.empty_state import EmptyState as EmptyState

@@ -16,7 +16,7 @@ from app.ui.text.numbers import tip_with_key
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.keyboard import has_no_modifiers
 from nep.i18n import _
 
 Kind = Literal["plain", "primary", "ghost", "run", "stop"]
@@ -29,16 +29,16 @@ _COLOURS: dict[str, tuple[str | None, str | None, str | None, str | None, str]] 
     "run": ("run", "runHover", "runHover", None, "onRun"),
     "stop": ("stop", "stopHover", "stopHover", None, "onStop"),
 }
-ARROW = 16
+ARROW_SIZE = 16
 CHEVRON, CHEVRON_GAP = 14, 6
 BarName = Literal["runBar", "toolBar", "appBar"]
 RUN_WIDTH = 112
 ICON_ONLY_WIDTH = 56
 DROP_TARGET_WIDTH = 2.0
-RING = 4  # px around Stop, for the ring that shows pending replies
+STOP_RING_WIDTH = 4  # px around Stop, for the ring that shows pending replies
 
 
-class _Measure(NamedTuple):
+class _ButtonMetrics(NamedTuple):
     height: int
     font: str
     icon: int
@@ -47,15 +47,15 @@ class _Measure(NamedTuple):
     radius: str
 
 
-_MEASURES: dict[str, _Measure] = {
-    "small": _Measure(26, "body", 14, 6, 9, "small"),
-    "normal": _Measure(32, "body", 16, 8, 12, "control"),
-    "form": _Measure(36, "label", 16, 8, 14, "control"),
-    "large": _Measure(44, "button", 20, 10, 18, "large"),
+_METRICS: dict[str, _ButtonMetrics] = {
+    "small": _ButtonMetrics(26, "body", 14, 6, 9, "small"),
+    "normal": _ButtonMetrics(32, "body", 16, 8, 12, "control"),
+    "form": _ButtonMetrics(36, "label", 16, 8, 14, "control"),
+    "large": _ButtonMetrics(44, "button", 20, 10, 18, "large"),
 }
 
 
-def name_command(widget: QWidget, command: str) -> None:
+def assign_command(widget: QWidget, command: str) -> None:
     """Associate a button with a command, whose tooltip and current shortcut the button then shows."""
     widget.setProperty("command", command)
 
@@ -133,7 +133,7 @@ class PaintedButton(QAbstractButton):
         Qt does so only for a QPushButton with `autoDefault`, which also repeats the click while Enter
         is held.
         """
-        if event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter} or not is_plain(event):
+        if event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter} or not has_no_modifiers(event):
             super().keyPressEvent(event)
         elif not event.isAutoRepeat():
             self.click()
@@ -173,7 +173,7 @@ class Button(PaintedButton):
         size: Size = "normal",
         parent: QWidget | None = None,
     ) -> None:
-        self.measure = _MEASURES[size]
+        self.measure = _METRICS[size]
         super().__init__(theme, text, radius=self.measure.radius, parent=parent)
         self.kind: Kind = kind
         self.icon_name = icon
@@ -201,8 +201,8 @@ class Button(PaintedButton):
 
     def set_size(self, size: Size) -> None:
         """Set the size, which determines height, font and padding."""
-        if self.measure != _MEASURES[size]:
-            self.measure = _MEASURES[size]
+        if self.measure != _METRICS[size]:
+            self.measure = _METRICS[size]
             self.setProperty("focusRadius", self._theme.radius(self.measure.radius))
             self.updateGeometry()
             self.update()
@@ -398,7 +398,7 @@ class LinkButton(PaintedButton):
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("title")
-        width = round(paint.width_of(font, self.text())) + 2 + (ARROW + 6 if self._icon else 0)
+        width = round(paint.width_of(font, self.text())) + 2 + (ARROW_SIZE + 6 if self._icon else 0)
         return QSize(width, max(24, round(paint.height_of(font)) + 4))
 
     def minimumSizeHint(self) -> QSize:
@@ -408,9 +408,11 @@ class LinkButton(PaintedButton):
         font, ink = self._theme.font("title"), self._theme.colour("accentText")
         font.setUnderline(self.is_hovered)
         if self._icon is not None:
-            square = QRectF(rect.right() - ARROW, rect.center().y() - ARROW / 2, ARROW, ARROW)
+            square = QRectF(
+                rect.right() - ARROW_SIZE, rect.center().y() - ARROW_SIZE / 2, ARROW_SIZE, ARROW_SIZE
+            )
             paint_icon(painter, square, self._icon, ink)
-            rect.adjust(0, 0, -ARROW - 6, 0)
+            rect.adjust(0, 0, -ARROW_SIZE - 6, 0)
         paint.text_line(painter, rect, self.text(), font, ink)
 
 
@@ -475,8 +477,8 @@ class StopButton(PaintedButton):
         self.filled = True
         # A click doesn't take the focus, so sheets stay open and typing continues.
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        name_command(self, "run.stop")
-        self.setProperty("focusInset", RING)
+        assign_command(self, "run.stop")
+        self.setProperty("focusInset", STOP_RING_WIDTH)
 
     def show_state(self, word: str, *, ring: bool = False, filled: bool = True) -> None:
         """Set the state of the button.
@@ -494,14 +496,14 @@ class StopButton(PaintedButton):
         self.update()
 
     def sizeHint(self) -> QSize:
-        wanted = self._theme.pair("stop", self._place)
+        wanted = self._theme.size_pair("stop", self._place)
         word, key = self._fonts()
         captions = (_("Stop"), _("Stopping"), _("Stop again"))  # the same size in every state
-        least = self._side() + 26 + max(paint.width_of(word, each) for each in captions)
+        least = self._icon_side() + 26 + max(paint.width_of(word, each) for each in captions)
         if self._place != "runBar":
             least += paint.width_of(key, "F12") + 8
         height = max(wanted.height(), round(paint.height_of(word)) + 10)
-        return QSize(max(wanted.width(), round(least)) + 2 * RING, height + 2 * RING)
+        return QSize(max(wanted.width(), round(least)) + 2 * STOP_RING_WIDTH, height + 2 * STOP_RING_WIDTH)
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
@@ -514,14 +516,14 @@ class StopButton(PaintedButton):
             word.setPixelSize(round(self._theme.scaled(17)))
         return word, self._theme.font("small" if large else "caption")
 
-    def _side(self) -> int:
+    def _icon_side(self) -> int:
         return 16 if self._place == "runBar" else 12
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme, radius = self._theme, self._theme.radius(self._corners)
-        frame = rect.adjusted(RING, RING, -RING, -RING)
+        frame = rect.adjusted(STOP_RING_WIDTH, STOP_RING_WIDTH, -STOP_RING_WIDTH, -STOP_RING_WIDTH)
         if self._ring:
-            paint.box(painter, rect, radius + RING, None, theme.colour("stop"), 2)
+            paint.box(painter, rect, radius + STOP_RING_WIDTH, None, theme.colour("stop"), 2)
         if self.filled:
             paint.box(painter, frame, radius, theme.colour("stopHover" if self.is_highlighted else "stop"))
             ink = theme.colour("onStop")
@@ -534,7 +536,7 @@ class StopButton(PaintedButton):
     def _paint_text(self, painter: QPainter, frame: QRectF, ink: QColor) -> None:
         font, key_font = self._fonts()
         key = "F12" if self.text() == _("Stop") or self._place != "runBar" else ""
-        side = self._side()
+        side = self._icon_side()
         gap = 10 if self._place == "runBar" else 8
         key_gap = gap + 3 if self._place == "runBar" else gap - 1
         word_width = paint.width_of(font, self.text())

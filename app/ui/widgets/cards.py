@@ -14,8 +14,8 @@ from app.ui.widgets.indicators import status_name
 from app.ui.widgets.labels import label
 from nep.i18n import _
 
-TILE = 28
-BORDERS = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info": "borderStrong"}
+TILE_SIZE = 28
+BORDER_ROLES = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info": "borderStrong"}
 
 
 class Card(QFrame):
@@ -36,7 +36,7 @@ class Card(QFrame):
 class Tile(QWidget):
     """Icon on a square in the colour of a block category."""
 
-    def __init__(self, theme: Theme, icon: str, category: str = "robot", side: int = TILE) -> None:
+    def __init__(self, theme: Theme, icon: str, category: str = "robot", side: int = TILE_SIZE) -> None:
         super().__init__()
         self._theme, self._icon, self._category = theme, icon, category
         self.setFixedSize(side, side)
@@ -106,7 +106,7 @@ class AlertBox(QWidget):
         theme, painter = self._theme, QPainter(self)
         status = theme.status(self._status)
         if self._framed:
-            edge = theme.colour(BORDERS.get(self._status, "borderStrong"))
+            edge = theme.colour(BORDER_ROLES.get(self._status, "borderStrong"))
             fill = theme.colour(status.tint or "panel")
             paint.box(painter, QRectF(self.rect()), theme.radius("panel"), fill, edge)
         square = QRectF(self.icon_left, self.icon_top(), self.icon_side, self.icon_side)

@@ -20,7 +20,7 @@ from app.ui.widgets.lists.scroll_areas import ContentScrollArea
 TILE, BELOW_TILE = 56, 16
 TEXT_WIDTH = 400
 MARGIN = 12
-ABOVE_ROW = 14
+ROW_TOP_MARGIN = 14
 
 
 @dataclass(frozen=True)
@@ -113,12 +113,12 @@ class EmptyState(QWidget):
         # otherwise the last line would be cut off if the height is low
         self._text.setMinimumHeight(max(0, text))
         high = self._title.heightForWidth(width) + text + 4
-        high += ABOVE_ROW + self._buttons[0].sizeHint().height() if self._buttons else 0
+        high += ROW_TOP_MARGIN + self._buttons[0].sizeHint().height() if self._buttons else 0
         self._tile.setVisible(self.height() - 2 * MARGIN >= high + TILE + BELOW_TILE)
         is_low = bool(self._buttons) and self.height() - 2 * MARGIN < high
         self._text.setVisible(not is_low)
         self._title.setToolTip(plain.tip(self._text.text()) if is_low else "")
-        self._row.setContentsMargins(0, 0 if is_low else ABOVE_ROW, 0, 0)
+        self._row.setContentsMargins(0, 0 if is_low else ROW_TOP_MARGIN, 0, 0)
         edge = 2 if is_low else MARGIN
         self._column.setContentsMargins(16, edge, 16, edge)
 

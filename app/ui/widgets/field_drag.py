@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from app.ui.widgets.labels import label
 
-MIME = "application/x-nep-field"
-MODIFIERS = {Qt.Key.Key_Shift, Qt.Key.Key_Control, Qt.Key.Key_Alt, Qt.Key.Key_Meta, Qt.Key.Key_AltGr}
+MIME_TYPE = "application/x-nep-field"
+MODIFIER_KEYS = {Qt.Key.Key_Shift, Qt.Key.Key_Control, Qt.Key.Key_Alt, Qt.Key.Key_Meta, Qt.Key.Key_AltGr}
 """Modifier keys, which are ignored during a drag because Qt uses them for the drop action."""
 
 
@@ -24,17 +24,17 @@ def field_mime_data(topic: str, path: str) -> QMimeData:
         path: Field path.
     """
     data = QMimeData()
-    data.setData(MIME, json.dumps([topic, path]).encode())
+    data.setData(MIME_TYPE, json.dumps([topic, path]).encode())
     data.setText(f"{topic}{'' if path.startswith('[') else '.'}{path}")
     return data
 
 
 def dropped_field(data: QMimeData) -> tuple[str, str] | None:
     """Return the key of the topic and the field path in dropped data, or None for other data."""
-    if not data.hasFormat(MIME):
+    if not data.hasFormat(MIME_TYPE):
         return None
     try:
-        found = json.loads(bytes(data.data(MIME).data()))
+        found = json.loads(bytes(data.data(MIME_TYPE).data()))
     except (ValueError, RecursionError):
         return None
     if isinstance(found, list) and len(found) == 2 and all(isinstance(each, str) for each in found):
@@ -42,7 +42,7 @@ def dropped_field(data: QMimeData) -> tuple[str, str] | None:
     return None
 
 
-class DragKeys(QObject):
+class DragKeyFilter(QObject):
     """Event filter that makes keyboard shortcuts work during a drag, when Qt grabs all keys.
 
     A key other than Esc or a modifier cancels the drag and runs its shortcut. This is needed for Stop.
@@ -72,7 +72,7 @@ class DragKeys(QObject):
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if event.type() != QEvent.Type.KeyPress or not isinstance(event, QKeyEvent):
             return False
-        if event.key() in {Qt.Key.Key_Escape, *MODIFIERS}:
+        if event.key() in {Qt.Key.Key_Escape, *MODIFIER_KEYS}:
             return False
         name = QKeySequence(event.keyCombination()).toString(QKeySequence.SequenceFormat.PortableText)
         QDrag.cancel()
@@ -89,7 +89,7 @@ def drag_field(source: QWidget, topic: str, path: str, *, press: Callable[[str],
         path: Field path.
         press: Runs a shortcut that is pressed during the drag, such as "F12".
     """
-    keys = DragKeys(press)
+    keys = DragKeyFilter(press)
     QTimer.singleShot(0, keys.begin)  # runs in the event loop of the drag, after Qt has installed its filter
     drag = QDrag(source)
     data = field_mime_data(topic, path)

@@ -116,10 +116,10 @@ class Flow(QLayout):
             rows = self._rows(shown, room.width())
         top = room.top()
         for row in rows:
-            high = max(_height(item, wide) for item, _rect, wide in row)
+            high = max(_height_for_width(item, wide) for item, _rect, wide in row)
             for item, left, wide in row:
                 if move:
-                    height = min(high, _height(item, wide))
+                    height = min(high, _height_for_width(item, wide))
                     item.setGeometry(QRect(room.left() + left, top + (high - height) // 2, wide, height))
             top += high + self._row_gap
         used = top - room.top() - (self._row_gap if rows else 0)
@@ -165,7 +165,7 @@ class Flow(QLayout):
         return rows
 
 
-def _height(item: QLayoutItem, wide: int) -> int:
+def _height_for_width(item: QLayoutItem, wide: int) -> int:
     if item.hasHeightForWidth():
         return max(item.heightForWidth(wide), item.minimumSize().height())
     return item.sizeHint().expandedTo(item.minimumSize()).height()

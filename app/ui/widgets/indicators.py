@@ -27,11 +27,11 @@ from app.ui.widgets import paint
 from nep.i18n import _, lazy
 
 CHIP_HEIGHT, CHIP_PADDING, CHIP_GAP = 22, 8, 5
-ICON = 18
+ICON_SIZE = 18
 # minimum width in px at 100 % of an item if space is scarce; its tooltip has the full text
-MIN_ITEM = 64
-SPARK = QSize(56, 16)
-SPARK_STROKE = 1.25
+MIN_ITEM_WIDTH = 64
+SPARKLINE_SIZE = QSize(56, 16)
+SPARKLINE_STROKE = 1.25
 BAR_HEIGHT = 6
 STATUS_NAMES = {
     "ok": lazy("ok"),
@@ -42,7 +42,7 @@ STATUS_NAMES = {
     "off": lazy("off"),
 }
 # status of the chip by `RobotLink.state`
-ROBOT_STATUS = {
+STATUS_BY_ROBOT_STATE = {
     "ready": "ok", "busy": "running", "stopping": "running", "silent": "warn", "not stopped": "error",
     "away": "off", "connecting": "off",
 }  # fmt: skip
@@ -118,12 +118,12 @@ class Chip(QWidget):
     def full_width(self) -> int:
         """Return the width in px with icon and text."""
         width = paint.width_of(self._font(), self._text) + 2 * CHIP_PADDING + (2 if self._large else 0)
-        return round(width + (self._side() + CHIP_GAP if self._icon_name() else 0)) + 1
+        return round(width + (self._icon_side() + CHIP_GAP if self._icon_name() else 0)) + 1
 
     def _icon_name(self) -> str:
         return self._theme.status(self._status).icon if self._icon is None else self._icon
 
-    def _side(self) -> float:
+    def _icon_side(self) -> float:
         return self._theme.scaled(self._theme.size("icon", "small") + (1 if self._large else 0))
 
     def _font(self) -> QFont:
@@ -133,7 +133,7 @@ class Chip(QWidget):
 
     def icon_only_width(self) -> int:
         """Return the width in px with the icon only."""
-        return max(self._preferred_height(), round(self._side()) + CHIP_PADDING)
+        return max(self._preferred_height(), round(self._icon_side()) + CHIP_PADDING)
 
     def _preferred_height(self) -> int:
         least = CHIP_HEIGHT + (4 if self._large else 0)
@@ -168,7 +168,7 @@ class Chip(QWidget):
         left = float(CHIP_PADDING + (1 if self._large else 0))
         name = self._icon_name()
         if name:
-            side = self._side()
+            side = self._icon_side()
             left = (rect.width() - side) / 2 if self._bare else left
             square = QRectF(left, (rect.height() - side) / 2, side, side)
             paint_icon(painter, square, name, theme.colour(status.colour) if name == "dot" else ink)
@@ -196,7 +196,7 @@ class StatusIcon(QWidget):
             self.update()
 
     def sizeHint(self) -> QSize:
-        side = round(self._theme.scaled(ICON))
+        side = round(self._theme.scaled(ICON_SIZE))
         return QSize(side, self._height or side)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -209,7 +209,7 @@ class StatusIcon(QWidget):
 class StatusItem(QWidget):
     """Item of the status bar with an optional icon and a short text, clickable if it has a command."""
 
-    ICON = 14
+    ICON_SIZE = 14
     pressed = Signal(str)
     """Emitted with the item's command on a click, Enter or Space."""
 
@@ -266,20 +266,20 @@ class StatusItem(QWidget):
         else:
             super().keyPressEvent(event)
 
-    def _side(self) -> float:
-        return self._theme.scaled(self.ICON)
+    def _icon_side(self) -> float:
+        return self._theme.scaled(self.ICON_SIZE)
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("small")
         # All digits count with the same width: values change many times a second, and each new width would
         # cause a relayout.
         words = re.sub(r"\d", "0", self._text)
-        width = paint.width_of(font, words) + (self._side() + 6 if self._icon else 0)
+        width = paint.width_of(font, words) + (self._icon_side() + 6 if self._icon else 0)
         return QSize(round(width) + 1, round(paint.height_of(font)))
 
     def minimumSizeHint(self) -> QSize:
         wanted = self.sizeHint()
-        return QSize(min(wanted.width(), round(self._theme.scaled(MIN_ITEM))), wanted.height())
+        return QSize(min(wanted.width(), round(self._theme.scaled(MIN_ITEM_WIDTH))), wanted.height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -295,7 +295,7 @@ class StatusItem(QWidget):
             colour = ink or theme.colour(
                 theme.status(self._status).colour if self._status else "textSecondary"
             )
-            side = self._side()
+            side = self._icon_side()
             paint_icon(painter, QRectF(0, rect.center().y() - side / 2, side, side), self._icon, colour)
             rect.setLeft(side + 6)
         paint.text_line(painter, rect, self._text, theme.font("small"), ink or theme.colour("textSecondary"))
@@ -309,7 +309,7 @@ class Sparkline(QWidget):
         super().__init__()
         self._theme = theme
         self._values: tuple[float, ...] = ()
-        self.setFixedSize(SPARK)
+        self.setFixedSize(SPARKLINE_SIZE)
 
     def set_values(self, values: Sequence[float]) -> None:
         """Set the values, oldest first."""
@@ -344,7 +344,7 @@ def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], co
         draw_to(left + step * index, bottom - (value - lowest) * rise)
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    painter.setPen(QPen(colour, SPARK_STROKE))
+    painter.setPen(QPen(colour, SPARKLINE_STROKE))
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.drawPath(curve)
     painter.restore()

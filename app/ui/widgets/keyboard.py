@@ -19,7 +19,7 @@ from shiboken6 import isValid
 _NAVIGATION_PROPERTY = "keyboardLeads"
 
 
-def is_plain(event: QKeyEvent) -> bool:
+def has_no_modifiers(event: QKeyEvent) -> bool:
     """Return True if a key was pressed without modifiers.
 
     On macOS, for example, Cmd+Down moves to the end of a text, but Down moves from a field to its list.

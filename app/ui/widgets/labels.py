@@ -107,7 +107,7 @@ class SteadyLabel(ElidedLabel):
             self.update()
 
 
-class BoldInLine(QWidget):
+class PartlyBoldLabel(QWidget):
     """Label for one line of text, in which one part is bold.
 
     Args:

@@ -22,7 +22,7 @@ def mnemonic_positions(texts: Sequence[str]) -> list[int]:
     First letters of texts take precedence, then first letters of other words, then any letter.
     """
     found, taken = [-1] * len(texts), set[str]()
-    for places in (_first_position, _word_starts, _all):
+    for places in (_first_position, _word_positions, _all_positions):
         for number, text in enumerate(texts):
             free = (place for place in places(text) if (key := key_of(text[place])) and key not in taken)
             place = next(free, -1) if found[number] < 0 else -1
@@ -55,9 +55,9 @@ def _first_position(text: str) -> Iterator[int]:
         yield 0
 
 
-def _word_starts(text: str) -> Iterator[int]:
+def _word_positions(text: str) -> Iterator[int]:
     return (found.start() for found in re.finditer(r"\b\w", text))
 
 
-def _all(text: str) -> Iterator[int]:
+def _all_positions(text: str) -> Iterator[int]:
     return iter(range(len(text)))

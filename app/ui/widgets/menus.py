@@ -35,12 +35,12 @@ from app.ui.widgets.paint import RIGHT, box, text_line, width_of
 
 MASKED_PLATFORMS = frozenset({"xcb"})
 MARK, MAX_MARK, TEXT_LEFT = 15, 22, 33
-SCROLLER = 22  # px, as in the style sheet
+SCROLLER_HEIGHT = 22  # px, as in the style sheet
 GUESSED_ROLE = QAction.MenuRole.TextHeuristicRole
 MIN_WIDTH = 160  # px; narrower menus are unreadable and better placed over Stop
 
 
-def make_round(widget: QWidget) -> None:
+def set_round_corners(widget: QWidget) -> None:
     """Set the window flags of a popup for round corners; call this before the popup is first shown."""
     widget.setWindowFlag(Qt.WindowType.FramelessWindowHint, True)
     widget.setWindowFlag(
@@ -63,7 +63,7 @@ def round_region(size: QSize, radius: float) -> QRegion:
     return QRegion(path.toFillPolygon().toPolygon())
 
 
-def avoid_stop(menu: QRect, stop: QRect, screen: QRect) -> QRect:
+def geometry_beside_stop(menu: QRect, stop: QRect, screen: QRect) -> QRect:
     """Return the geometry of a menu, changed so that it doesn't cover Stop.
 
     The menu is moved to the left of Stop or below it, or is made narrower. If none is possible on the
@@ -116,7 +116,7 @@ class Menu(QMenu):
         self._theme = theme
         self._by_keys = False
         self.menuAction().setMenuRole(QAction.MenuRole.NoRole)
-        make_round(self)
+        set_round_corners(self)
 
     def actionEvent(self, event: QActionEvent) -> None:
         """Clear the role of a new entry if Qt would derive it from the text.
@@ -168,7 +168,7 @@ class Menu(QMenu):
         for stop in owner.window().findChildren(StopButton):
             if stop.isVisible():
                 place = QRect(stop.mapToGlobal(QPoint()), stop.size())
-                self.setGeometry(avoid_stop(self.geometry(), place, screen))
+                self.setGeometry(geometry_beside_stop(self.geometry(), place, screen))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Trigger Stop on a click on a Stop button; otherwise close the menu on a click outside.
@@ -190,13 +190,13 @@ class Menu(QMenu):
         box(painter, rect, theme.radius("panel"), theme.colour("raised"), theme.colour("borderStrong"))
         shown = [action for action in self.actions() if action.isVisible()]
         above, below = self._hidden_ends(shown)
-        inside = rect.adjusted(1, 1 + above * SCROLLER, -1, -1 - below * SCROLLER)
+        inside = rect.adjusted(1, 1 + above * SCROLLER_HEIGHT, -1, -1 - below * SCROLLER_HEIGHT)
         for hidden, icon, top in (
             (above, "chevron-up", 1),
-            (below, "chevron-down", rect.height() - SCROLLER),
+            (below, "chevron-down", rect.height() - SCROLLER_HEIGHT),
         ):
             if hidden:
-                square = QRectF((rect.width() - 14) / 2, top + (SCROLLER - 14) / 2, 14, 14)
+                square = QRectF((rect.width() - 14) / 2, top + (SCROLLER_HEIGHT - 14) / 2, 14, 14)
                 paint_icon(painter, square, icon, theme.colour("textSecondary"))
         painter.setClipRect(inside)
         letters = self.mnemonics()
@@ -214,7 +214,7 @@ class Menu(QMenu):
         first, last = self.actionGeometry(shown[0]), self.actionGeometry(shown[-1])
         return first.top() < 0, last.bottom() > self.height()
 
-    def _underline(self, painter: QPainter, inside: QRectF, said: str, letter: int) -> None:
+    def _paint_underline(self, painter: QPainter, inside: QRectF, said: str, letter: int) -> None:
         font = self.font()
         left, wide = width_of(font, said[:letter]), width_of(font, said[letter])
         low = inside.center().y() + QFontMetricsF(font).ascent() / 2 + 1
@@ -245,7 +245,7 @@ class Menu(QMenu):
             key = ""  # in a narrow menu the text takes precedence; shortcuts are listed on F1
         text_line(painter, inside, text, self.font(), ink)
         if self._by_keys and letter >= 0 and whole <= inside.width():
-            self._underline(painter, inside, text, letter)
+            self._paint_underline(painter, inside, text, letter)
         if action.menu() is not None:
             chevron = QRectF(inside.right() - 12, place.center().y() - 7, 14, 14)
             paint_icon(painter, chevron, "chevron-right", theme.colour("textTertiary"))
@@ -263,7 +263,7 @@ def open_below(menu: Menu, anchor: QWidget) -> None:
     menu.popup(anchor.mapToGlobal(place))
 
 
-class EditMenu(QObject):
+class ContextMenuFilter(QObject):
     """Event filter that gives a text field a context menu in Studio's style."""
 
     def __init__(self, theme: Theme, field: QLineEdit | QPlainTextEdit) -> None:

@@ -92,7 +92,7 @@ def _forked() -> None:
 forks.call_in_child(_forked)
 
 
-def _hub(configuration: Configuration) -> _Hub:
+def _get_hub(configuration: Configuration) -> _Hub:
     if not isinstance(configuration, Hybrid):
         raise NepError(_("the back end 'memory' doesn't support direct connections; use 'zeromq'"))
     with _hubs_lock:
@@ -344,7 +344,7 @@ class MemoryTransport:
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - immediate
         """Return the current graph."""
-        return _hub(configuration).view()
+        return _get_hub(configuration).view()
 
     def renewal(self, hub: _Hub) -> requests.Renew:
         """Return the renewal request with the statistics of this node's members at `hub`.
@@ -389,7 +389,7 @@ class MemoryTransport:
     @contextmanager
     def _joined_hub(self, configuration: Configuration) -> Iterator[_Hub]:
         # Yields the hub with its lock held, after adding this node. Raises `ClosedError`.
-        hub = _hub(configuration)
+        hub = _get_hub(configuration)
         with hub.lock:  # closing the node acquires the lock again after setting `_closing`
             if self._closing.is_set():
                 raise ClosedError(f"node '{self.node.name}'")

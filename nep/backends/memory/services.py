@@ -20,8 +20,8 @@ from nep.backends.services import (
     OpenCall,
     Outcome,
     ServerSpec,
-    Tally,
-    check_calls,
+    ServerStats,
+    check_call_limits,
     limit_reply_size,
     rejection_reply,
 )
@@ -56,7 +56,7 @@ class ServiceHub:
         """Apply a request to the graph. Raises `RequestRefusedError` if it is rejected."""
         with self.lock:
             for each in self.graph.apply(request, 0, time.monotonic(), ""):
-                if isinstance(each.body, requests.Refused):
+                if isinstance(each.body, requests.RejectedReply):
                     raise RequestRefusedError(each.body.reason)
 
 
@@ -87,7 +87,7 @@ class MemoryServer:
         self.hub = hub
         self.spec = spec
         self.calls = CallQueue()
-        self.tally = Tally()
+        self.stats = ServerStats()
         self.endpoints = ("memory",)
         self.is_closed = False
 
@@ -105,10 +105,10 @@ class MemoryServer:
 
     def _reply(self, call: _Call, reply: Reply) -> bool:
         reply = limit_reply_size(reply)
-        self.tally.add(reply)
+        self.stats.add(reply)
         with self.hub.lock:
             is_waited_for = call.client.remove_locked(call)
-            call.client.answered += is_waited_for
+            call.client.replied += is_waited_for
             call.client.late += not is_waited_for
         if is_waited_for:
             data = reply.data if isinstance(reply.data, bytes) else bytes(reply.data)
@@ -117,7 +117,7 @@ class MemoryServer:
 
     def counts(self) -> PublisherCount:
         """Return the statistics that a renewal reports."""
-        tally = self.tally
+        tally = self.stats
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def begin_close(self) -> None:
@@ -129,7 +129,7 @@ class MemoryServer:
             if not left:
                 del self.hub.servers[self.spec.service]
             if is_listed:
-                self.hub.apply(requests.RemovePublisher(self._node_id, self.spec.id, self.tally.calls))
+                self.hub.apply(requests.RemovePublisher(self._node_id, self.spec.id, self.stats.calls))
         for call in self.calls.close():
             call.reply(rejection_reply(self.spec.service, is_closed=True))
 
@@ -163,7 +163,7 @@ class MemoryClient:
         self._deadlines = deadlines
         self.hub = hub
         self.spec = spec
-        self.answered = self.failed = self.late = 0
+        self.replied = self.failed = self.late = 0
         self.is_closed = False
         self._calls: dict[int, _Call] = {}
         self._bytes = 0
@@ -197,7 +197,7 @@ class MemoryClient:
         with self.hub.lock:
             if self.is_closed:
                 raise self._closed_error()
-            check_calls(self.spec.service, len(self._calls), self._bytes, len(copied))
+            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(copied))
             call = _Call(next(self._numbers), self, copied, timeout_s, deadline, then)
             self._calls[call.number] = call
             self._bytes += len(copied)
@@ -266,7 +266,7 @@ class MemoryClient:
 
     def counts(self) -> SubscriberCount:
         """Return the statistics that a renewal reports."""
-        return SubscriberCount(self.spec.id, self.answered, self.failed)
+        return SubscriberCount(self.spec.id, self.replied, self.failed)
 
     def close(self) -> None:
         """Unregister the client; calls in flight fail with `ClosedError`."""

@@ -18,7 +18,7 @@ from nep.backends.services import (
     CallQueue,
     IncomingCall,
     ServerSpec,
-    Tally,
+    ServerStats,
     limit_reply_size,
     rejection_reply,
 )
@@ -84,7 +84,7 @@ class NanomsgServer:
     ) -> None:
         self.spec = spec
         self.calls = CallQueue()
-        self.tally = Tally()
+        self.stats = ServerStats()
         self.is_closed = False
         self.endpoints: tuple[str, ...] = (endpoint,)
         self._socket = socket
@@ -122,7 +122,7 @@ class NanomsgServer:
         with self._lock:
             self._contexts.discard(context)
         close_context(context)
-        self.tally.add_unreadable()
+        self.stats.add_unreadable()
         if self._refusals.add(error.reason):
             _logger.warning("malformed call to '%s': %s", self.spec.service, error)
 
@@ -138,7 +138,7 @@ class NanomsgServer:
     def _reply_function(self, context: Any, number: int) -> Callable[[Reply], bool]:  # noqa: ANN401 - see above
         def reply_to_call(reply: Reply) -> bool:
             checked = limit_reply_size(reply)
-            self.tally.add(checked)
+            self.stats.add(checked)
             with self._lock:
                 if self.is_closed:
                     return False

@@ -18,7 +18,7 @@ from typing import Any
 from nep.backends.deadlines import Deadlines
 from nep.backends.nanomsg.answering import close_context, join_parts, split_parts
 from nep.backends.nanomsg.library import load_pynng, prevent_finalization
-from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_calls
+from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_call_limits
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
 from nep.i18n import _
 from nep.protocol.service_wire import ORIGINAL, Framing
@@ -94,7 +94,7 @@ class NanomsgClient(ClientCalls[_Call]):
         with self._lock:
             if self.is_closed:
                 raise self._closed_error()
-            check_calls(self.spec.service, len(self._calls), self._bytes, len(data))
+            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
             call = _Call(next(self._numbers), data, timeout_s, deadline, then, self._socket.new_context())
             call.thread = threading.Thread(
                 target=self._run, args=(call,), name=f"nep-call-{self.spec.service}", daemon=True

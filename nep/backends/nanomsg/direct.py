@@ -30,7 +30,7 @@ _LINGER_S = 0.2
 
 pynng discards the queue of a closed socket and doesn't report when the queue is empty.
 """
-_LIBNANOMSG_MAX_BYTES = 2**20
+_MAX_LIBNANOMSG_BYTES = 2**20
 """Default size limit of libnanomsg in bytes. The receiver silently discards larger messages."""
 
 
@@ -161,7 +161,7 @@ class DirectPublisher:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self.count += 1
-            warns = len(frame) > _LIBNANOMSG_MAX_BYTES and not self._has_warned
+            warns = len(frame) > _MAX_LIBNANOMSG_BYTES and not self._has_warned
             self._has_warned = self._has_warned or warns
             self._sent_at = time.monotonic()
             self._socket.send(frame, block=False)
@@ -170,7 +170,7 @@ class DirectPublisher:
                 _(
                     "a message on '{topic}' is {size} bytes; programs that use libnanomsg silently drop "
                     "messages of more than {most} bytes, so send smaller messages"
-                ).format(topic=self.spec.topic, size=len(frame), most=_LIBNANOMSG_MAX_BYTES)
+                ).format(topic=self.spec.topic, size=len(frame), most=_MAX_LIBNANOMSG_BYTES)
             )
 
     def serve(self, now: float) -> PollState:  # noqa: ARG002 - no input
@@ -207,7 +207,7 @@ class DirectSubSocket(UnbatchedReader):
 
     def __init__(self, spec: SubscriberSpec, direct: Direct) -> None:
         check_direct(direct)
-        self.refusals = RejectionLog()
+        self.rejections = RejectionLog()
         self.received = 0
         self.lost: int | None = None
         self.problem = ""
@@ -235,7 +235,7 @@ class DirectSubSocket(UnbatchedReader):
             try:
                 data = from_frame(self._spec.topic, self._spec.msg_type, self._codec, frame)
             except WireError as error:
-                self.refusals.add(error.reason)
+                self.rejections.add(error.reason)
                 continue
             if data is not None:
                 self.received += 1

@@ -19,12 +19,12 @@ from nep.backends.nanomsg.library import listen, new_socket
 from nep.backends.nanomsg.surveys import NanomsgSurveyor
 from nep.backends.services import ClientSpec, ServerSpec
 from nep.errors import ClosedError
-from nep.protocol.service_wire import HEADER_BYTES, NATIVE, ORIGINAL, PAYLOAD_MAX_BYTES, Framing
+from nep.protocol.service_wire import HEADER_BYTES, MAX_PAYLOAD_BYTES, NATIVE, ORIGINAL, Framing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-_MAX_MESSAGE_BYTES = PAYLOAD_MAX_BYTES + HEADER_BYTES
+_MAX_MESSAGE_BYTES = MAX_PAYLOAD_BYTES + HEADER_BYTES
 _REPLY_TIMEOUT_MS = round(REPLY_TIMEOUT_S * 1000)
 _NEVER_RESEND = -1
 _RECONNECT_MS = {"reconnect_time_min": 10, "reconnect_time_max": 500}

@@ -15,7 +15,7 @@ from nep.protocol.wire import EXTENSION, HEADER_BYTES, LATCHED, hello_part, read
 _ENDPOINT = re.compile(r"nanomsg://([\w.-]{1,253}):(\d{1,5})/(\d{1,5})", re.ASCII)
 
 
-def endpoint(host: str, messages: int, hellos: int) -> str:
+def format_endpoint(host: str, messages: int, hellos: int) -> str:
     """Return the endpoint of a publisher.
 
     Args:

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from nep.backends.base import PublisherSpec
-from nep.backends.nanomsg.endpoints import endpoint, subscriber_topic_part
+from nep.backends.nanomsg.endpoints import format_endpoint, subscriber_topic_part
 from nep.backends.nanomsg.library import bound_port, listen, load_pynng, new_socket, queue_length
 from nep.backends.zeromq.io_thread import Pollable, PollState
 from nep.backends.zeromq.publisher import HandshakePublisher
@@ -29,8 +29,8 @@ from nep.protocol.wire import (
     BYE,
     EXTENSION,
     LATCHED,
-    SIZE_MAX,
-    SUBSCRIPTION_MAX_BYTES,
+    MAX_SIZE,
+    MAX_SUBSCRIPTION_BYTES,
     Header,
     extension_part,
     parse_hello,
@@ -66,7 +66,7 @@ class NanomsgPublisher(HandshakePublisher):
         queue = max(queue_length(spec.codec.name), 2 * spec.history)  # the history is sent in one burst
         self._message_socket: Any = new_socket("Pub0", send_buffer_size=queue)
         self._hello_socket: Any = new_socket(
-            "Pull0", recv_buffer_size=_HELLO_QUEUE_LENGTH, recv_max_size=SUBSCRIPTION_MAX_BYTES
+            "Pull0", recv_buffer_size=_HELLO_QUEUE_LENGTH, recv_max_size=MAX_SUBSCRIPTION_BYTES
         )
         self.fd = int(self._hello_socket.recv_fd)
         self._endpoint = ""
@@ -117,7 +117,7 @@ class NanomsgPublisher(HandshakePublisher):
             messages, hellos = (
                 listen(each, f"{LOOPBACK}:0", what) for each in (self._message_socket, self._hello_socket)
             )
-            self._endpoint = endpoint(LOOPBACK, bound_port(messages), bound_port(hellos))
+            self._endpoint = format_endpoint(LOOPBACK, bound_port(messages), bound_port(hellos))
         return (self._endpoint,)
 
     def unbind_local(self) -> None:
@@ -151,7 +151,7 @@ class NanomsgPublisher(HandshakePublisher):
             self.count += 1
             self._bytes += size
             self._last_stamp_ns = time.time_ns()
-            size_field = size if size <= SIZE_MAX else 0
+            size_field = size if size <= MAX_SIZE else 0
             header = Header(
                 self.spec.codec.number, flags, self.count, self._last_stamp_ns, self.spec.id, size_field
             )

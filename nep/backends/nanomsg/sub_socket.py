@@ -16,7 +16,7 @@ from nep.backends.nanomsg.endpoints import parse_endpoint, split_message, subscr
 from nep.backends.nanomsg.library import FDS_PER_SOCKET, load_pynng, new_socket, queue_length
 from nep.backends.zeromq.loss import PublisherTracker
 from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionLog
-from nep.backends.zeromq.sub_socket import CarefulParser, MessageBuffer
+from nep.backends.zeromq.sub_socket import MessageBuffer, MessageParser
 from nep.backends.zeromq.subscriber import UnbatchedReader
 from nep.errors import TooManyFilesError, WireError
 from nep.i18n import _
@@ -90,14 +90,14 @@ class NanomsgSubSocket(UnbatchedReader):
 
     def __init__(self, spec: SubscriberSpec) -> None:
         self.sources = PublisherTracker()
-        self.refusals = RejectionLog()
+        self.rejections = RejectionLog()
         self._sub = PollableSub(codec_for(spec.msg_type).name)
         self.fd = self._sub.fd
         self._name = spec.topic
         self._topic = topic_part(spec.topic)
         self._own = subscriber_topic_part(spec.id, spec.topic)
         self._hello = hello_part(spec.id, spec.topic)
-        self._parser = CarefulParser(
+        self._parser = MessageParser(
             spec, self._own, self.sources, self.disconnect, lambda _publisher, _seq: None
         )
         self._links: dict[int, _Link] = {}
@@ -160,7 +160,7 @@ class NanomsgSubSocket(UnbatchedReader):
             name=remote.node_name,
             why=why or _("not an endpoint of 'nanomsg'"),
         )
-        if self.refusals.add(source.problem):
+        if self.rejections.add(source.problem):
             _logger.warning("subscription to '%s': %s", self._name, source.problem)
 
     def _create_link(self, publisher: int, endpoint: str, address: str, hellos: str) -> str:
@@ -210,7 +210,7 @@ class NanomsgSubSocket(UnbatchedReader):
             try:
                 message = self._parser.parse(first, split_message(frame, first, is_alone=is_alone))
             except WireError as error:
-                if self.refusals.add(error.reason):
+                if self.rejections.add(error.reason):
                     _logger.warning("malformed message on '%s': %s", self._name, error)
                 continue
             if message is not None:

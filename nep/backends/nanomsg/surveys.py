@@ -16,14 +16,14 @@ from nep.backends.connection import Direct
 from nep.backends.nanomsg.answering import close_context, receive
 from nep.backends.nanomsg.direct import attach
 from nep.backends.nanomsg.library import load_pynng, new_socket, prevent_finalization
-from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
+from nep.backends.services import ClientSpec, OpenCall, Outcome, check_call_limits
 from nep.backends.zeromq.sockets import wait_until
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.service_wire import ORIGINAL
 
 _JSON_CODEC = 1
-_MAX_SURVEY_MS = 2**31 - 1
+_MAX_SURVEY_TIMEOUT_MS = 2**31 - 1
 _JOIN_TIMEOUT_S = 2.0
 
 OutcomeCallback = Callable[[Outcome], None]
@@ -36,7 +36,7 @@ class _Survey:
     context: Any
     left: int
     callback: OutcomeCallback
-    is_over: bool = False
+    is_finished: bool = False
     thread: threading.Thread | None = field(default=None)
     sending: threading.Lock = field(default_factory=threading.Lock)
 
@@ -97,11 +97,15 @@ class NanomsgSurveyor:
         with self._changed:
             if self.is_closed:
                 raise self._closed_error()
-            check_calls(self.spec.service, len(self._surveys), 0, len(data))
+            check_call_limits(self.spec.service, len(self._surveys), 0, len(data))
             count = len(self._pipes)
             if not count:
                 return []
-            limit_ms = _MAX_SURVEY_MS if timeout_s is None else min(_MAX_SURVEY_MS, round(timeout_s * 1000))
+            limit_ms = (
+                _MAX_SURVEY_TIMEOUT_MS
+                if timeout_s is None
+                else min(_MAX_SURVEY_TIMEOUT_MS, round(timeout_s * 1000))
+            )
             self._socket.survey_time = max(1, limit_ms)
             self._survey_count += 1
             survey = _Survey(self._survey_count, self._socket.new_context(), count, then)
@@ -118,7 +122,7 @@ class NanomsgSurveyor:
     def _receive_replies(self, survey: _Survey) -> None:
         while survey.left and (data := receive(survey.context)) is not None:
             survey.left -= 1
-            if survey.is_over:
+            if survey.is_finished:
                 return
             survey.callback(ORIGINAL.read_reply([b"", data]).reply)
 
@@ -131,7 +135,7 @@ class NanomsgSurveyor:
                 self._finish(survey)
 
     def _finish(self, survey: _Survey) -> None:
-        survey.is_over = True
+        survey.is_finished = True
         with survey.sending:  # nng aborts the process if a context is closed while it sends
             close_context(survey.context)
         thread = survey.thread

@@ -22,13 +22,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from nep.backends.ros.definition import Definition, parse
-from nep.backends.ros.library import message_text
+from nep.backends.ros.library import message_definition
 from nep.errors import EncodeError, NepError, WireError
 from nep.i18n import _
 from nep.messages import image_codec
 from nep.messages.codecs import CODECS, IMAGE, Codec, codec_for
 from nep.messages.encoded import Encoded
-from nep.messages.image_codec import picture_info, raw_array, raw_image, raw_layout
+from nep.messages.image_codec import image_info, raw_array, raw_image, raw_layout
 from nep.text import escaped, shortened
 
 STAMP = struct.Struct("<III")
@@ -64,8 +64,8 @@ _CODEC_NUMBER = 6
 """Codec number of ROS messages. Never sent, because the native wire doesn't transfer ROS messages."""
 _definitions: dict[str, Definition] = {}
 
-Unpacked = tuple[bytes | memoryview, Mapping[str, object] | None]
-Unpack = Callable[[memoryview], Unpacked]
+UnpackedData = tuple[bytes | memoryview, Mapping[str, object] | None]
+UnpackFunction = Callable[[memoryview], UnpackedData]
 
 
 def is_ros_type(msg_type: str) -> bool:
@@ -84,7 +84,7 @@ def installed_definition(name: str) -> Definition:
     Raises `NepError`, whose message names the package to install.
     """
     if name not in _definitions:
-        found = message_text(name)
+        found = message_definition(name)
         if found is None:
             raise not_installed_error(name, _("ROS message"))
         _definitions[name] = parse(name, found[0])
@@ -181,7 +181,7 @@ def _check_file(encoded: Encoded, kind: str) -> str:
     return str(encoding)
 
 
-def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
+def to_ros_body(ros_type: str, codec: str, encoded: Encoded) -> bytes:
     """Convert encoded data to the body of a ROS message. Raises `EncodeError` and `WireError`.
 
     Args:
@@ -193,16 +193,16 @@ def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
     if codec == "image" and extension:
         head = bytes(4) + _current_stamp() + bytes(4)
         if ros_type == _RAW_IMAGE_TYPE:
-            return head + _raw_body(data, extension)
+            return head + _raw_image_body(data, extension)
         kind = _check_file(encoded, type(data).__name__).encode()
         return b"".join((head, _LENGTH.pack(len(kind)), kind, _LENGTH.pack(len(data)), data))
     if extension:
         raise WireError(_("a '{name}' can't carry an extension").format(name=ros_type), len(data))
     if codec == "image" and ros_type == _COMPRESSED_IMAGE_TYPE and _has_image_magic(data):
-        known = picture_info(data)
+        known = image_info(data)
         if known is None:
             raise EncodeError("image", type(data).__name__, _("not a readable image"))
-        return to_ros(ros_type, codec, Encoded(data, known))
+        return to_ros_body(ros_type, codec, Encoded(data, known))
     if codec in {"ros", "image"}:
         return bytes(data)
     size = _LENGTH.pack(len(data))
@@ -217,7 +217,7 @@ def _current_stamp() -> bytes:
     return struct.pack("<II", *divmod(time.time_ns(), 1_000_000_000))
 
 
-def _raw_body(data: bytes | memoryview, extension: Mapping[str, object]) -> bytes:
+def _raw_image_body(data: bytes | memoryview, extension: Mapping[str, object]) -> bytes:
     layout, shape = raw_layout(extension.get("encoding")), extension.get("shape")
     if layout is None or not isinstance(shape, list | tuple):
         raise WireError(
@@ -252,7 +252,7 @@ class Unpacker:
 
     codec: Codec
     msg_type: str
-    unpack: Unpack
+    unpack: UnpackFunction
     has_header: bool
 
 
@@ -275,10 +275,13 @@ def unpacker_for(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> 
         raise _type_mismatch_error(msg_type, ros_type)
     if ros_type in _IMAGE_TYPES and (msg_type in _IMAGE_TYPES or wanted is IMAGE):
         return Unpacker(
-            IMAGE, IMAGE.name, _from_raw if ros_type == _RAW_IMAGE_TYPE else _from_compressed, True
+            IMAGE,
+            IMAGE.name,
+            _unpack_raw_image if ros_type == _RAW_IMAGE_TYPE else _unpack_compressed_image,
+            True,
         )
     if not is_ros_type(msg_type) and ros_type == _CARRIER_TYPES[wanted.name]:
-        read = _from_string if ros_type == _STRING_TYPE else _from_array
+        read = _unpack_string if ros_type == _STRING_TYPE else _unpack_array
         return Unpacker(wanted, msg_type, read, has_header=False)
     if not is_ros_type(msg_type) and wanted is not CODECS["json"]:
         raise _type_mismatch_error(msg_type, ros_type)
@@ -288,7 +291,7 @@ def unpacker_for(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> 
 
 def _matching_definition(ros_type: str, md5sum: str) -> Definition:
     # For a publisher that doesn't announce its definition.
-    definition, found = installed_definition(ros_type), message_text(ros_type)
+    definition, found = installed_definition(ros_type), message_definition(ros_type)
     if found is None or md5sum not in {"*", found[1]}:
         raise version_error(ros_type)
     return definition
@@ -330,11 +333,11 @@ def _read_all(body: memoryview, at: int) -> memoryview:
     return data
 
 
-def _from_string(body: memoryview) -> Unpacked:
+def _unpack_string(body: memoryview) -> UnpackedData:
     return _read_all(body, 0), None
 
 
-def _from_array(body: memoryview) -> Unpacked:
+def _unpack_array(body: memoryview) -> UnpackedData:
     (count,) = _LENGTH.unpack_from(body, 0)
     at = 4
     if count * 12 > len(body):
@@ -346,16 +349,16 @@ def _from_array(body: memoryview) -> Unpacked:
     return _read_all(body, at + 4)[offset:], None
 
 
-def _from_compressed(body: memoryview) -> Unpacked:
+def _unpack_compressed_image(body: memoryview) -> UnpackedData:
     _frame, at = _read_sized(body, STAMP.size)
     kind, at = _read_sized(body, at)
     data = _read_all(body, at)
     if b"compressedDepth" in bytes(kind) and bytes(kind[:4]) == b"16UC":
         data = data[_DEPTH_HEADER_BYTES:]
-    return data, picture_info(data)
+    return data, image_info(data)
 
 
-def _from_raw(body: memoryview) -> Unpacked:
+def _unpack_raw_image(body: memoryview) -> UnpackedData:
     # Returns the rows without padding, in little-endian order.
     _frame, at = _read_sized(body, STAMP.size)
     height, width = struct.unpack_from("<II", body, at)

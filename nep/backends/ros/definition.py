@@ -24,12 +24,12 @@ _SEPARATOR = re.compile(r"^={10,}\s*$", re.MULTILINE)
 _SECTION_HEADER = re.compile(r"\s*MSG:\s*([\w/]+)[^\n]*\n?")
 _CONSTANT = re.compile(r"[\w/]+\s+\w+\s*=")
 _FIELD = re.compile(r"([A-Za-z][\w/]*)(\[(\d{0,10})\])?\s+([A-Za-z]\w*)")
-_INTEGERS = {
+_INTEGER_FORMATS = {
     "int8": "b", "byte": "b", "uint8": "B", "char": "B", "int16": "h", "uint16": "H", "int32": "i",
     "uint32": "I", "int64": "q", "uint64": "Q",
 }  # fmt: skip
-_FLOATS = {"float32": "f", "float64": "d"}
-_FORMATS = {**_INTEGERS, **_FLOATS, "bool": "?"}
+_FLOAT_FORMATS = {"float32": "f", "float64": "d"}
+_FORMATS = {**_INTEGER_FORMATS, **_FLOAT_FORMATS, "bool": "?"}
 _TIME_FORMATS = {"time": struct.Struct("<II"), "duration": struct.Struct("<ii")}
 _BYTE_TYPES = ("uint8", "char")
 _LENGTH = struct.Struct("<I")
@@ -234,9 +234,9 @@ class _Parser:
 
 
 def _basic_kind(name: str) -> FieldKind | None:
-    if name in _INTEGERS:
+    if name in _INTEGER_FORMATS:
         return _integer_kind(name)
-    if name in _FLOATS:
+    if name in _FLOAT_FORMATS:
         return _float_kind(name)
     if name in _TIME_FORMATS:
         return _time_kind(name)
@@ -248,9 +248,9 @@ def _basic_kind(name: str) -> FieldKind | None:
 
 
 def _integer_kind(name: str) -> FieldKind:
-    packing = struct.Struct(f"<{_INTEGERS[name]}")
+    packing = struct.Struct(f"<{_INTEGER_FORMATS[name]}")
     bits = 8 * packing.size
-    is_signed = _INTEGERS[name].islower()
+    is_signed = _INTEGER_FORMATS[name].islower()
     low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if is_signed else (0, (1 << bits) - 1)
 
     def write(value: object, path: str, out: bytearray) -> None:
@@ -272,7 +272,7 @@ def _integer_kind(name: str) -> FieldKind:
 
 
 def _float_kind(name: str) -> FieldKind:
-    packing = struct.Struct(f"<{_FLOATS[name]}")
+    packing = struct.Struct(f"<{_FLOAT_FORMATS[name]}")
 
     def write(value: object, path: str, out: bytearray) -> None:
         as_float = getattr(type(value), "__float__", None)
@@ -295,7 +295,7 @@ def _time_kind(name: str) -> FieldKind:
 
     def write(value: object, path: str, out: bytearray) -> None:
         try:
-            out += packing.pack(*_secs_of(value, path, name))
+            out += packing.pack(*_to_secs_and_nsecs(value, path, name))
         except struct.error:
             raise _FieldError(
                 path, _("is {value}, which isn't a '{name}'").format(value=_describe(value), name=name)
@@ -308,11 +308,11 @@ def _time_kind(name: str) -> FieldKind:
     return FieldKind(name, write, read, 8)
 
 
-def _secs_of(value: object, path: str, name: str) -> tuple[int, int]:
+def _to_secs_and_nsecs(value: object, path: str, name: str) -> tuple[int, int]:
     if isinstance(value, Mapping):
         for key in value:
             if key not in {"secs", "nsecs"}:
-                raise _unknown_field(path, key, ("secs", "nsecs"))
+                raise _unknown_field_error(path, key, ("secs", "nsecs"))
         secs, nsecs = _to_integer(value.get("secs", 0)), _to_integer(value.get("nsecs", 0))
         if secs is not None and nsecs is not None:
             return secs, nsecs
@@ -368,14 +368,14 @@ def _array_kind(kind: FieldKind, length: int | None) -> FieldKind:
 
 def _bytes_writer(name: str, length: int | None) -> Callable[[object, str, bytearray], None]:
     def write(value: object, path: str, out: bytearray) -> None:
-        data = _bytes_of(value, path, name)
+        data = _to_bytes(value, path, name)
         _write_length(len(data), length, path, out)
         out += data
 
     return write
 
 
-def _bytes_of(value: object, path: str, name: str) -> bytes | bytearray | memoryview:
+def _to_bytes(value: object, path: str, name: str) -> bytes | bytearray | memoryview:
     if isinstance(value, bytes | bytearray):
         return value
     if isinstance(value, memoryview):
@@ -470,7 +470,7 @@ def _write_fields(
             out += bytes(each.kind.min_bytes)  # zero and empty values are zero bytes in every type
     if len(payload) > len(fields) or not payload.keys() <= {each.name for each in fields}:
         names = tuple(each.name for each in fields)
-        raise _unknown_field(path, next(key for key in payload if key not in names), names)
+        raise _unknown_field_error(path, next(key for key in payload if key not in names), names)
 
 
 def _read_fields(fields: tuple[DefinitionField, ...], reader: _Reader, path: str) -> dict[str, object]:
@@ -509,7 +509,7 @@ def _type_error(path: str, value: object, name: str) -> _FieldError:
     return _FieldError(path, _("is {value}; expected a '{name}'").format(value=_describe(value), name=name))
 
 
-def _unknown_field(path: str, key: object, names: tuple[str, ...]) -> _FieldError:
+def _unknown_field_error(path: str, key: object, names: tuple[str, ...]) -> _FieldError:
     where = f"{path}.{key}" if path else str(key)
     return _FieldError(
         escaped(shortened(where, 200)),

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from urllib.parse import urlsplit
 
-from nep.backends.ros.master import RosNodes
+from nep.backends.ros.master import RosSystemState
 from nep.masters.graph import Graph
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
@@ -34,7 +34,7 @@ _GENERATION = "ros"
 
 
 @dataclass(frozen=True)
-class OwnNode:
+class LocalNode:
     """nep node of this process, with its statistics.
 
     Attributes:
@@ -54,7 +54,7 @@ class OwnNode:
     clients: tuple[tuple[str, SubscriberCount], ...] = ()
 
 
-def graph_view(known: RosNodes, own: list[OwnNode]) -> GraphView:
+def graph_view(known: RosSystemState, own: list[LocalNode]) -> GraphView:
     """Return the graph of a ROS network.
 
     The process's own ROS node is listed as its nep nodes. The rates of other nodes are unknown, because ROS
@@ -70,23 +70,23 @@ def graph_view(known: RosNodes, own: list[OwnNode]) -> GraphView:
         uri = known.uris.get(name, "")
         codec = _CODECS.get(kind, "ros")
         record = PublisherRecord(publisher_id(name, topic), topic, kind, codec, (uri,) if uri else ())
-        _apply(graph, AddPublisher(_node_record(name, uri), record))
+        _apply_request(graph, AddPublisher(_node_record(name, uri), record))
     for topic, name in _foreign_entries(known.subscribers, own, lambda each: each.subscribers):
         subscriber_count = SubscriberRecord(_stable_id(name, topic, "i"), topic, known.types.get(topic, "*"))
-        _apply(graph, AddSubscriber(_node_record(name, known.uris.get(name, "")), subscriber_count))
+        _apply_request(graph, AddSubscriber(_node_record(name, known.uris.get(name, "")), subscriber_count))
     for service, name in _foreign_entries(known.services, own, lambda each: each.servers):
         node = _node_record(name, known.uris.get(name, ""))
-        _apply(graph, _server_request(node, _stable_id(name, service, "s"), service))
+        _apply_request(graph, _server_request(node, _stable_id(name, service, "s"), service))
     for each in own:
         if each.ros_name:
-            _add_own(graph, each, known.uris.get(each.ros_name, ""))
+            _add_local_node(graph, each, known.uris.get(each.ros_name, ""))
     return graph.view()
 
 
 def _foreign_entries(
     known: Mapping[str, Sequence[str]],
-    own: list[OwnNode],
-    rows_of: Callable[[OwnNode], Sequence[tuple[object, ...]]],
+    own: list[LocalNode],
+    rows_of: Callable[[LocalNode], Sequence[tuple[object, ...]]],
 ) -> Iterator[tuple[str, str]]:
     # Yields (topic or service, node name) of nodes other than this process's nep nodes.
     mine = {(row[0], each.ros_name) for each in own for row in rows_of(each)}
@@ -100,18 +100,18 @@ def _server_request(node: NodeRecord, server_id: int, service: str, uri: str = "
     )
 
 
-def _add_own(graph: Graph, own: OwnNode, uri: str) -> None:
+def _add_local_node(graph: Graph, own: LocalNode, uri: str) -> None:
     node = replace(own.node, generation=_GENERATION)
     for topic, kind, is_latched, count in own.publishers:
         codec = _CODECS.get(kind, "ros")
         record = PublisherRecord(count.id, topic, kind, codec, (uri,) if uri else (), is_latched)
-        _apply(graph, AddPublisher(node, record))
+        _apply_request(graph, AddPublisher(node, record))
     for topic, kind, subscriber_count in own.subscribers:
-        _apply(graph, AddSubscriber(node, SubscriberRecord(subscriber_count.id, topic, kind)))
+        _apply_request(graph, AddSubscriber(node, SubscriberRecord(subscriber_count.id, topic, kind)))
     for service, count in own.servers:
-        _apply(graph, _server_request(node, count.id, service, uri))
+        _apply_request(graph, _server_request(node, count.id, service, uri))
     for service, subscriber_count in own.clients:
-        _apply(
+        _apply_request(
             graph, AddSubscriber(node, SubscriberRecord(subscriber_count.id, topic_of(service), SERVICE_TYPE))
         )
     counts = (*(each[-1] for each in own.publishers), *(count for _, count in own.servers))
@@ -119,10 +119,10 @@ def _add_own(graph: Graph, own: OwnNode, uri: str) -> None:
         *(each[-1] for each in own.subscribers),
         *(subscriber_count for _, subscriber_count in own.clients),
     )
-    _apply(graph, Renew(node.id, graph.epoch, graph.revision, counts, subscriber_counts))
+    _apply_request(graph, Renew(node.id, graph.epoch, graph.revision, counts, subscriber_counts))
 
 
-def _apply(graph: Graph, request: Request) -> None:
+def _apply_request(graph: Graph, request: Request) -> None:
     graph.apply(request, 0, time.monotonic(), "")
 
 

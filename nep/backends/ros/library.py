@@ -130,7 +130,7 @@ class ServiceDefinition(NamedTuple):
     md5sum: str
 
 
-def message_text(name: str) -> tuple[str, str] | None:
+def message_definition(name: str) -> tuple[str, str] | None:
     """Return the definition and MD5 sum of a message type, or None if it is not installed."""
     found = _installed_class(name, "msg")
     text, checksum = getattr(found, "_full_text", None), getattr(found, "_md5sum", None)

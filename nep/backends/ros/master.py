@@ -14,7 +14,7 @@ from xml.parsers.expat import ExpatError
 from nep.errors import MasterUnreachable, NepError
 from nep.i18n import _
 
-_CALLER = "/nep"
+_CALLER_ID = "/nep"
 _REQUEST_TIMEOUT_S = 1.0
 """Timeout of a single request to a master in seconds."""
 _RETRY_S = 0.1
@@ -53,7 +53,7 @@ class _Transport(xmlrpc.client.Transport):
         return connection
 
 
-class _RefusedError(ValueError): ...
+class _RejectedError(ValueError): ...
 
 
 def _call(uri: str, timeout_s: float, method: str, *args: object) -> Any:  # noqa: ANN401 - any value
@@ -61,7 +61,7 @@ def _call(uri: str, timeout_s: float, method: str, *args: object) -> Any:  # noq
     with xmlrpc.client.ServerProxy(uri, transport=_Transport(max(0.01, timeout_s))) as proxy:
         code, status, value = getattr(proxy, method)(*args)
     if code != 1:
-        raise _RefusedError(status)
+        raise _RejectedError(status)
     return value
 
 
@@ -76,14 +76,14 @@ def connections_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
         (peer, direction, topic) of each connection; the direction is "i" (in) or "o" (out).
     """
     try:
-        buses = _call(uri, timeout_s, "getBusInfo", _CALLER)
+        buses = _call(uri, timeout_s, "getBusInfo", _CALLER_ID)
         return [(str(each[1]), str(each[2]), str(each[4])) for each in buses]
     except _REQUEST_ERRORS:
         return []
 
 
 @dataclass(frozen=True)
-class RosNodes:
+class RosSystemState:
     """Snapshot of a ROS master.
 
     Attributes:
@@ -134,7 +134,7 @@ class RosMaster:
             waited = time.monotonic() - started
             left = _REQUEST_TIMEOUT_S if timeout_s is None else min(_REQUEST_TIMEOUT_S, timeout_s - waited)
             try:
-                _call(self.uri, left, "getPid", _CALLER)
+                _call(self.uri, left, "getPid", _CALLER_ID)
                 return
             except _REQUEST_ERRORS as error:
                 waited = time.monotonic() - started
@@ -151,8 +151,8 @@ class RosMaster:
     def is_node_unknown(self, name: str, timeout_s: float) -> bool:
         """Return True if the master replies but doesn't list the node `name`, for example after a restart."""
         try:
-            _call(self.uri, timeout_s, "lookupNode", _CALLER, name)
-        except _RefusedError:
+            _call(self.uri, timeout_s, "lookupNode", _CALLER_ID, name)
+        except _RejectedError:
             return True
         except _REQUEST_ERRORS:
             pass
@@ -182,11 +182,11 @@ class RosMaster:
     def uri_of(self, name: str, timeout_s: float) -> str:
         """Return the address of a node, or "" if it is unknown."""
         try:
-            return str(_call(self.uri, timeout_s, "lookupNode", _CALLER, name))
+            return str(_call(self.uri, timeout_s, "lookupNode", _CALLER_ID, name))
         except _REQUEST_ERRORS:
             return ""
 
-    def nodes(self, timeout_s: float) -> RosNodes:
+    def system_state(self, timeout_s: float) -> RosSystemState:
         """Return a snapshot of the master."""
         state = self._request("getSystemState", timeout_s)
         publishers, subscribers, services = (
@@ -197,7 +197,7 @@ class RosMaster:
         names = {
             name for part in (publishers, subscribers, served) for each in part.values() for name in each
         }
-        return RosNodes(publishers, subscribers, served, types, self._uris(sorted(names), timeout_s))
+        return RosSystemState(publishers, subscribers, served, types, self._uris(sorted(names), timeout_s))
 
     def services(self, timeout_s: float) -> tuple[str, ...]:
         """Return the names of services that have a server."""
@@ -207,7 +207,7 @@ class RosMaster:
     def service_uri(self, name: str, timeout_s: float) -> str:
         """Return the address of a service, or "" if it is unknown."""
         try:
-            return str(_call(self.uri, timeout_s, "lookupService", _CALLER, name))
+            return str(_call(self.uri, timeout_s, "lookupService", _CALLER_ID, name))
         except _REQUEST_ERRORS:
             return ""
 
@@ -216,7 +216,7 @@ class RosMaster:
             with xmlrpc.client.ServerProxy(self.uri, transport=_Transport(timeout_s)) as proxy:
                 calls = xmlrpc.client.MultiCall(proxy)
                 for name in names:
-                    calls.lookupNode(_CALLER, name)
+                    calls.lookupNode(_CALLER_ID, name)
                 given: Any = calls() if names else []
                 answers: list[Any] = [given[number] for number in range(len(names))]
         except _REQUEST_ERRORS:
@@ -225,6 +225,6 @@ class RosMaster:
 
     def _request(self, method: str, timeout_s: float) -> Any:  # noqa: ANN401 - any value
         try:
-            return _call(self.uri, timeout_s, method, _CALLER)
+            return _call(self.uri, timeout_s, method, _CALLER_ID)
         except _REQUEST_ERRORS as error:
             raise RosMasterUnreachable(self.address, timeout_s) from error

@@ -36,7 +36,7 @@ _INVALID_CHARACTERS = re.compile(r"\W+", re.ASCII)
 _TOPIC = re.compile(r"[~/A-Za-z][\w/]*", re.ASCII)
 _POLL_S = 0.01
 _REQUEST_TIMEOUT_S = 0.5
-_MASTER_CHECK_S = 1.0
+_MASTER_CHECK_INTERVAL_S = 1.0
 """Interval in seconds for detecting a restart of the master."""
 _MIN_TIMEOUT_S = 0.2
 """Minimum timeout in seconds of a request to the master, even if the caller's timeout is shorter."""
@@ -115,11 +115,11 @@ class RosProcess:
 
     def _monitor_master(self) -> None:
         # Thread that detects restarts of the master; runs until rospy is shut down.
-        while not self._ended.wait(_MASTER_CHECK_S):
-            if self.master.is_node_unknown(self.name, _REQUEST_TIMEOUT_S) and self._repeat_registrations():
+        while not self._ended.wait(_MASTER_CHECK_INTERVAL_S):
+            if self.master.is_node_unknown(self.name, _REQUEST_TIMEOUT_S) and self._restore_registrations():
                 _logger.warning("the ROS master at '%s' was restarted; registered again", self.master.address)
 
-    def _repeat_registrations(self) -> bool:
+    def _restore_registrations(self) -> bool:
         # Repeats rospy's registrations, which rospy doesn't do after a restart of the master. Returns False
         # on failure.
         registration = self.rospy.impl.registration
@@ -178,7 +178,7 @@ class RosProcess:
         with self._lock:
             self._published.get(topic, {}).pop(id_, None)
 
-    def own_publisher_id(self, topic: str) -> int | None:
+    def local_publisher_id(self, topic: str) -> int | None:
         """Return the id of this process's publisher on a topic; None if there isn't exactly one.
 
         ROS reports only the process that sent a message. The publisher is therefore unknown if nep nodes
@@ -217,7 +217,7 @@ class RosProcess:
         impl = publisher.impl
         pause = threading.Event()
         while True:
-            left = sum(_has_unsent(each) for each in ([] if impl is None else impl.connections))
+            left = sum(_has_unsent_data(each) for each in ([] if impl is None else impl.connections))
             if not left or time.monotonic() >= deadline:
                 return left
             pause.wait(_POLL_S)
@@ -352,7 +352,7 @@ def run_with_timeout(call: Callable[[], object], timeout_s: float) -> bool:
     return not thread.is_alive()
 
 
-def _has_unsent(connection: Any) -> bool:  # noqa: ANN401 - rospy is not typed
+def _has_unsent_data(connection: Any) -> bool:  # noqa: ANN401 - rospy is not typed
     # True unless the connection's thread waits for data: messages it has taken from the queue are visible
     # nowhere else.
     data = getattr(connection, "_cond_data_available", None)

@@ -14,7 +14,7 @@ from nep.backends.ros.master import RosMasterUnreachable
 from nep.backends.ros.process import RosProcess
 from nep.backends.ros.service_connection import ServiceConnection
 from nep.backends.ros.service_types import NEP_CALL, ServiceType, installed_service
-from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_calls
+from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_call_limits
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError
 from nep.i18n import _
 from nep.protocol.requests import SubscriberCount
@@ -70,7 +70,7 @@ class RosClient(ClientCalls[_Call]):
         with self._lock:
             if self.is_closed:
                 raise self._closed_error()
-            check_calls(self.spec.service, len(self._calls), self._bytes, len(data))
+            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
             call = _Call(next(self._numbers), bytes(data), timeout_s, deadline, then)
             self._calls[call.number] = call
             self._bytes += len(call.data)

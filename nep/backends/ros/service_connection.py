@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterator
 from urllib.parse import urlsplit
 
 from nep.i18n import _
-from nep.protocol.service_wire import PAYLOAD_MAX_BYTES
+from nep.protocol.service_wire import MAX_PAYLOAD_BYTES
 
 _LENGTH = struct.Struct("<I")
-_HEADER_MAX_BYTES = 2**20
+_MAX_HEADER_BYTES = 2**20
 _HANDSHAKE_TIMEOUT_S = 5.0
-_HANDSHAKES_MAX = 3
+_MAX_HANDSHAKES = 3
 """Maximum number of concurrent handshakes with one server.
 
 rospy's listen backlog is five; further connections would be delayed for seconds.
@@ -51,7 +51,7 @@ class HandshakeLimiter:
             ServiceConnectionError: The call was cancelled.
         """
         with self._changed:
-            while self._counts[uri] >= _HANDSHAKES_MAX:
+            while self._counts[uri] >= _MAX_HANDSHAKES:
                 left = deadline - time.monotonic()
                 if left <= 0.0:
                     raise TimeoutError
@@ -105,7 +105,7 @@ class ServiceConnection:
     def _handshake(self, fields: dict[str, str]) -> dict[str, str]:
         packed = [f"{key}={value}".encode() for key, value in fields.items()]
         self._send(b"".join(_LENGTH.pack(len(each)) + each for each in packed))
-        data = self._receive_sized(_HEADER_MAX_BYTES)
+        data = self._receive_sized(_MAX_HEADER_BYTES)
         header: dict[str, str] = {}
         at = 0
         while at + 4 <= len(data):
@@ -121,7 +121,7 @@ class ServiceConnection:
         """Send a request; return (True, response) or (False, error message)."""
         self._send(body)
         is_carried_out = self._receive_exactly(1) != b"\0"
-        return is_carried_out, self._receive_sized(PAYLOAD_MAX_BYTES + 2**20)
+        return is_carried_out, self._receive_sized(MAX_PAYLOAD_BYTES + 2**20)
 
     def _send(self, data: bytes) -> None:
         self._set_timeout()

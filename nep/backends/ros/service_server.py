@@ -14,7 +14,7 @@ from nep.backends.services import (
     CallQueue,
     IncomingCall,
     ServerSpec,
-    Tally,
+    ServerStats,
     limit_reply_size,
     rejection_reply,
 )
@@ -54,7 +54,7 @@ class RosServer:
         self.process = process
         self.service = process.resolved(spec.service)
         self.calls = CallQueue()
-        self.tally = Tally()
+        self.stats = ServerStats()
         self.is_closed = False
         self._forget = forget
         self._type = service_type_for(spec.msg_type)
@@ -96,7 +96,7 @@ class RosServer:
         try:
             call = self._type.decode_call(body)
         except NepError as error:
-            self._reply(pending_reply, error_reply(CallKind.REFUSED, "", str(error)))
+            self._reply(pending_reply, error_reply(CallKind.REJECTED, "", str(error)))
             return
         deadline = None if call.timeout_s is None else time.monotonic() + call.timeout_s
         incoming = IncomingCall(
@@ -107,12 +107,12 @@ class RosServer:
 
     def _reply(self, pending_reply: _PendingReply, reply: Reply) -> bool:
         body: bytes | None = None
-        if self._type is NEP_CALL or reply.kind == CallKind.ANSWER:
+        if self._type is NEP_CALL or reply.kind == CallKind.REPLY:
             try:
                 body = self._type.encode_reply(reply)
             except NepError as error:  # the callback's result doesn't fit the type
                 reply = error_reply(CallKind.ERROR, type(error).__name__, str(error))
-        self.tally.add(reply)
+        self.stats.add(reply)
         if body is not None:
             return pending_reply.set_result(body)
         return pending_reply.set_result(None, ": ".join(filter(None, read_error_reply(reply.data))))
@@ -121,7 +121,7 @@ class RosServer:
 
     def counts(self) -> PublisherCount:
         """Return the statistics shown in the graph."""
-        tally = self.tally
+        tally = self.stats
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def begin_close(self) -> None:

@@ -54,7 +54,7 @@ class _Source:
     seq: int = 0
     last: object = None
     publisher: int | None = None
-    is_own: bool = False
+    is_local: bool = False
 
 
 def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy is not typed
@@ -82,7 +82,7 @@ class RospySubscriber(WakingSubscriber):
         self.ready: deque[Message] = deque()
         self.received = 0
         self.lost: int | None = None
-        self.refusals = RejectionLog()
+        self.rejections = RejectionLog()
         self.is_closed = False
         self._owner = owner
         self._reader_problem = ""
@@ -101,12 +101,12 @@ class RospySubscriber(WakingSubscriber):
     @property
     def refused(self) -> int:
         """Number of messages rejected as malformed or of a wrong type."""
-        return self.refusals.count
+        return self.rejections.count
 
     @property
     def problem(self) -> str:
         """Reason why the newest message was rejected; "" if it was accepted."""
-        return self._reader_problem or self.refusals.recent_message()
+        return self._reader_problem or self.rejections.recent_message()
 
     # ---- callbacks of rospy, in a thread per connection
 
@@ -161,7 +161,7 @@ class RospySubscriber(WakingSubscriber):
         name = header.get("callerid", "")
         is_own = name == self.process.name
         publisher = publisher_id(name, self.topic) if name and not is_own else None
-        return _Source(found, kind, publisher=publisher, is_own=is_own)
+        return _Source(found, kind, publisher=publisher, is_local=is_own)
 
     def _read(self, source: _Source, body: memoryview) -> Message:
         if source.unpacker is None or source.kind is None:
@@ -173,8 +173,8 @@ class RospySubscriber(WakingSubscriber):
         message = received_message(source.kind, data, None, 0, 0, extension or NO_EXTENSION)
         message.seq = None
         message.publisher = source.publisher
-        if source.is_own:
-            message.publisher = self.process.own_publisher_id(self.topic)
+        if source.is_local:
+            message.publisher = self.process.local_publisher_id(self.topic)
         if source.unpacker.has_header:
             seq, secs, nsecs = STAMP.unpack_from(body, 0)
             message.stamp_ns = secs * 1_000_000_000 + nsecs
@@ -192,7 +192,7 @@ class RospySubscriber(WakingSubscriber):
         source.seq = seq
 
     def _reject(self, reason: str) -> None:
-        if self.refusals.add(reason):
+        if self.rejections.add(reason):
             _logger.warning("malformed message on '%s': %s", self.spec.topic, reason)
 
     # ---- reading

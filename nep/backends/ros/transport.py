@@ -10,8 +10,8 @@ from typing import Any
 
 from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
-from nep.backends.ros.carried import installed_definition, ros_type_of, to_ros
-from nep.backends.ros.graph import OwnNode, graph_view
+from nep.backends.ros.carried import installed_definition, ros_type_of, to_ros_body
+from nep.backends.ros.graph import LocalNode, graph_view
 from nep.backends.ros.library import get_rospy
 from nep.backends.ros.master import RosMaster, RosMasterUnreachable
 from nep.backends.ros.process import RosProcess, RosShutdownError, get_process
@@ -123,7 +123,7 @@ class RospyPublisher:
 
         Raises `ClosedError`, and the same errors as `to_ros`.
         """
-        body = to_ros(self._definition.name, self.spec.codec.name, encoded)
+        body = to_ros_body(self._definition.name, self.spec.codec.name, encoded)
         with self._lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
@@ -287,12 +287,12 @@ class RospyTransport:
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
         """Return the graph of the ROS network. Raises `MasterUnreachable`."""
         address = _master_address(configuration)
-        known = RosMaster(address).nodes(timeout_s)
+        known = RosMaster(address).system_state(timeout_s)
         # of the same class
-        own = [each.own_node(address) for each in list(_transports) if not each._is_closed]  # noqa: SLF001
+        own = [each.local_node(address) for each in list(_transports) if not each._is_closed]  # noqa: SLF001
         return graph_view(known, own)
 
-    def own_node(self, address: str) -> OwnNode:
+    def local_node(self, address: str) -> LocalNode:
         """Return this node's publishers, subscribers and services at the ROS master at `address`."""
         outs: list[RospyPublisher] = [
             each for each in self._publishers if each.process.master.address == address
@@ -303,7 +303,7 @@ class RospyTransport:
         servers = [each for each in self._servers if each.process.master.address == address]
         clients = [each for each in self._clients if each.process.master.address == address]
         names = [each.process.name for part in (outs, ins, servers, clients) for each in part]
-        return OwnNode(
+        return LocalNode(
             self.node,
             names[0] if names else "",
             tuple((o.topic, o.ros_type, o.spec.is_latched, o.counts()) for o in outs),

@@ -11,7 +11,7 @@ from nep.backends.base import Backend
 from nep.backends.ros2.environment import resolve_domain
 from nep.backends.ros2.message_types import MessageTypes, message_types
 from nep.backends.ros2.quality import QOS_PROFILES
-from nep.backends.ros2.services.definitions import codec_of_calls
+from nep.backends.ros2.services.definitions import call_codec_for
 from nep.backends.ros2.transport import Ros2Transport
 from nep.backends.ros2.type_mapping import codec_for
 
@@ -23,7 +23,7 @@ BACKEND = Backend(
     needs="cyclonedds, rosbags",
     master=resolve_domain,
     codec_for=codec_for,
-    codec_of_calls=codec_of_calls,
+    call_codec_for=call_codec_for,
     qos=QOS_PROFILES,
     has_history=True,
     has_extensions=False,

@@ -15,12 +15,12 @@ _DOMAIN_COUNT = 233
 """Number of valid DDS domains; higher domain ids have no valid ports."""
 _SUBNET_RANGES = frozenset({"SUBNET", "SYSTEM_DEFAULT"})
 _VALID_RANGES = frozenset({"", "OFF", "LOCALHOST", *_SUBNET_RANGES})
-PARTICIPANTS_MAX = 100
+MAX_PARTICIPANTS = 100
 """Maximum number of participants per computer in a domain.
 
 Without multicast, the ports of this number of participants are probed.
 """
-_MAX_PARTICIPANT_INDEX = PARTICIPANTS_MAX - 1
+_MAX_PARTICIPANT_INDEX = MAX_PARTICIPANTS - 1
 _PACKET_SIZES = "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
 """Packet sizes in the configuration of Cyclone DDS.
 
@@ -47,14 +47,14 @@ def resolve_domain(master: str | None, environment: Mapping[str, str] = os.envir
             _("a ROS 2 domain must be a 'str' such as '5', not a '{kind}'").format(kind=type(master).__name__)
         )
     said = (master or "").strip()
-    if said and not _is_domain(said):
+    if said and not _is_valid_domain(said):
         raise NepError(
             _("'{said}' isn't a ROS 2 domain; use a number from 0 to {most}").format(
                 said=said[:40], most=_DOMAIN_COUNT - 1
             )
         )
     said = said or environment.get("ROS_DOMAIN_ID", "").strip() or "0"
-    if not _is_domain(said):
+    if not _is_valid_domain(said):
         raise NepError(
             _("ROS_DOMAIN_ID is '{said}'; set it to a number from 0 to {most}").format(
                 said=said[:40], most=_DOMAIN_COUNT - 1
@@ -63,7 +63,7 @@ def resolve_domain(master: str | None, environment: Mapping[str, str] = os.envir
     return str(int(said))
 
 
-def _is_domain(said: str) -> bool:
+def _is_valid_domain(said: str) -> bool:
     return said.isascii() and said.isdigit() and len(said) <= 3 and int(said) < _DOMAIN_COUNT
 
 

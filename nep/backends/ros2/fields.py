@@ -23,10 +23,10 @@ _NUMPY_DTYPES = {
     "byte": "uint8",
     **{name: name for name in ("bool", "float32", "float64", *_INTEGER_RANGES) if name != "byte"},
 }
-_FLOATS = frozenset({"float32", "float64"})
+_FLOAT_TYPES = frozenset({"float32", "float64"})
 _FLOAT32_OVERFLOW = 3.4028235677973366e38
 """Smallest number that rounds to infinity as float32."""
-_OCTETS = frozenset({"uint8", "byte"})
+_OCTET_TYPES = frozenset({"uint8", "byte"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,9 @@ class TypeRegistry(Protocol):
         """Return the message class that rosbags creates for a type."""
 
 
-def read_definition(entries: Sequence[tuple[str, Any]]) -> tuple[list[tuple[str, Any]], tuple[RosField, ...]]:
+def convert_definition(
+    entries: Sequence[tuple[str, Any]],
+) -> tuple[list[tuple[str, Any]], tuple[RosField, ...]]:
     """Convert a type description of rosbags. The type `char` becomes `uint8`.
 
     Args:
@@ -180,7 +182,7 @@ def _convert_scalar(field: RosField, value: object, path: str) -> str | bool | i
                 path, _("is a '{kind}'; expected True or False").format(kind=_type_name(value))
             )
         return value
-    if field.kind in _FLOATS:
+    if field.kind in _FLOAT_TYPES:
         return _convert_float(field, value, path)
     low, high = _INTEGER_RANGES[field.kind]
     if not isinstance(value, int) or isinstance(value, bool):
@@ -264,7 +266,7 @@ def _convert_array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN4
     np = _import_numpy()
     wanted = np.dtype(_NUMPY_DTYPES[field.kind])
     if isinstance(value, bytes | bytearray | memoryview):
-        if field.kind not in _OCTETS:
+        if field.kind not in _OCTET_TYPES:
             raise RosFieldError(path, _("is a '{kind}'; expected a list").format(kind=_type_name(value)))
         return np.frombuffer(bytes(value), np.uint8)
     try:
@@ -273,7 +275,7 @@ def _convert_array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN4
         found = np.empty((), object)
     if found.ndim == 1 and (not found.size or _is_convertible(found, field, wanted)):
         return np.ascontiguousarray(found.astype(wanted))
-    single = RosField(field.name, "uint8" if field.kind in _OCTETS else field.kind, is_message=False)
+    single = RosField(field.name, "uint8" if field.kind in _OCTET_TYPES else field.kind, is_message=False)
     items = [_convert_scalar(single, each, f"{path}[{number}]") for number, each in enumerate(list(value))]
     return np.array(items, wanted)
 
@@ -282,7 +284,7 @@ def _is_convertible(found: Any, field: RosField, wanted: Any) -> bool:  # noqa: 
     # False means that the items must be checked one by one.
     if found.dtype == wanted:
         return True
-    if field.kind in _FLOATS:
+    if field.kind in _FLOAT_TYPES:
         if found.dtype.kind not in "iuf":
             return False
         if field.kind == "float64" or found.dtype.kind != "f":
@@ -326,7 +328,7 @@ def _to_plain(types: TypeRegistry, field: RosField, value: Any) -> object:  # no
         return [from_message(types, field.kind, each) for each in value]
     if field.kind == "string":
         return list(value)
-    return value.tobytes() if field.kind in _OCTETS else value.tolist()
+    return value.tobytes() if field.kind in _OCTET_TYPES else value.tolist()
 
 
 def _import_numpy() -> Any:  # noqa: ANN401 - the module numpy

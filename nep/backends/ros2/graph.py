@@ -48,7 +48,7 @@ _MAX_FOREIGN_ENDPOINTS = 10_000
 
 
 @dataclass
-class _Names:
+class _NameCache:
     # Names in nep of DDS topics and types, as used by this program or another nep program.
     topics: dict[str, str] = field(default_factory=dict)
     types: dict[tuple[str, str], str] = field(default_factory=dict)
@@ -61,11 +61,11 @@ class _Names:
 
     def msg_type(self, endpoint: DdsEndpoint) -> str:
         known = self.types.get((endpoint.topic, endpoint.type))
-        return known or endpoint.announced.get("neptype") or ros_type(endpoint.type)
+        return known or endpoint.user_data.get("neptype") or ros_type(endpoint.type)
 
     def id(self, endpoint: DdsEndpoint) -> int:
         # Returns the announced id, unless another endpoint announces the same one.
-        announced_ids = endpoint_id(endpoint.gid, endpoint.announced.get("nepid"))
+        announced_ids = endpoint_id(endpoint.gid, endpoint.user_data.get("nepid"))
         found = endpoint_id(endpoint.gid, None) if announced_ids in self.ids else announced_ids
         self.ids.add(found)
         return found
@@ -73,7 +73,7 @@ class _Names:
 
 def current_graph(participant: Participant) -> GraphView:
     """Return the current graph."""
-    graph, names = Graph(epoch=1, now=0.0, learn_s=0.0), _Names()
+    graph, names = Graph(epoch=1, now=0.0, learn_s=0.0), _NameCache()
     for local in participant.local_nodes:
         _add_local(graph, local, names)
     found = [
@@ -83,7 +83,7 @@ def current_graph(participant: Participant) -> GraphView:
         if ros_topic(each.topic) is not None or ros_service(each.topic) is not None
     ]
     parties: dict[str, dict[str, list[NodeEndpoint]]] = {}
-    own = participant.own_gids()
+    own = participant.local_node_names()
     for kind, each in found:
         if each.gid in own and ros_service(each.topic) is None:
             _add_endpoint(parties, names, NodeEndpoint(own[each.gid], each), kind)
@@ -101,13 +101,13 @@ def current_graph(participant: Participant) -> GraphView:
 
 
 def _add_endpoint(
-    parties: dict[str, dict[str, list[NodeEndpoint]]], names: _Names, party: NodeEndpoint, kind: str
+    parties: dict[str, dict[str, list[NodeEndpoint]]], names: _NameCache, party: NodeEndpoint, kind: str
 ) -> None:
     topic = names.topic(party.endpoint)
     parties.setdefault(topic, {"writer": [], "reader": []})[kind].append(party)
 
 
-def _add_local(graph: Graph, local: LocalNode, names: _Names) -> None:
+def _add_local(graph: Graph, local: LocalNode, names: _NameCache) -> None:
     publishers, subscribers = local.publishers, local.subscribers
     servers, clients = local.servers, local.clients
     specs: list[PublisherSpec | SubscriberSpec] = [each.spec for each in publishers]
@@ -136,17 +136,17 @@ def _add_local(graph: Graph, local: LocalNode, names: _Names) -> None:
 
 
 def _foreign_endpoints(
-    participant: Participant, all_found: Sequence[tuple[str, DdsEndpoint]], names: _Names
+    participant: Participant, all_found: Sequence[tuple[str, DdsEndpoint]], names: _NameCache
 ) -> Iterator[tuple[NodeRecord, str, DdsEndpoint | None]]:
     # Yields foreign writers and readers with their node, and None for nodes without any.
     own = participant.gid
     alive = participant.participants() - {own}
     found = [(kind, each) for kind, each in all_found if each.participant != own]
     for _kind, each in found:
-        if each.announced.get("neptype"):
-            names.types.setdefault((each.topic, each.type), each.announced["neptype"])
+        if each.user_data.get("neptype"):
+            names.types.setdefault((each.topic, each.type), each.user_data["neptype"])
     announced_ids = {
-        each.gid: each.announced["nepnode"] for _kind, each in found if each.announced.get("nepnode")
+        each.gid: each.user_data["nepnode"] for _kind, each in found if each.user_data.get("nepnode")
     }
     owners: dict[bytes, NodeRecord] = {}
     for gid, nodes in sorted(participant.remote_nodes(alive).items()):
@@ -173,7 +173,7 @@ def _unknown_node(gid: bytes) -> NodeRecord:
 
 
 def _add_foreign(
-    graph: Graph, node: NodeRecord, kind: str, endpoint: DdsEndpoint | None, names: _Names
+    graph: Graph, node: NodeRecord, kind: str, endpoint: DdsEndpoint | None, names: _NameCache
 ) -> None:
     # Records that the graph rejects are skipped.
     if node.id not in graph.members:

@@ -67,7 +67,7 @@ class Matches:
         for gid, entity in self._followed.items():
             if entity.take_status():
                 found = matched_gids(entity)
-                self._found[gid] = frozenset(each for each in found if not self._is_own(each))
+                self._found[gid] = frozenset(each for each in found if not self._is_local(each))
                 self._has_changes = True
         if not self._has_changes:
             return
@@ -78,7 +78,7 @@ class Matches:
             self._writer.write(create_sample(self._sample_class, self._types.encode(_TYPE, {"data": data})))
             self._published = data
 
-    def _is_own(self, gid: bytes) -> bool:
+    def _is_local(self, gid: bytes) -> bool:
         return gid[:PREFIX_BYTES] == self._gid[:PREFIX_BYTES]
 
     def process(self, cdr: bytes) -> None:
@@ -89,7 +89,7 @@ class Matches:
             return
         data = decoded["data"] if isinstance(decoded, dict) else b""
         sender, pairs = data[:GID_BYTES], data[GID_BYTES:]
-        if len(sender) < GID_BYTES or len(pairs) % (2 * GID_BYTES) or self._is_own(sender):
+        if len(sender) < GID_BYTES or len(pairs) % (2 * GID_BYTES) or self._is_local(sender):
             return
         found = (
             (pairs[at : at + GID_BYTES], pairs[at + GID_BYTES : at + 2 * GID_BYTES])
@@ -101,7 +101,7 @@ class Matches:
         self._confirmed[sender] = frozenset(
             pair
             for pair in found
-            if self._is_own(pair[1]) and pair[0][:PREFIX_BYTES] == sender[:PREFIX_BYTES]
+            if self._is_local(pair[1]) and pair[0][:PREFIX_BYTES] == sender[:PREFIX_BYTES]
         )
 
     def is_confirmed(self, own: bytes, other: bytes, participant: bytes) -> bool:
@@ -112,7 +112,7 @@ class Matches:
             other: GUID of the other program's endpoint. Endpoints of this program count as confirmed.
             participant: GUID of the other program's participant.
         """
-        return self._is_own(other) or (other, own) in self._confirmed.get(participant, ())
+        return self._is_local(other) or (other, own) in self._confirmed.get(participant, ())
 
     def unmatched_gids(
         self, entities: Iterable[Any], known: Iterable[tuple[bytes, bytes, bool]]

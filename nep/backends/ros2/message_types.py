@@ -17,8 +17,8 @@ from nep.backends.ros2.fields import (
     PLACEHOLDER_FIELD,
     RosField,
     RosFieldError,
+    convert_definition,
     from_message,
-    read_definition,
     to_message,
 )
 from nep.backends.ros2.library import load_typesys
@@ -30,7 +30,7 @@ FOLDERS_VARIABLE = "NEP_ROS_MSG_PATH"
 """Name of the environment variable that lists folders of .msg files."""
 _MAX_FILE_BYTES = 2**20
 _MAX_FILES = 10_000
-_WIDE_STRING = "wstring"
+_WIDE_STRING_TYPE = "wstring"
 _GID_TYPE = "rmw_dds_common/msg/Gid"
 
 
@@ -59,7 +59,7 @@ class MessageTypes:
         # `char` is replaced by `uint8`, which type hashes are computed from.
         for name, (constants, entries) in list(self._store.fielddefs.items()):
             if name not in self._fields:
-                plain, fields = read_definition(entries)
+                plain, fields = convert_definition(entries)
                 self._store.fielddefs[name] = (constants, plain)
                 self._fields[name] = fields
 
@@ -130,7 +130,7 @@ class MessageTypes:
         for wrong in self._add({type_name(name): text}).values():
             raise wrong
 
-    def add_part(self, name: str, text: str) -> None:
+    def add_service_part(self, name: str, text: str) -> None:
         """Add the request or response type of a service, such as "std_srvs/srv/SetBool_Request".
 
         Raises the same errors as `add`.
@@ -144,7 +144,7 @@ class MessageTypes:
                 _("the definition of '{name}' can't be read: {error}").format(name=name, error=error)
             ) from error
         with self._lock:
-            fields = read_definition(found[1])[1]
+            fields = convert_definition(found[1])[1]
             for wrong in self._missing_type_errors({name: fields}).values():
                 raise wrong
             known = [each for each in self._fields.get(name, fields) if each.name != PLACEHOLDER_FIELD]
@@ -195,7 +195,7 @@ class MessageTypes:
                     _("the definition of '{name}' can't be read: {error}").format(name=name, error=error)
                 )
         with self._lock:
-            fields = {name: read_definition(entries)[1] for name, (_constants, entries) in found.items()}
+            fields = {name: convert_definition(entries)[1] for name, (_constants, entries) in found.items()}
             while missing := self._missing_type_errors(fields):
                 wrong.update(missing)
                 fields = {name: each for name, each in fields.items() if name not in missing}
@@ -223,7 +223,7 @@ class MessageTypes:
         )
         return {
             name: NepError(
-                (wide if field.kind.endswith(f"/{_WIDE_STRING}") else unknown).format(
+                (wide if field.kind.endswith(f"/{_WIDE_STRING_TYPE}") else unknown).format(
                     name=name, field=field.name, kind=field.kind
                 )
             )

@@ -50,7 +50,7 @@ def _merge_readers(readers: Iterable[NodeEndpoint]) -> Iterator[NodeEndpoint]:
     # A subscriber of nep may have two readers; keep the one with the weaker requirements.
     known: dict[str, NodeEndpoint] = {}
     for each in readers:
-        key = each.endpoint.announced.get("nepid") or each.endpoint.gid.hex()
+        key = each.endpoint.user_data.get("nepid") or each.endpoint.gid.hex()
         other = known.get(key)
         is_latched = each.endpoint.is_latched and (other is None or other.endpoint.is_latched)
         known[key] = replace(each, endpoint=replace(each.endpoint, is_latched=is_latched))
@@ -58,7 +58,7 @@ def _merge_readers(readers: Iterable[NodeEndpoint]) -> Iterator[NodeEndpoint]:
 
 
 def _have_different_definitions(writer: DdsEndpoint, reader: DdsEndpoint) -> bool:
-    hashes = writer.announced.get("typehash", ""), reader.announced.get("typehash", "")
+    hashes = writer.user_data.get("typehash", ""), reader.user_data.get("typehash", "")
     return writer.type == reader.type and all(hashes) and hashes[0] != hashes[1]
 
 

@@ -17,7 +17,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec
-from nep.backends.ros2.environment import PARTICIPANTS_MAX, cyclonedds_config, is_loopback_only
+from nep.backends.ros2.environment import MAX_PARTICIPANTS, cyclonedds_config, is_loopback_only
 from nep.backends.ros2.library import Dds, load_dds, restrict_to_loopback
 from nep.backends.ros2.matches import Matches
 from nep.backends.ros2.message_types import MessageTypes, message_types
@@ -43,10 +43,10 @@ _MAX_PARTICIPANTS = 4096
 """Maximum number of other participants that are tracked."""
 _FDS_PER_PARTICIPANT = 16
 """Number of file descriptors that a participant needs."""
-_SETTLE_S = 0.3
+_DISCOVERY_TIME_S = 0.3
 """Time in seconds that a new participant waits to discover others, which respond within milliseconds."""
 _POLL_S = 0.01
-_READ_MAX = 10_000
+_MAX_SAMPLES_PER_READ = 10_000
 
 
 @dataclass(frozen=True)
@@ -82,11 +82,11 @@ class DdsEndpoint:
     type: str
     is_latched: bool
     is_reliable: bool
-    announced: dict[str, str]
+    user_data: dict[str, str]
 
     def has_type(self, kind: str, type_hash: str) -> bool:
         """Return True if the endpoint's type is `kind` and its type hash, if announced, is `type_hash`."""
-        return self.type == kind and self.announced.get("typehash", type_hash) == type_hash
+        return self.type == kind and self.user_data.get("typehash", type_hash) == type_hash
 
 
 class LocalNode(Protocol):
@@ -202,7 +202,7 @@ class Participant:
                 _(
                     "Cyclone DDS can't start: {error}; check CYCLONEDDS_URI, the network, and whether the "
                     "domain already has {most} programs"
-                ).format(error=error, most=PARTICIPANTS_MAX)
+                ).format(error=error, most=MAX_PARTICIPANTS)
             ) from error
         self._began_at = time.monotonic()
         self._thread = threading.Thread(target=self._run, name="nep-ros2", daemon=True)
@@ -266,7 +266,9 @@ class Participant:
         if self._is_settled:
             return
         with self.changed:
-            while (left := self._began_at + _SETTLE_S - time.monotonic()) > 0.0 and not self._is_closing:
+            while (
+                left := self._began_at + _DISCOVERY_TIME_S - time.monotonic()
+            ) > 0.0 and not self._is_closing:
                 self.changed.wait(left)
             deadline = time.monotonic() + HANDSHAKE_TIMEOUT_S
             while not self._is_discovery_complete() and (left := deadline - time.monotonic()) > 0.0:
@@ -351,7 +353,7 @@ class Participant:
         return {"data": gid.ljust(self.types.gid_bytes, b"\0")}
 
     def _mark_changed(self, reader: Any, news: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        reader.read(_READ_MAX, news)
+        reader.read(_MAX_SAMPLES_PER_READ, news)
         self._has_changes = True
 
     def _process_info(self, cdr: bytes) -> None:
@@ -373,14 +375,14 @@ class Participant:
             for each in info["node_entities_info_seq"]
         )
 
-    def names_of(self, gids: Iterable[bytes]) -> tuple[str, ...]:
+    def remote_node_names(self, gids: Iterable[bytes]) -> tuple[str, ...]:
         """Return the names of other programs' nodes that own the endpoints with these GUIDs."""
         wanted = set(gids)
         with self.changed:
             nodes = [node for others in self._others.values() for node in others if node.gids & wanted]
         return tuple(sorted({each.name for each in nodes}))
 
-    def own_gids(self) -> dict[bytes, str]:
+    def local_node_names(self) -> dict[bytes, str]:
         """Return the node names of this process's writers and readers by GUID."""
         with self.changed:
             return {
@@ -420,7 +422,7 @@ class Participant:
             alive = core.ReadCondition(
                 reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Alive
             )
-            found = reader.read(_READ_MAX, alive)
+            found = reader.read(_MAX_SAMPLES_PER_READ, alive)
         announced = policy_classes(self.dds).Userdata
         return frozenset(
             each.key.bytes
@@ -440,7 +442,7 @@ class Participant:
             if self._is_closing:
                 return []
             reader, alive = self._alive[kind]
-            found = reader.read(_READ_MAX, alive)
+            found = reader.read(_MAX_SAMPLES_PER_READ, alive)
         return [
             self.to_endpoint(each)
             for each in found

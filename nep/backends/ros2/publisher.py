@@ -43,17 +43,17 @@ def wait_for_matches(
         Names of the nodes whose endpoints are not matched.
     """
     deadline = time.monotonic() + HANDSHAKE_TIMEOUT_S
-    expected = [(each.gid, each.participant, "nepid" in each.announced) for each in known]
+    expected = [(each.gid, each.participant, "nepid" in each.user_data) for each in known]
     with participant.changed:
         while (unready := participant.matches.unmatched_gids(entities(), expected)) and (
             left := deadline - time.monotonic()
         ) > 0.0:
             participant.changed.wait(min(left, _POLL_S))
-        if any(each.participant != participant.gid and "nepid" not in each.announced for each in known):
+        if any(each.participant != participant.gid and "nepid" not in each.user_data for each in known):
             ready_at = time.monotonic() + _READY_DELAY_S
             while (left := ready_at - time.monotonic()) > 0.0:
                 participant.changed.wait(left)
-        return participant.names_of(unready)
+        return participant.remote_node_names(unready)
 
 
 def announcement(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) -> bytes:
@@ -152,7 +152,7 @@ class Ros2Publisher:
 
     def _id_of(self, handle: int) -> str:
         data = self._writer.get_matched_subscription_data(handle)
-        announced = {} if data is None else self._participant.to_endpoint(data).announced
+        announced = {} if data is None else self._participant.to_endpoint(data).user_data
         return announced.get("nepid") or f"handle {handle}"
 
     @property

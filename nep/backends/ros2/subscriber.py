@@ -224,7 +224,7 @@ class Ros2Subscriber(WakingSubscriber):
         source = _Source(
             endpoint_id(handle.to_bytes(8, "little", signed=handle < 0), None)
             if described is None
-            else endpoint_id(described.gid, described.announced.get("nepid")),
+            else endpoint_id(described.gid, described.user_data.get("nepid")),
             self._mapping.kind(self.spec.topic, self.spec.msg_type, is_latched=is_latched),
         )
         if described is not None:
@@ -269,9 +269,9 @@ class Ros2Subscriber(WakingSubscriber):
     def lost(self) -> int | None:
         """Number of messages that DDS reports as lost or that were dropped from the full queue."""
         with self._participant.changed:
-            return self._lost_before + self._lost_in_transit() + self._dropped
+            return self._lost_before + self._lost_in_transit_count() + self._dropped
 
-    def _lost_in_transit(self) -> int:
+    def _lost_in_transit_count(self) -> int:
         if self.is_closed or has_forked() or self._participant.has_closed():
             return 0
         return sum(int(each.get_sample_lost_status().total_count) for each in self._readers)
@@ -307,7 +307,7 @@ class Ros2Subscriber(WakingSubscriber):
         with self._participant.changed:
             if self.is_closed:
                 return
-            self._lost_before = self._lost_in_transit()
+            self._lost_before = self._lost_in_transit_count()
             self.is_closed = True
             if self._participant.has_closed():
                 self._readers.clear()

@@ -104,7 +104,7 @@ def _check_map(name: str, payload: object) -> None:
 
 
 def _pack_cdr(encoded: Encoded) -> bytes:
-    data = _plain_data(encoded)
+    data = _data_without_extension(encoded)
     if len(data) < 4 or data[:1] != b"\0" or data[1] > 1:
         raise WireError(_("a ROS message must begin with the 4 bytes of the CDR header"), len(data))
     return data
@@ -113,7 +113,7 @@ def _pack_cdr(encoded: Encoded) -> bytes:
 # ---- nep message types
 
 
-def _plain_data(encoded: Encoded) -> bytes:
+def _data_without_extension(encoded: Encoded) -> bytes:
     # ROS messages can't carry extensions. Raises `WireError` as other back ends do.
     if encoded.extension:
         extension_part(encoded.extension)
@@ -136,7 +136,7 @@ def _null_character_reason() -> str:
 
 
 def _pack_text(encoded: Encoded) -> bytes:
-    data = _plain_data(encoded)
+    data = _data_without_extension(encoded)
     if 0 in data:
         raise WireError(_null_character_reason(), len(data))
     return b"".join((_CDR_HEADER, struct.pack("<I", len(data) + 1), data, b"\0"))
@@ -150,7 +150,7 @@ def _unpack_text(cdr: bytes) -> memoryview:
 
 
 def _pack_bytes(encoded: Encoded) -> bytes:
-    data = _plain_data(encoded)
+    data = _data_without_extension(encoded)
     return b"".join((_CDR_HEADER, struct.pack("<III", 0, 0, len(data)), data))
 
 
@@ -196,7 +196,7 @@ def _raw_image_reason() -> str:
 
 
 def _pack_image(encoded: Encoded) -> bytes:
-    data = _plain_data(encoded)
+    data = _data_without_extension(encoded)
     try:
         kind = parse_header(data).kind
     except DecodeError as error:

@@ -12,7 +12,7 @@ from nep.messages.message import Message
 
 _logger = logging.getLogger("nep")
 _BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
-_WAIT_S = 0.1
+_WAIT_SLICE_S = 0.1
 
 
 class SinkSubscriber(Protocol):
@@ -94,7 +94,7 @@ class Inboxes:
 
     def _run(self) -> None:
         while not self._closing.is_set():
-            self.wait(self._sinks, _WAIT_S)
+            self.wait(self._sinks, _WAIT_SLICE_S)
             for subscriber in self._sinks:
                 messages = subscriber.take_batch()
                 if messages and subscriber.sink is not None:

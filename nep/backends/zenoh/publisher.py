@@ -15,7 +15,7 @@ from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
 from nep.protocol.requests import PublisherCount, PublisherRecord
-from nep.protocol.wire import EXTENSION, LATCHED, SIZE_MAX, Header, extension_part
+from nep.protocol.wire import EXTENSION, LATCHED, MAX_SIZE, Header, extension_part
 
 
 class ZenohPublisher:
@@ -122,7 +122,7 @@ class ZenohPublisher:
         data = encoded.data if isinstance(encoded.data, bytes) else bytes(encoded.data)
         extension = extension_part(encoded.extension) if encoded.extension else b""
         flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if extension else 0)
-        size = len(data) if len(data) <= SIZE_MAX else 0
+        size = len(data) if len(data) <= MAX_SIZE else 0
         with self._lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")

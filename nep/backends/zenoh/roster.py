@@ -64,9 +64,9 @@ class Roster:
         if not self._patterns:
             return found
         with self._lock:
-            return found + sum(len(self._subscribers[each]) for each in self._matching_locked(topic))
+            return found + sum(len(self._subscribers[each]) for each in self._matching_patterns_locked(topic))
 
-    def _matching_locked(self, topic: str) -> list[str]:
+    def _matching_patterns_locked(self, topic: str) -> list[str]:
         # Returns the patterns that match `topic`, except `topic` itself.
         return [each for each in self._patterns if each != topic and matches(each, topic)]
 
@@ -93,7 +93,7 @@ class Roster:
         with self._lock:
             entries = [
                 found
-                for each in (topic, *self._matching_locked(topic))
+                for each in (topic, *self._matching_patterns_locked(topic))
                 for found in self._subscribers.get(each, {}).values()
             ]
             return tuple(
@@ -118,8 +118,8 @@ class Roster:
     ) -> list[tuple[NodeRecord, tuple[PublisherRecord, ...], tuple[SubscriberRecord, ...]]]:
         """Return all nodes, each with its publishers and subscribers."""
         with self._lock:
-            publishers = _by_node(self._publishers)
-            subscribers = _by_node(self._subscribers)
+            publishers = _group_by_node(self._publishers)
+            subscribers = _group_by_node(self._subscribers)
             return [
                 (node, tuple(publishers.get(each, ())), tuple(subscribers.get(each, ())))
                 for each, node in self._nodes.items()
@@ -145,7 +145,7 @@ def _update_table(
     return len(entries) - before
 
 
-def _by_node(table: dict[str, dict[int, tuple[str, _Record]]]) -> dict[str, list[_Record]]:
+def _group_by_node(table: dict[str, dict[int, tuple[str, _Record]]]) -> dict[str, list[_Record]]:
     found: dict[str, list[_Record]] = {}
     for entries in table.values():
         for node_id, record in entries.values():

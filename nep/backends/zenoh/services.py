@@ -24,8 +24,8 @@ from nep.backends.services import (
     OpenCall,
     Outcome,
     ServerSpec,
-    Tally,
-    check_calls,
+    ServerStats,
+    check_call_limits,
     limit_reply_size,
     rejection_reply,
     size_error_text,
@@ -41,14 +41,14 @@ from nep.protocol.requests import (
     PublisherRecord,
     SubscriberCount,
     SubscriberRecord,
-    as_count,
+    clamp_count,
 )
-from nep.protocol.service_wire import NATIVE, PAYLOAD_MAX_BYTES, SERVICE_TYPE, Reply, topic_of
+from nep.protocol.service_wire import MAX_PAYLOAD_BYTES, NATIVE, SERVICE_TYPE, Reply, topic_of
 
 _logger = logging.getLogger("nep")
-_LATE_REPLY_S = 30.0
+_LATE_REPLY_WINDOW_S = 30.0
 """Time in seconds after a call's timeout in which its reply is still received, and counted as late."""
-_UNLIMITED_S = 1e9
+_MAX_QUERY_TIMEOUT_S = 1e9
 _TOKEN_DELAY_S = 0.5
 """Maximum time in seconds from the end of a server's queries to the removal of its liveliness token."""
 
@@ -63,7 +63,7 @@ class ZenohServer:
     ) -> None:
         self.spec = spec
         self.calls = CallQueue()
-        self.tally = Tally()
+        self.stats = ServerStats()
         self.is_closed = False
         self._session = session
         self._on_close = on_close
@@ -84,11 +84,11 @@ class ZenohServer:
         attachment: bytes = b"" if query.attachment is None else query.attachment.to_bytes()
         try:
             call = NATIVE.read_call([attachment, data])
-            if len(data) > PAYLOAD_MAX_BYTES:
+            if len(data) > MAX_PAYLOAD_BYTES:
                 raise WireError(size_error_text(len(data)))
         except WireError as error:
             query.drop()
-            self.tally.add_unreadable()
+            self.stats.add_unreadable()
             if self._refusals.add(error.reason):
                 _logger.warning("malformed call to '%s': %s", self.spec.service, error)
             return
@@ -108,7 +108,7 @@ class ZenohServer:
             incoming.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
 
     def _reply(self, query: Any, number: int, reply: Reply) -> bool:  # noqa: ANN401 - zenoh is not typed
-        self.tally.add(reply)
+        self.stats.add(reply)
         with self._lock:
             if query not in self._queries:
                 return False
@@ -124,7 +124,7 @@ class ZenohServer:
 
     def counts(self) -> PublisherCount:
         """Return the statistics shown in the graph."""
-        tally = self.tally
+        tally = self.stats
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def begin_close(self) -> None:
@@ -237,7 +237,7 @@ class ZenohClient(ClientCalls[_Call]):
         with self._lock:
             if self.is_closed:
                 raise self._closed_error()
-            check_calls(self.spec.service, len(self._calls), self._bytes, len(data))
+            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
             call = _Call(next(self._numbers), data, timeout_s, deadline, then)
             self._calls[call.number] = call
             self._bytes += len(data)
@@ -252,7 +252,11 @@ class ZenohClient(ClientCalls[_Call]):
         limit_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         parts = NATIVE.call(call.number, self.spec.codec.number, limit_s, call.data)
         call.data = b""  # the query outlives its timeout: release the payload
-        query_s = _UNLIMITED_S if limit_s is None else min(_UNLIMITED_S, limit_s + _LATE_REPLY_S)
+        query_s = (
+            _MAX_QUERY_TIMEOUT_S
+            if limit_s is None
+            else min(_MAX_QUERY_TIMEOUT_S, limit_s + _LATE_REPLY_WINDOW_S)
+        )
         try:
             self._session.call(
                 key,
@@ -350,7 +354,7 @@ class ZenohClient(ClientCalls[_Call]):
 
     def counts(self) -> SubscriberCount:
         """Return the statistics shown in the graph."""
-        return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed))
+        return SubscriberCount(self.spec.id, clamp_count(self._answered), clamp_count(self._failed))
 
     # ---- closing
 

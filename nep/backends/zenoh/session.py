@@ -52,7 +52,7 @@ from nep.protocol.service_wire import service_of
 from nep.system.cpu import CpuLoad
 
 _logger = logging.getLogger("nep")
-_GRACE_S = 1.0
+_TIMEOUT_GRACE_S = 1.0
 """Time in seconds that is added to a query's timeout here, because zenoh normally reports the timeout."""
 _HANDSHAKE_TIMEOUT_S = 10.0
 _MAX_REPLIES, _MAX_LIST_ITEMS = 100, 20_000
@@ -85,7 +85,7 @@ class PendingQuery:
     def __init__(self, timeout_s: float, on_finished: Callable[[], None] | None = None) -> None:
         self._on_finished = on_finished
         self.replies: dict[str, bytes] = {}
-        self._ends_at = time.monotonic() + timeout_s + _GRACE_S
+        self._ends_at = time.monotonic() + timeout_s + _TIMEOUT_GRACE_S
         self._is_finished = False
         self._changed = threading.Condition()
 

@@ -15,12 +15,12 @@ from nep.backends.zenoh.inboxes import Inboxes
 from nep.backends.zenoh.keys import topic_of
 from nep.backends.zeromq.loss import PublisherTracker
 from nep.backends.zeromq.sockets import RejectionLog
-from nep.backends.zeromq.sub_socket import CarefulParser
+from nep.backends.zeromq.sub_socket import MessageParser
 from nep.errors import WireError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
-from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
+from nep.protocol.requests import RemotePublisher, SubscriberCount, clamp_count
 from nep.protocol.topic_pattern import matches
 from nep.protocol.wire import HEADER_BYTES, hello_part, read_header, topic_part
 
@@ -38,7 +38,7 @@ class _TopicParser(NamedTuple):
     # alone.
     topic: bytes
     subscriber_part: bytes
-    parser: CarefulParser
+    parser: MessageParser
 
 
 class ZenohSubscriber(WakingSubscriber):
@@ -72,7 +72,7 @@ class ZenohSubscriber(WakingSubscriber):
     def _new_topic_parser(self, topic: str) -> _TopicParser:
         spec = self.spec if topic == self.spec.topic else replace(self.spec, topic=topic)
         own = hello_part(spec.id, topic)
-        parser = CarefulParser(
+        parser = MessageParser(
             spec, own, self._sources, self._remove_publisher, lambda _publisher, _seq: None
         )
         return _TopicParser(topic_part(topic), own, parser)
@@ -144,7 +144,7 @@ class ZenohSubscriber(WakingSubscriber):
     def counts(self) -> SubscriberCount:
         """Return the statistics shown in the graph."""
         problem = self._problem or self._refusals.recent_message()
-        return SubscriberCount(self.spec.id, as_count(self.received), as_count(self.lost), problem)
+        return SubscriberCount(self.spec.id, clamp_count(self.received), clamp_count(self.lost), problem)
 
     # ---- callbacks in zenoh's threads
 
@@ -192,7 +192,7 @@ class ZenohSubscriber(WakingSubscriber):
                 return
             self._enqueue(topic_parser.parser.parse(first, rest))
             if first == topic_parser.subscriber_part and len(rest) == 1:  # end of the reply to a hello
-                self._release_early(read_header(rest[0]).publisher)
+                self._deliver_early_messages(read_header(rest[0]).publisher)
         except WireError as error:
             if self._refusals.add(error.reason):
                 _logger.warning("malformed message on '%s': %s", self.spec.topic, error)
@@ -201,7 +201,7 @@ class ZenohSubscriber(WakingSubscriber):
         header = read_header(rest[0])
         is_early = self._early.queue_if_early(header, (topic_parser, rest), sum(map(len, rest)))
         if not is_early:  # messages queued before this one need not wait any longer, either
-            self._release_early(header.publisher)
+            self._deliver_early_messages(header.publisher)
         return is_early
 
     def _enqueue(self, message: Message | None) -> None:
@@ -209,7 +209,7 @@ class ZenohSubscriber(WakingSubscriber):
             self._sources.count_dropped(self._inbox.put(message))
             self.notify_waiting()
 
-    def _release_early(self, publisher: int) -> None:
+    def _deliver_early_messages(self, publisher: int) -> None:
         for topic_parser, rest in self._early.pop(publisher):
             self._enqueue(topic_parser.parser.parse(topic_parser.topic, rest))
 
@@ -217,7 +217,7 @@ class ZenohSubscriber(WakingSubscriber):
         """Stop waiting for the replies of these publishers to a hello, and deliver their queued messages."""
         with self._inboxes.changed:
             for publisher in publishers:
-                self._release_early(publisher)
+                self._deliver_early_messages(publisher)
 
     def add_publisher(self, remote: RemotePublisher) -> None:
         """Add a publisher, which removes silent publishers that it replaces."""

@@ -20,7 +20,7 @@ from dataclasses import replace
 
 import zmq
 
-from nep.backends.zeromq.sockets import LOOPBACK, Socket, bind_free_port, keep_alive
+from nep.backends.zeromq.sockets import LOOPBACK, Socket, bind_free_port, enable_keep_alive
 from nep.errors import AddressInUseError, TooManyFilesError
 from nep.protocol.requests import RemotePublisher
 from nep.system.addresses import endpoint_of, is_loopback, reachable_endpoint
@@ -152,7 +152,7 @@ class Bindings:
         for host in hosts:
             if host not in self._bound:
                 try:
-                    keep_alive(self._socket, endpoint_of(f"{host}:*"), is_watched=self._is_watched)
+                    enable_keep_alive(self._socket, endpoint_of(f"{host}:*"), is_watched=self._is_watched)
                     self._bound[host] = bind_free_port(self._socket, host)
                     name = _bind_unix_socket(self._socket, self._bound[host]) if self._may_be_local else ""
                     if name:

@@ -43,7 +43,7 @@ class CheckedSubSocket(SubSocket):
             if self._is_authentic(parts):
                 self._pending_parts = parts
             else:
-                self.refusals.add(_("a message wasn't sent by the publisher that it names"))
+                self.rejections.add(_("a message wasn't sent by the publisher that it names"))
         frame = self._pending_parts.pop(0)
         return frame.bytes if copy else frame
 

@@ -62,7 +62,7 @@ _ROOM_CHECKS, _ROOM_CHECK_S = 10, 0.01
 _ReadyKey = tuple[selectors.SelectorKey, int]
 _EPOLL_TICK_S = 0.001
 _EPOLL_SELECTOR = getattr(selectors, "EpollSelector", ())
-_SELECT_MAX_FD = 1024
+_MAX_SELECT_FD = 1024
 """Limit of `select`, which supports only file descriptors below this number."""
 
 
@@ -316,7 +316,7 @@ def _select(selector: selectors.BaseSelector, timeout_s: float | None) -> Sequen
         timeout_s
         and timeout_s < _EPOLL_TICK_S
         and isinstance(selector, _EPOLL_SELECTOR)
-        and selector.fileno() < _SELECT_MAX_FD
+        and selector.fileno() < _MAX_SELECT_FD
     ):
         if not select.select((selector.fileno(),), (), (), timeout_s)[0]:
             return ()

@@ -275,7 +275,7 @@ class OriginalSubSocket(UnbatchedReader):
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         self.fd = int(socket.getsockopt(zmq.FD))
-        self.refusals = RejectionLog()
+        self.rejections = RejectionLog()
         self.received = 0
         self.lost: int | None = None
         self.problem = ""
@@ -299,7 +299,7 @@ class OriginalSubSocket(UnbatchedReader):
             except zmq.Again:
                 return None
             if len(parts) != 1:
-                self.refusals.add(
+                self.rejections.add(
                     _("a message of the original NEP must have one part, but this one has {count}").format(
                         count=len(parts)
                     )
@@ -308,7 +308,7 @@ class OriginalSubSocket(UnbatchedReader):
             try:
                 data = from_frame(self._spec.topic, self._spec.msg_type, self._codec.name, parts[0])
             except WireError as error:
-                self.refusals.add(error.reason)
+                self.rejections.add(error.reason)
                 continue
             if data is not None:
                 self.received += 1

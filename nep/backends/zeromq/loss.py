@@ -16,11 +16,11 @@ from nep.system.computer import computer_id
 
 BYE_TIMEOUT_S = 3.0
 """Maximum time in seconds in which the last messages of an unregistered publisher can still arrive."""
-EARLY_MESSAGES_S = 5.0
-GAP_MAX = 2**32
+EARLY_MESSAGE_WINDOW_S = 5.0
+MAX_GAP = 2**32
 """Maximum accepted gap in sequence numbers, which is an hour at a million messages per second."""
 MIN_RECONNECT_S, MAX_RECONNECT_S = 2.0, 30.0
-UNLISTED_MAX = 1000
+MAX_UNLISTED_PUBLISHERS = 1000
 """Maximum number of tracked publishers that the master doesn't list.
 
 Limited because any sender can invent publisher ids.
@@ -110,7 +110,7 @@ class PublisherTracker:
         if source is None:
             source = self.by_id[publisher] = TrackedPublisher()
             self._unlisted[publisher] = None
-            if len(self._unlisted) > UNLISTED_MAX:
+            if len(self._unlisted) > MAX_UNLISTED_PUBLISHERS:
                 self.pop(next(iter(self._unlisted)))
         return source
 
@@ -174,7 +174,7 @@ class PublisherTracker:
         source = self.get(publisher)
         source.has_responded = source.is_connected = True
         last = source.last
-        if last is not None and seq - last > GAP_MAX:
+        if last is not None and seq - last > MAX_GAP:
             if not source.jump_seq or source.jump_seq != seq - 1:
                 source.jump_seq = seq
                 raise WireError(f"its sequence number jumps from {last} to {seq}", code="seq-leap")
@@ -207,7 +207,7 @@ class PublisherTracker:
             return False
         now = time.monotonic()
         if source.early_until is None:
-            source.early_until = now + EARLY_MESSAGES_S
+            source.early_until = now + EARLY_MESSAGE_WINDOW_S
         return now < source.early_until
 
     def advance_to(self, publisher: int, seq: int) -> bool:
@@ -218,7 +218,7 @@ class PublisherTracker:
         """
         source = self.get(publisher)
         source.has_responded = source.is_connected = True
-        if source.last is not None and seq - source.last > GAP_MAX:
+        if source.last is not None and seq - source.last > MAX_GAP:
             return False
         if source.last is not None and seq > source.last:
             self.lost += seq - source.last
@@ -234,7 +234,7 @@ class PublisherTracker:
         included, because they may have ended while this computer was disconnected.
         """
         source = self.by_id.get(publisher)
-        if source is None or source.last is None or seq - source.last > GAP_MAX:
+        if source is None or source.last is None or seq - source.last > MAX_GAP:
             return
         if source.announced_seq > source.last:
             if source.late_to != source.last:
@@ -290,7 +290,7 @@ class PublisherTracker:
         over = [
             each for each, source in all_ if source.bye_deadline is not None and now >= source.bye_deadline
         ]
-        return silent[: max(0, len(silent) - UNLISTED_MAX)] + over
+        return silent[: max(0, len(silent) - MAX_UNLISTED_PUBLISHERS)] + over
 
     def unresponsive_publishers(self, now: float) -> list[int]:
         """Return the ids of publishers from which nothing was received before the reconnection time."""

@@ -28,15 +28,15 @@ from nep.errors import (
     TooManyFilesError,
 )
 from nep.i18n import _
-from nep.messages.clocks import ClockDifference, is_clock
+from nep.messages.clocks import ClockDifference, is_plausible_clock
 from nep.protocol.clock_samples import ClockSamples, Moment
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
-    RENEW_S,
-    Added,
+    RENEW_INTERVAL_S,
+    AddedReply,
     AddPublisher,
     AddSubscriber,
-    Found,
+    FoundReply,
     GraphReply,
     Join,
     Leave,
@@ -51,22 +51,22 @@ from nep.protocol.requests import (
     RemovePublisher,
     RemoveSubscriber,
     Renew,
-    Renewed,
+    RenewedReply,
     Reply,
     ReportMissing,
     SubscriberCount,
     SubscriberRecord,
 )
 from nep.protocol.topic_pattern import matches
-from nep.system.addresses import MasterName, is_endpoint, is_loopback, resolve_host
+from nep.system.addresses import MasterNameResolver, is_endpoint, is_loopback, resolve_host
 from nep.system.cpu import CpuLoad
 
-_MAX_RENEW_S = 30.0
+_MAX_RENEW_INTERVAL_S = 30.0
 """Longest renewal interval in seconds that is accepted from a master."""
 
 _logger = logging.getLogger("nep")
 
-_ADDRESS_CHECK_S = 1.0
+_ADDRESS_CHECK_INTERVAL_S = 1.0
 """Interval in seconds for checking whether the publishers must bind other addresses."""
 _JOIN_RETRY_S = 0.5
 _RECONNECT_S, _RECONNECT_FAR_S = 2.0, 2 * CONNECT_TIMEOUT_MS / 1000
@@ -135,7 +135,7 @@ class RenewalTimer:
 
     def __init__(self) -> None:
         self.due_at = 0.0
-        self._renew_s = RENEW_S
+        self._renew_s = RENEW_INTERVAL_S
 
     def start(self, now: float) -> None:
         """Record a renewal sent at `now` (`time.monotonic`) and schedule the next one.
@@ -151,7 +151,7 @@ class RenewalTimer:
             renew_s: Interval in seconds.
             now: Current time (`time.monotonic`).
         """
-        self._renew_s = min(_MAX_RENEW_S, max(RENEW_S, renew_s))
+        self._renew_s = min(_MAX_RENEW_INTERVAL_S, max(RENEW_INTERVAL_S, renew_s))
         self.due_at = now + self._renew_s
 
 
@@ -195,7 +195,7 @@ class MasterSession:
         self._reconnect_at = time.monotonic() + self._reconnect_s
         self._served_hosts: tuple[str, ...] = ()
         self._own_host = LOOPBACK
-        self._name = MasterName(address, self._set_address, look_up)
+        self._name = MasterNameResolver(address, self._set_address, look_up)
         if self._name.known:
             self._set_address(self._name.known)
         self._name.resolve(time.monotonic())
@@ -245,7 +245,7 @@ class MasterSession:
 
     def add_publisher(
         self, record: PublisherRecord, publisher: SessionPublisher, wait_s: float | None
-    ) -> Added:
+    ) -> AddedReply:
         """Register a publisher and return the master's reply with the subscribers to wait for.
 
         Args:
@@ -264,7 +264,7 @@ class MasterSession:
             raise
         with self._lock:
             self._confirmed.add(record.id)
-        added = reply if isinstance(reply, Added) else Added(reply.epoch, reply.revision)
+        added = reply if isinstance(reply, AddedReply) else AddedReply(reply.epoch, reply.revision)
         self._served_hosts = (
             added.hosts
         )  # the first registration returns the addresses that the master serves
@@ -279,7 +279,7 @@ class MasterSession:
         record: SubscriberRecord,
         subscriber: SessionSubscriber | PatternSubscriber,
         wait_s: float | None,
-    ) -> Found:
+    ) -> FoundReply:
         """Register a subscriber and return the master's reply with the publishers to connect to.
 
         Raises the same errors as `RpcClient.request`.
@@ -293,8 +293,8 @@ class MasterSession:
             raise
         with self._lock:
             self._confirmed.add(record.id)
-        if not isinstance(reply, Found):
-            return Found(reply.epoch, reply.revision)
+        if not isinstance(reply, FoundReply):
+            return FoundReply(reply.epoch, reply.revision)
         return replace(reply, publishers=self._select_endpoints(reply.publishers))
 
     def remove_publisher(self, publisher: int, last_seq: int) -> None:
@@ -332,7 +332,7 @@ class MasterSession:
             )
         return reply.view
 
-    def begin_leave(self) -> None:
+    def start_leave(self) -> None:
         """Unregister the node if the master is connected, without waiting for the reply."""
         with self._lock:
             if self._is_closed:
@@ -387,7 +387,7 @@ class MasterSession:
             self._reconnect_if_due(now)
         is_due = now >= self._renewal_timer.due_at
         if is_due or now >= self._address_check_at:
-            self._address_check_at = now + _ADDRESS_CHECK_S
+            self._address_check_at = now + _ADDRESS_CHECK_INTERVAL_S
             self._update_addresses()
         if is_due:
             self._renewal_timer.start(now)
@@ -437,16 +437,16 @@ class MasterSession:
         return tuple(select_endpoint(remote, self._name.known or self.address) for remote in remotes)
 
     def _handle_reply(self, answer: Reply | Push, now: float) -> None:
-        if isinstance(answer, Added | Found | Renewed) and answer.hosts != self._served_hosts:
+        if isinstance(answer, AddedReply | FoundReply | RenewedReply) and answer.hosts != self._served_hosts:
             self._served_hosts = answer.hosts
             self._renewal_timer.due_at = now
         if isinstance(answer, PublisherAdded):
             self._handle_publisher_added(answer)
         elif isinstance(answer, PublisherRemoved):
             self._handle_publisher_removed(answer)
-        elif isinstance(answer, Renewed):
+        elif isinstance(answer, RenewedReply):
             self._handle_renewed(answer, now)
-        elif isinstance(answer, Added | Found) and self._epoch == 0:
+        elif isinstance(answer, AddedReply | FoundReply) and self._epoch == 0:
             self._epoch = answer.epoch
         if self._epoch not in {0, answer.epoch}:
             self._join(now)
@@ -493,15 +493,15 @@ class MasterSession:
 
     def _add_clock_sample(self, sent: Moment, answer: Reply) -> None:
         # Compares this computer's clock with the master's by the times of a renewal and its reply.
-        if not isinstance(answer, Renewed) or answer.epoch != self._epoch or not answer.times:
+        if not isinstance(answer, RenewedReply) or answer.epoch != self._epoch or not answer.times:
             return
         was_known = self._clock.offset() is not None
         if len(answer.times) != 2:
-            self._calls.refusals.add(_("a reply to a renewal must have two times"))
+            self._calls.rejections.add(_("a reply to a renewal must have two times"))
         elif self._clock.add(sent, *answer.times, self._read_at) and not was_known:
             self._renewal_timer.due_at = self._read_at.steady_ns / 1e9  # other nodes wait for it
 
-    def _handle_renewed(self, answer: Renewed, now: float) -> None:
+    def _handle_renewed(self, answer: RenewedReply, now: float) -> None:
         if answer.again:
             self._join(now)
             return
@@ -514,15 +514,15 @@ class MasterSession:
         for _record, each in self._all_subscribers():
             each.handle_renewal(now, answer.last_seqs.items())
 
-    def _parse_clock_differences(self, answer: Renewed) -> Mapping[str, ClockDifference]:
+    def _parse_clock_differences(self, answer: RenewedReply) -> Mapping[str, ClockDifference]:
         known_at_ns = time.monotonic_ns()
         found = {
             node_id: ClockDifference(*clock_times, known_at_ns)
             for node_id, clock_times in answer.clocks.items()
-            if len(clock_times) == 2 and is_clock(clock_times[0] // 2, clock_times[1] // 2)
+            if len(clock_times) == 2 and is_plausible_clock(clock_times[0] // 2, clock_times[1] // 2)
         }
         if len(found) < len(answer.clocks):
-            self._calls.refusals.add(_("a reported clock difference is impossible"))
+            self._calls.rejections.add(_("a reported clock difference is impossible"))
         return found
 
     def _update_clocks(self, clocks: Mapping[str, ClockDifference]) -> None:
@@ -535,7 +535,9 @@ class MasterSession:
 
     def _join(self, now: float) -> None:
         # Registers everything again, at most once per `_JOIN_RETRY_S`.
-        self._renewal_timer.set_interval(RENEW_S, now)  # the new master hasn't requested an interval yet
+        self._renewal_timer.set_interval(
+            RENEW_INTERVAL_S, now
+        )  # the new master hasn't requested an interval yet
         if now < self._join_retry_at:
             return
         self._join_retry_at = now + _JOIN_RETRY_S
@@ -549,7 +551,7 @@ class MasterSession:
             self._calls.notify(request, then=lambda reply: self._handle_joined(reply, items))
 
     def _handle_joined(self, reply: Reply, items: set[int]) -> None:
-        if not isinstance(reply, Found):
+        if not isinstance(reply, FoundReply):
             return
         self._epoch, self._revision = reply.epoch, reply.revision
         self._clock.clear()  # the master may run on another computer now

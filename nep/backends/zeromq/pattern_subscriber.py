@@ -23,7 +23,7 @@ from nep.errors import NepError
 from nep.messages.clocks import ClockDifference
 from nep.messages.message import Message
 from nep.messages.queue import MAX_MESSAGES, Inbox
-from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
+from nep.protocol.requests import RemotePublisher, SubscriberCount, clamp_count
 from nep.system.log_rarely import is_logged
 from nep.system.wakeup import Waker
 
@@ -136,7 +136,7 @@ class PatternSubscriber(WakingSubscriber):
         with self._members_lock:
             problems = (each.counts().problem for each in self._members.values())
             problem = self._problem or self._member_error or next(filter(None, problems), "")
-            return SubscriberCount(self.spec.id, as_count(self.received), as_count(self.lost), problem)
+            return SubscriberCount(self.spec.id, clamp_count(self.received), clamp_count(self.lost), problem)
 
     # ---- publishers
 

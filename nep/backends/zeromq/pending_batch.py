@@ -15,23 +15,23 @@ from typing import Any, Protocol
 from nep.backends.base import PublishHooks
 from nep.messages.codecs import NULL
 from nep.messages.encoded import Encoded
-from nep.protocol.batch import BATCH_MAX
+from nep.protocol.batch import MAX_BATCH_MESSAGES
 
 BATCH_WINDOW_NS = 20_000
 MAX_DELAY_NS = 100_000
-MAX_PENDING = 64
+MAX_PENDING_MESSAGES = 64
 FULL_BATCH_BYTES = 65_536
 """Size in bytes at which a batch is sent. Copying more would take longer than sending separately."""
 MAX_BATCHED_BYTES = 16_384
 """Maximum size in bytes of a message in a batch. Copying larger messages would cost more than it saves."""
-_BURST_CHECK_S = 500e-6
+_BURST_CHECK_INTERVAL_S = 500e-6
 """Interval in seconds of the I/O thread's checks while the publisher itself sends full batches."""
 
 
 _time_ns = time.time_ns
 
 
-class SendPath(Protocol):
+class BatchOwner(Protocol):
     """Interface of a publisher to its batch."""
 
     has_subscribers: bool
@@ -97,7 +97,7 @@ class PendingBatch:
             self.until_ns = stamp_ns + BATCH_WINDOW_NS
 
     def publish_function(
-        self, hooks: PublishHooks, path: SendPath, lock: threading.Lock
+        self, hooks: PublishHooks, path: BatchOwner, lock: threading.Lock
     ) -> Callable[..., None]:
         """Return the function that implements `Publisher.publish`.
 
@@ -131,7 +131,7 @@ class PendingBatch:
                 return
             put((data, stamp_ns))
             count = len(pending)
-            if count >= MAX_PENDING or count * len(data) >= FULL_BATCH_BYTES:
+            if count >= MAX_PENDING_MESSAGES or count * len(data) >= FULL_BATCH_BYTES:
                 with lock:
                     path.flush_locked()
                 batch.has_sent_full = True
@@ -151,7 +151,7 @@ class PendingBatch:
 
         At least one message must be pending.
         """
-        taken = self.pending[:BATCH_MAX]
+        taken = self.pending[:MAX_BATCH_MESSAGES]
         del self.pending[: len(taken)]  # more may have been appended meanwhile
         self.until_ns = taken[-1][1] + BATCH_WINDOW_NS if self.is_allowed else 0
         return taken
@@ -171,10 +171,10 @@ class PendingBatch:
         left_ns = pending[0][1] + MAX_DELAY_NS - now_ns if pending else 0
         if 0 < left_ns <= MAX_DELAY_NS:  # larger values mean that the clock was set
             self.is_flush_scheduled = True
-            return _BURST_CHECK_S if had_full else left_ns / 1e9
+            return _BURST_CHECK_INTERVAL_S if had_full else left_ns / 1e9
         return 0.0
 
     @property
     def burst_check_s(self) -> float:
         """Time in seconds until the next check while nothing is pending; 0 after the end of a burst."""
-        return _BURST_CHECK_S if self.is_flush_scheduled else 0.0
+        return _BURST_CHECK_INTERVAL_S if self.is_flush_scheduled else 0.0

@@ -36,16 +36,16 @@ from nep.backends.zeromq.subscriptions import Subscriptions
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
-from nep.protocol.batch import batch_part
+from nep.protocol.batch import encode_batch
 from nep.protocol.requests import ExpectedSubscriber, PublisherCount
 from nep.protocol.wire import (
     BYE,
     LATCHED,
+    MAX_SIZE,
     OFFER,
     SHARED,
-    SIZE_MAX,
+    encode_form,
     extension_part,
-    form_of,
     pack_header,
     parse_hello,
     topic_part,
@@ -57,7 +57,7 @@ _SNDMORE = int(zmq.SNDMORE)  # plain ints: looking up pyzmq's enum members costs
 _EVENTS = int(zmq.EVENTS)
 _POLLIN = int(zmq.POLLIN)
 _time_ns = time.time_ns
-_NO_COPY_BYTES = 65_536
+_MIN_ZERO_COPY_BYTES = 65_536
 _MAX_ONE_PART_BYTES = MAX_BATCHED_BYTES
 """Maximum size in bytes of messages sent in one part if all subscribers accept this form.
 
@@ -69,7 +69,7 @@ _READ_INTERVAL_NS = 500_000
 The I/O thread checks for subscriptions afterwards, because sending may have consumed the edge of
 ZMQ_FD.
 """
-_IO_CHECK_S = 0.02
+_IO_CHECK_INTERVAL_S = 0.02
 _BYE_RETRY_S = 0.05
 
 
@@ -171,7 +171,7 @@ class NativePublisher(HandshakePublisher):
         self._topic = topic_part(spec.topic)
         self._codec = spec.codec.number
         self._flags = LATCHED if spec.is_latched else 0
-        self._form = form_of(self._codec, self._flags)
+        self._form = encode_form(self._codec, self._flags)
         # `with` is three times faster on the lock than on the condition
         self._lock = threading.Lock()
         super().__init__(threading.Condition(self._lock), self._subscriptions.seen)
@@ -220,9 +220,9 @@ class NativePublisher(HandshakePublisher):
                 self._read_subscriptions_locked()
 
     @property
-    def refusals(self) -> RejectionLog:
+    def rejections(self) -> RejectionLog:
         """Log of rejected subscriptions."""
-        return self._subscriptions.refusals
+        return self._subscriptions.rejections
 
     @property
     def endpoints(self) -> tuple[str, ...]:
@@ -258,7 +258,7 @@ class NativePublisher(HandshakePublisher):
         else:
             self._send_now(data, extension_fields)
 
-    def quick_publish(self, asked: PublishHooks) -> Callable[..., None]:
+    def fast_publish_function(self, asked: PublishHooks) -> Callable[..., None]:
         """Return the fast publish function. See `nep.backends.base.SupportsQuickPublish`."""
         return self._batch.publish_function(asked, self, self._lock)
 
@@ -347,7 +347,9 @@ class NativePublisher(HandshakePublisher):
             return None if shared is None or self.is_closed else shared.borrow_memory(size_bytes)
 
     def _send_offer_locked(self, subscriber: int, generation: int) -> None:
-        notice = pack_header(form_of(self._codec, OFFER), generation, self._count, time.time_ns(), self._id)
+        notice = pack_header(
+            encode_form(self._codec, OFFER), generation, self._count, time.time_ns(), self._id
+        )
         self._send_parts_locked(self._subscriptions.hellos[subscriber], (notice,))
 
     def _poll_subscriptions_locked(self, stamp_ns: int) -> None:
@@ -363,8 +365,8 @@ class NativePublisher(HandshakePublisher):
         # Sends three parts.
         send = self._send
         send(self._topic, _SNDMORE)
-        send(pack_header(self._form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id), _SNDMORE)
-        send(data, 0, size < _NO_COPY_BYTES)
+        send(pack_header(self._form, size if size <= MAX_SIZE else 0, seq, stamp_ns, self._id), _SNDMORE)
+        send(data, 0, size < _MIN_ZERO_COPY_BYTES)
 
     def flush_soon_locked(self) -> None:
         """Let the I/O thread send pending messages soon. Call with the lock held."""
@@ -390,7 +392,7 @@ class NativePublisher(HandshakePublisher):
             count, payloads, stamps_ns = len(taken), *zip(*taken, strict=True)
             size = sum(map(len, payloads))
             if count > 1 and batch.is_allowed and self._bytes + size < self._full_path_at:
-                part = batch_part(self._topic, self._form, self._count + 1, self._id, stamps_ns, payloads)
+                part = encode_batch(self._topic, self._form, self._count + 1, self._id, stamps_ns, payloads)
                 self._count += count
                 self._bytes += size
                 self._send(part)
@@ -423,7 +425,7 @@ class NativePublisher(HandshakePublisher):
 
     def _message_parts(self, data: Part, extension: bytes | None, size: int, flags: int) -> tuple[Part, ...]:
         form = self._form | flags << 16 | (0 if extension is None else EXTENSION_FLAG << 16)
-        size_field = size if size <= SIZE_MAX else 0
+        size_field = size if size <= MAX_SIZE else 0
         header = pack_header(form, size_field, self._count, self._last_stamp_ns or 0, self._id)
         return (header, data) if extension is None else (header, data, extension)
 
@@ -496,8 +498,8 @@ class NativePublisher(HandshakePublisher):
         send = self._send
         send(first, _SNDMORE)
         for part in tail[:-1]:
-            send(part, _SNDMORE, len(part) < _NO_COPY_BYTES)
-        send(tail[-1], 0, len(tail[-1]) < _NO_COPY_BYTES)
+            send(part, _SNDMORE, len(part) < _MIN_ZERO_COPY_BYTES)
+        send(tail[-1], 0, len(tail[-1]) < _MIN_ZERO_COPY_BYTES)
 
     # ---- subscriptions
 
@@ -515,7 +517,7 @@ class NativePublisher(HandshakePublisher):
             count, self._count_at_check = self._count_at_check, self._count
             # While another thread publishes without reading subscriptions, this thread keeps checking.
             self._is_io_scheduled = self._is_io_scheduled and count != self._count and not self.is_closed
-            return PollState(due=now + _IO_CHECK_S) if self._is_io_scheduled else PollState()
+            return PollState(due=now + _IO_CHECK_INTERVAL_S) if self._is_io_scheduled else PollState()
 
     def _read_subscriptions_locked(self) -> None:
         # Reads until the socket is empty.
@@ -553,7 +555,7 @@ class NativePublisher(HandshakePublisher):
         self._send_parts_locked(own, (self._encode_notice(0),))
 
     def _encode_notice(self, flags: int) -> bytes:
-        return pack_header(form_of(self._codec, flags), 0, self._count, time.time_ns(), self._id)
+        return pack_header(encode_form(self._codec, flags), 0, self._count, time.time_ns(), self._id)
 
     # ---- closing
 

@@ -16,12 +16,12 @@ from nep.backends.zeromq.sockets import CONNECT_TIMEOUT_MS, RejectionLog, Socket
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
 from nep.i18n import _
 from nep.protocol.encoding import call_of_graph_reply, decode_reply, encode_request
-from nep.protocol.requests import Push, Refused, Reply, Request
+from nep.protocol.requests import Push, RejectedReply, Reply, Request
 from nep.system.addresses import endpoint_of, is_loopback
 
 _logger = logging.getLogger("nep")
 
-_READ_MAX = 50
+_MAX_MESSAGES_PER_READ = 50
 """Maximum number of replies read before other sockets are served."""
 _RESEND_S = 0.5
 """Interval in seconds for sending an unanswered request again, for example to a restarted master."""
@@ -71,7 +71,7 @@ class RpcClient:
         self._calls: dict[int, PendingRequest] = {}
         self._numbers = itertools.count(1)
         self._is_closed = False
-        self.refusals = RejectionLog()
+        self.rejections = RejectionLog()
         self.has_more = False
         """True if `read` has left messages unread."""
         self.is_connected = False
@@ -152,7 +152,7 @@ class RpcClient:
             return self._decode_reply(call.view)
         if call.reply is None:
             raise ClosedError("the node")
-        if isinstance(call.reply, Refused):
+        if isinstance(call.reply, RejectedReply):
             raise RequestRefusedError(call.reply.reason)
         return call.reply
 
@@ -186,7 +186,7 @@ class RpcClient:
         answers: list[ReceivedMessage] = []
         events = 0
         with self._changed:
-            while not (has_more := len(answers) >= _READ_MAX):
+            while not (has_more := len(answers) >= _MAX_MESSAGES_PER_READ):
                 events = self._events()
                 if events & zmq.POLLIN:
                     answer = self._read_one_locked()
@@ -271,11 +271,11 @@ class RpcClient:
         return ReceivedMessage(answer, call.callback)
 
     def _reject(self, error: WireError) -> None:
-        if self.refusals.add(error.reason):
+        if self.rejections.add(error.reason):
             _logger.warning(
                 "malformed message from the master at '%s' (%d so far): %s",
                 self.address,
-                self.refusals.count,
+                self.rejections.count,
                 error,
             )
 

@@ -162,7 +162,7 @@ def is_remote(endpoint: str) -> bool:
     return endpoint.startswith("tcp://") and not is_loopback(endpoint.removeprefix("tcp://"))
 
 
-def keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False) -> None:
+def enable_keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False) -> None:
     """Set socket options that detect within a dozen seconds that a peer's computer has vanished.
 
     Call before connecting or binding. Only needed for other computers, because on the same computer the

@@ -22,8 +22,8 @@ from nep.backends.zeromq.shared.payloads import SharedSources
 from nep.backends.zeromq.sockets import (
     RejectionLog,
     Socket,
+    enable_keep_alive,
     is_remote,
-    keep_alive,
     receive_high_water_mark,
     set_receive_timeout,
 )
@@ -39,7 +39,14 @@ from nep.messages.message import (
     new_message,
     received_message,
 )
-from nep.protocol.batch import BATCH_FORM_FLAG, BATCH_MAX, check_batch, entries, table_struct, unknown_codec
+from nep.protocol.batch import (
+    BATCH_FORM_FLAG,
+    MAX_BATCH_MESSAGES,
+    check_batch,
+    parse_entries,
+    table_struct,
+    unknown_codec_error,
+)
 from nep.protocol.requests import RemotePublisher
 from nep.protocol.wire import (
     BYE,
@@ -53,10 +60,10 @@ from nep.protocol.wire import (
     OfferAcceptance,
     acceptance_part,
     acknowledgement_part,
-    form_of,
+    encode_form,
     hello_part,
+    parse_remaining_parts,
     read_header,
-    split_rest,
     split_single_part,
     topic_part,
     unpack_header,
@@ -67,7 +74,7 @@ from nep.system.addresses import is_endpoint
 MessageBuffer = list[Message] | deque[Message]
 """Container to which received messages are appended."""
 
-_NO_COPY_BYTES = 8_192
+_MIN_ZERO_COPY_BYTES = 8_192
 """Minimum size in bytes of messages that libzmq receives into separate memory, which views can reference."""
 SHARED_FORM = SHARED << 16
 _Part = bytes | memoryview
@@ -83,10 +90,10 @@ _DONTWAIT = int(zmq.DONTWAIT)  # plain ints: looking up pyzmq's enum members cos
 _EVENTS = int(zmq.EVENTS)
 _RCVMORE = int(zmq.RCVMORE)
 _POLLIN = int(zmq.POLLIN)
-_TOO_SHORT = lazy("a message must have 3 or 4 parts, but this one is incomplete")
+_INCOMPLETE_MESSAGE_TEXT = lazy("a message must have 3 or 4 parts, but this one is incomplete")
 
 
-class CarefulParser:
+class MessageParser:
     """Parser for messages and notices outside the fast path. Performs no I/O.
 
     Args:
@@ -135,14 +142,14 @@ class CarefulParser:
         if is_alone and len(rest) == 1:
             self._handle_notice(read_header(bytes(rest[0])))
             return None
-        return self._parse_message(*split_rest(rest, is_one_part=is_one_part), is_alone=is_alone)
+        return self._parse_message(*parse_remaining_parts(rest, is_one_part=is_one_part), is_alone=is_alone)
 
     def parse_batch(self, first: bytes) -> list[Message]:
         """Return the messages of a batch, given as one part. Raises `WireError`."""
         topic, head, body = split_single_part(first)
         if topic != self._topic:
             raise _topic_error()
-        header, _payload, _extension = split_rest((head, body), is_one_part=True)
+        header, _payload, _extension = parse_remaining_parts((head, body), is_one_part=True)
         check_batch(header, body)
         one = header._replace(flags=0)
         read = (
@@ -152,7 +159,7 @@ class CarefulParser:
                 NO_EXTENSION,
                 is_alone=False,
             )
-            for each in entries(body)
+            for each in parse_entries(body)
         )
         return [each for each in read if each is not None]
 
@@ -180,7 +187,7 @@ class CarefulParser:
     ) -> Message | None:
         codec = codec_by_number(header.codec)
         if codec is None:
-            raise unknown_codec(header.codec)
+            raise unknown_codec_error(header.codec)
         if not is_alone and self._sources.is_early(header.publisher):
             return None
         if not self._sources.count_message(header.publisher, header.seq, is_alone=is_alone):
@@ -205,7 +212,7 @@ class CarefulParser:
             clock=source.clock,
         )
         # `kind` depends on both forms: a message with another codec takes the careful path again
-        plain = 0 if header.flags & EXTENSION else form_of(header.codec, header.flags & ~SHARED)
+        plain = 0 if header.flags & EXTENSION else encode_form(header.codec, header.flags & ~SHARED)
         if header.flags & SHARED:
             source.shared_form = plain and plain | SHARED_FORM
             source.form = source.form if source.form == plain else 0
@@ -217,7 +224,7 @@ class CarefulParser:
                 source.kind, shared, header.stamp_ns, header.seq, header.publisher, extension
             )
         # a small view must not keep a large receive buffer alive
-        is_large = len(payload) >= _NO_COPY_BYTES
+        is_large = len(payload) >= _MIN_ZERO_COPY_BYTES
         data = memoryview(payload).toreadonly() if is_large else bytes(payload)
         return received_message(source.kind, data, header.stamp_ns, header.seq, header.publisher, extension)
 
@@ -235,7 +242,7 @@ class SubSocket:
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         self.sources = PublisherTracker()
-        self.refusals = RejectionLog()
+        self.rejections = RejectionLog()
         self.fd = int(socket.getsockopt(zmq.FD))
         self._socket = socket
         self._recv: Callable[..., Any] = socket.recv
@@ -244,7 +251,7 @@ class SubSocket:
         self._hello = hello_part(spec.id, spec.topic, batches=True)
         self._id = spec.id
         self._shared = SharedSources(spec.id, self._confirm_offer)
-        self._parser = CarefulParser(
+        self._parser = MessageParser(
             spec, self._hello, self.sources, self.disconnect, self._acknowledge, self._shared
         )
         self._topic_length = len(self._topic)
@@ -314,7 +321,7 @@ class SubSocket:
             self._disconnect(source.endpoint)
         source.reset_connection(endpoint)
         try:
-            keep_alive(self._socket, endpoint)
+            enable_keep_alive(self._socket, endpoint)
             self._socket.connect(endpoint)
         except zmq.ZMQError as error:
             self._report_problem(source, endpoint, str(error))
@@ -340,7 +347,7 @@ class SubSocket:
         source.problem = _("can't connect to the endpoint '{shown}' of '{name}': {why}").format(
             shown=shown, name=name, why=why
         )
-        if self.refusals.add(source.problem):
+        if self.rejections.add(source.problem):
             _logger.warning("subscription to '%s': %s", self._name, source.problem)
 
     @property
@@ -459,7 +466,7 @@ class SubSocket:
         source = self.sources.by_id.get(publisher)
         count = int.from_bytes(first[body : body + 4], "little")
         is_next = source and source.last == seq - 1 and source.form | BATCH_FORM_FLAG == form
-        if not (source and is_next and 0 < count <= BATCH_MAX and len(first) == body + size):
+        if not (source and is_next and 0 < count <= MAX_BATCH_MESSAGES and len(first) == body + size):
             return self._read_any_batch(first, into)
         table = table_struct(count)
         at = body + table.size
@@ -549,7 +556,7 @@ class SubSocket:
         try:
             messages = self._parser.parse_batch(first)
         except WireError as error:
-            self.refusals.add(error.reason)
+            self.rejections.add(error.reason)
             return 0, 0
         into.extend(messages)
         return len(messages), 0
@@ -607,14 +614,14 @@ class SubSocket:
                     and source.last == seq - 1
                     and size not in self._ambiguous_sizes
                 ):
-                    data = recv(_DONTWAIT, size < _NO_COPY_BYTES)
+                    data = recv(_DONTWAIT, size < _MIN_ZERO_COPY_BYTES)
                     if len(data) == size:
                         self.sources.received += 1
                         source.last = seq
-                        raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
+                        raw = data if size < _MIN_ZERO_COPY_BYTES else memoryview(data).toreadonly()
                         return None, received_message(source.kind, raw, stamp_ns, seq, publisher)
         except zmq.Again:
-            self.refusals.add(_(_TOO_SHORT))
+            self.rejections.add(_(_INCOMPLETE_MESSAGE_TEXT))
             return None, None
         return self._parse_parts(first, head, data)
 
@@ -627,7 +634,7 @@ class SubSocket:
         rest: list[_Part] = [each.buffer if isinstance(each, zmq.Frame) else each for each in read]
         if rest and bytes(rest[-1][: len(self._hello)]).startswith((self._topic, self._hello)):
             following = bytes(rest.pop())
-            self.refusals.add(
+            self.rejections.add(
                 _("a message must have 3 or 4 parts, but this one has {count}").format(count=len(rest) + 1)
             )
             return following, None
@@ -639,7 +646,7 @@ class SubSocket:
         try:
             return None, self._parser.parse(first, rest)
         except WireError as error:
-            self.refusals.add(error.reason)
+            self.rejections.add(error.reason)
             return None, None
 
     def count_dropped(self, count: int) -> None:

@@ -34,7 +34,7 @@ from nep.backends.zeromq.sub_socket import MessageBuffer, SubSocket
 from nep.messages.clocks import ClockDifference
 from nep.messages.message import Message
 from nep.messages.queue import MAX_READ_AHEAD, Inbox, ReadAhead
-from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
+from nep.protocol.requests import RemotePublisher, SubscriberCount, clamp_count
 from nep.system.wakeup import Waker
 
 _READ_AHEAD_BYTES = 2**18
@@ -43,9 +43,9 @@ _logger = logging.getLogger("nep")
 _POLLIN = int(zmq.POLLIN)
 _INFINITE = math.inf
 LEASE_S = 0.02
-_WAITER_CHECK_S = 0.1
+_WAITER_CHECK_INTERVAL_S = 0.1
 """Interval in seconds at which the I/O thread checks whether a reader still waits."""
-_MAX_IO_DELAY_S = _WAITER_CHECK_S + LEASE_S
+_MAX_IO_DELAY_S = _WAITER_CHECK_INTERVAL_S + LEASE_S
 """Maximum time in seconds until the next check by the I/O thread.
 
 A read wakes the I/O thread only if the next check is later.
@@ -61,7 +61,7 @@ class Readable(Protocol):
     """Interface of a socket that returns messages. Guarded by the subscriber's lock."""
 
     fd: int
-    refusals: RejectionLog
+    rejections: RejectionLog
     """Log of rejected messages."""
 
     @property
@@ -262,7 +262,7 @@ class SocketSubscriber(Generic[R]):
     @property
     def refused(self) -> int:
         """Number of received frames rejected because they are not valid messages."""
-        return self._readable.refusals.count
+        return self._readable.rejections.count
 
     def report(self, problem: str) -> None:
         """Set the reason why messages can't be decoded; the next renewal reports it."""
@@ -270,9 +270,9 @@ class SocketSubscriber(Generic[R]):
 
     def counts(self) -> SubscriberCount:
         """Return the statistics that a renewal reports."""
-        problem = self._problem or self._readable.refusals.recent_message() or self._readable.problem
-        lost = None if self.lost is None else as_count(self.lost)
-        return SubscriberCount(self.spec.id, as_count(self.received), lost, problem)
+        problem = self._problem or self._readable.rejections.recent_message() or self._readable.problem
+        lost = None if self.lost is None else clamp_count(self.lost)
+        return SubscriberCount(self.spec.id, clamp_count(self.received), lost, problem)
 
     # ---- waiting
 
@@ -340,7 +340,7 @@ class SocketSubscriber(Generic[R]):
         sink = self.spec.sink
         if now < self._leased_until and not self.is_closed:
             # without the lock, which a waiting reader holds; a stale value is harmless
-            self._io_check_at = due = now + _WAITER_CHECK_S if self._waiters else self._leased_until
+            self._io_check_at = due = now + _WAITER_CHECK_INTERVAL_S if self._waiters else self._leased_until
             return PollState(pause_reading=True, due=due)
         with self._requested_lock():
             if self.is_closed:
@@ -349,7 +349,7 @@ class SocketSubscriber(Generic[R]):
                 # a reader in a long wait needs fewer checks than one that may stop at any moment
                 self._io_check_at = max(self._leased_until, now + LEASE_S)
                 if self._waiters and now >= self._leased_until:
-                    self._io_check_at = now + _WAITER_CHECK_S
+                    self._io_check_at = now + _WAITER_CHECK_INTERVAL_S
                 return PollState(pause_reading=True, due=self._io_check_at)
             self._io_check_at = _INFINITE
             batch: list[Message] = []

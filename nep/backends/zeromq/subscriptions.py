@@ -39,7 +39,7 @@ class Subscriptions:
         self._far: dict[int, RemoteConnection] = {}
         """Connections of subscribers on other computers, by id."""
         self.shared: SharedPayloads | None = None
-        self.refusals = RejectionLog()
+        self.rejections = RejectionLog()
         self._id = publisher
         self._name = topic
         self._topic = topic_part(topic)
@@ -113,7 +113,7 @@ class Subscriptions:
         if len(self.seen) >= MAX_SUBSCRIBERS and hello.subscriber not in self.seen:
             self._reject(f"a hello beyond the limit of {MAX_SUBSCRIBERS} subscribers")
             return None
-        if hello.one_part:  # its plain filter was counted before
+        if hello.reads_one_part:  # its plain filter was counted before
             left = self.legacy_filters.pop(self._topic, 0) - 1
             if left > 0:
                 self.legacy_filters[self._topic] = left
@@ -123,7 +123,7 @@ class Subscriptions:
         if self.shared is not None:
             self.shared.discard(hello.subscriber)
         self._without_batches.discard(hello.subscriber)
-        if not hello.batches:
+        if not hello.reads_batches:
             self._without_batches.add(hello.subscriber)
         if hello.acknowledges:
             self.windows[hello.subscriber] = SendWindow()  # a new connection: nothing is in flight
@@ -163,5 +163,5 @@ class Subscriptions:
             self.legacy_filters.pop(subscription, None)
 
     def _reject(self, reason: str) -> None:
-        if self.refusals.add(reason):
-            _logger.info("'%s' received %s", self._name, self.refusals.recent_message())
+        if self.rejections.add(reason):
+            _logger.info("'%s' received %s", self._name, self.rejections.recent_message())

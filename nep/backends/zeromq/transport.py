@@ -42,7 +42,7 @@ from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import ExpectedSubscriber, NodeRecord, PublisherRecord, SubscriberRecord
-from nep.protocol.wire import SUBSCRIPTION_MAX_BYTES
+from nep.protocol.wire import MAX_SUBSCRIPTION_BYTES
 from nep.system.descriptors import check_free_descriptors
 from nep.system.forks import close_in_child, watch
 from nep.system.wakeup import Waker
@@ -142,7 +142,7 @@ class ZeromqTransport:
 
     def create_publisher(self, spec: PublisherSpec) -> PublisherTransport:
         """Create a publisher. See `Transport.create_publisher`."""
-        with self._hold_context():
+        with self._acquired_context():
             if isinstance(spec.configuration, Direct):
                 return self._create_direct_publisher(spec, spec.configuration)
             return self._create_native_publisher(spec, spec.configuration)
@@ -205,7 +205,7 @@ class ZeromqTransport:
     def _new_xpub_socket(self, spec: PublisherSpec) -> Socket:
         socket = self._shared.socket(zmq.XPUB, f"a publisher of '{spec.topic}'")
         socket.setsockopt(zmq.XPUB_VERBOSE, 1)  # a reconnecting subscriber repeats its hello
-        socket.setsockopt(zmq.MAXMSGSIZE, SUBSCRIPTION_MAX_BYTES)  # applies to received messages
+        socket.setsockopt(zmq.MAXMSGSIZE, MAX_SUBSCRIPTION_BYTES)  # applies to received messages
         return socket
 
     def _add_publisher(self, publisher: OwnedPublisher) -> None:
@@ -231,7 +231,7 @@ class ZeromqTransport:
 
     def create_subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
         """Create a subscriber. See `Transport.create_subscriber`."""
-        with self._hold_context():
+        with self._acquired_context():
             if isinstance(spec.configuration, Direct):
                 return self._create_direct_subscriber(spec, spec.configuration)
             return self._create_native_subscriber(spec, spec.configuration)
@@ -326,7 +326,7 @@ class ZeromqTransport:
             io.add(subscriber)  # before `close` can remove the subscriber, which acquires this lock first
 
     @contextmanager
-    def _hold_context(self) -> Iterator[None]:
+    def _acquired_context(self) -> Iterator[None]:
         # Keeps the context while sockets are opened, also if `close` ends the last node meanwhile. Raises
         # `ClosedError`.
         with self._lock:
@@ -356,17 +356,17 @@ class ZeromqTransport:
 
     def create_server(self, spec: ServerSpec) -> ServerTransport:
         """Create a server. See `ServiceTransport.create_server`."""
-        with self._hold_context():
+        with self._acquired_context():
             return self._services.create_server(spec)
 
     def create_client(self, spec: ClientSpec) -> ClientTransport:
         """Create a client. See `ServiceTransport.create_client`."""
-        with self._hold_context():
+        with self._acquired_context():
             return self._services.create_client(spec)
 
     def create_surveyor(self, spec: ClientSpec) -> SurveyTransport:
         """Create a surveyor. See `ServiceTransport.create_surveyor`."""
-        with self._hold_context():
+        with self._acquired_context():
             return self._services.create_surveyor(spec)
 
     # ---- waiting
@@ -449,7 +449,7 @@ class ZeromqTransport:
             raise NepError(
                 _("a direct connection has no master, so there is no graph; use a node with a master")
             )
-        with self._hold_context():
+        with self._acquired_context():
             return self._session(configuration.master).query_graph(timeout_s)
 
     def begin_close(self) -> None:
@@ -461,7 +461,7 @@ class ZeromqTransport:
             sessions = list(self._sessions.values())
             publishers = list(self._publishers.values())
         for session in sessions:
-            session.begin_leave()
+            session.start_leave()
         self._services.begin_close()
         for publisher in publishers:
             publisher.send_bye()
@@ -506,7 +506,7 @@ class ZeromqTransport:
                 return
             if session.is_idle:
                 del self._sessions[address]
-                session.begin_leave()
+                session.start_leave()
                 session.close()
 
     def forked(self) -> None:

@@ -56,7 +56,7 @@ class ParameterForm:
         return self._shape.read(plain)
 
 
-def form_of(declared: type) -> ParameterForm | None:
+def create_form(declared: type) -> ParameterForm | None:
     """Return the form of a class, or None for a class that is not a dataclass, TypedDict or Enum.
 
     Raises `ValueError` when the type of a field can't be represented in JSON.

@@ -11,7 +11,7 @@ import orjson
 
 from nep.errors import ParameterError
 from nep.i18n import _, format_list
-from nep.patterns.parameters.form import ParameterForm, form_of
+from nep.patterns.parameters.form import ParameterForm, create_form
 from nep.protocol.wire import check_topic
 from nep.text import escaped, shortened
 
@@ -23,8 +23,8 @@ KINDS: Mapping[str, type] = {
     "list": list,
     "dict": dict,
 }
-_VALUE_MAX_BYTES = 2**20
-_CHOICES_MAX = 1000
+_MAX_VALUE_BYTES = 2**20
+_MAX_CHOICES = 1000
 _MAX_DESCRIPTION_LENGTH = 1000
 _MAX_SHOWN_LENGTH = 60
 _MAX_INT = 2**63 - 1
@@ -108,11 +108,11 @@ class NodeParameter:
             data = orjson.dumps(value)
         except (TypeError, ValueError) as error:
             raise self._error(value, str(error)) from error
-        if len(data) > _VALUE_MAX_BYTES:
+        if len(data) > _MAX_VALUE_BYTES:
             raise self._error(
                 value,
                 _("the value is {size} bytes; at most {most} are allowed").format(
-                    size=len(data), most=_VALUE_MAX_BYTES
+                    size=len(data), most=_MAX_VALUE_BYTES
                 ),
             )
         return cast("object", orjson.loads(data))
@@ -150,7 +150,7 @@ def new_parameter(
 
     Raises `ParameterError` or `ValueError` for invalid arguments.
     """
-    form = _form_of(name, type(default) if kind is None else kind, default)
+    form = _create_form(name, type(default) if kind is None else kind, default)
     word = kind if isinstance(kind, str) else (type(default) if kind is None else kind).__name__
     if form is not None:
         word, choices = form.plain_kind, choices or form.choices
@@ -168,7 +168,7 @@ def new_parameter(
                 _("only numbers can have limits, and the limits must be finite"),
             )
     bare = NodeParameter(check_topic(name), None, word, None, _clean_description(description), form=form)
-    if len(choices) > _CHOICES_MAX:
+    if len(choices) > _MAX_CHOICES:
         raise ParameterError(name, short_repr(default), _("too many choices"))
     allowed = tuple(bare.with_value(each).value for each in choices)
     parameter = replace(bare, minimum=minimum, maximum=maximum, choices=allowed, is_read_only=is_read_only)
@@ -176,11 +176,11 @@ def new_parameter(
     return replace(parameter, value=value, default=value)
 
 
-def _form_of(name: str, kind: object, default: object) -> ParameterForm | None:
+def _create_form(name: str, kind: object, default: object) -> ParameterForm | None:
     if not isinstance(kind, type) or kind in KINDS.values():
         return None
     try:
-        return form_of(kind)
+        return create_form(kind)
     except ValueError as error:
         raise ParameterError(check_topic(name), short_repr(default), str(error)) from error
 

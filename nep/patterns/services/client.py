@@ -142,7 +142,7 @@ class Client:
         call = self._start_call(
             request,
             self._resolve_timeout(timeout_s),
-            lambda outcome: ends.add(lambda: self._settle(future, outcome)),
+            lambda outcome: ends.add(lambda: self._complete_future(future, outcome)),
         )
         future.add_done_callback(lambda ended: self._transport.cancel(call) if ended.cancelled() else None)
         return future
@@ -213,7 +213,7 @@ class Client:
     def _result(self, outcome: Outcome) -> object:
         if isinstance(outcome, NepError):
             raise outcome
-        if outcome.kind == CallKind.ANSWER:
+        if outcome.kind == CallKind.REPLY:
             codec = codec_by_number(outcome.codec)
             if codec is None:
                 reason = _("this version doesn't know the codec of the reply; update nep")
@@ -236,7 +236,7 @@ class Client:
             error.service, error.timeout_s, self._transport.service_names(_SERVICE_QUERY_TIMEOUT_S)
         )
 
-    def _settle(self, future: Future[object], outcome: Outcome) -> None:
+    def _complete_future(self, future: Future[object], outcome: Outcome) -> None:
         if not future.set_running_or_notify_cancel():
             return
         try:

@@ -166,7 +166,7 @@ class ServiceRegistry:
             raise self._closed_error()
 
     def _client_spec(self, service: str, configuration: Configuration, msg_type: str) -> ClientSpec:
-        codec_of = self._backend.codec_of_calls or self._backend.codec_for
+        codec_of = self._backend.call_codec_for or self._backend.codec_for
         codec = check_call_codec(codec_of(check_type_name("msg_type", msg_type)))
         id_, number = self._new_id()
         return ClientSpec(id_, service, codec, configuration, self._wait_s, number, msg_type)

@@ -80,22 +80,22 @@ class Server:
     @property
     def calls(self) -> int:
         """Number of answered calls, including calls answered with an error."""
-        return self._transport.tally.calls
+        return self._transport.stats.calls
 
     @property
     def errors(self) -> int:
         """Number of calls answered with an error."""
-        return self._transport.tally.errors
+        return self._transport.stats.errors
 
     @property
     def refused(self) -> int:
         """Number of rejected calls (queue full, time limit passed, or server closing)."""
-        return self._transport.tally.refused
+        return self._transport.stats.refused
 
     @property
     def unreadable(self) -> int:
         """Number of received frames that were not valid calls; the reasons are logged."""
-        return self._transport.tally.unreadable
+        return self._transport.stats.unreadable
 
     @property
     def endpoints(self) -> tuple[str, ...]:
@@ -134,12 +134,12 @@ class Server:
 
     def _execute(self, call: IncomingCall) -> None:
         if call.is_late:
-            call.reply(error_reply(CallKind.REFUSED, "", _("the client no longer waits for the reply")))
+            call.reply(error_reply(CallKind.REJECTED, "", _("the client no longer waits for the reply")))
             return
         try:
             request = self._decode_request(call)
         except DecodeError as error:
-            call.reply(error_reply(CallKind.REFUSED, "", str(error)))
+            call.reply(error_reply(CallKind.REJECTED, "", str(error)))
             return
         try:
             answer = self._callback(request) if self._callback is not None else None
@@ -184,7 +184,7 @@ class Server:
             raise EncodeError(str(number), type(answer).__name__, reason)
         answer_type = self._types.reply
         value = {} if answer is None and answer_type.is_any else answer
-        return Reply(CallKind.ANSWER, answer_type.codec(codec).encode(value).data, number)
+        return Reply(CallKind.REPLY, answer_type.codec(codec).encode(value).data, number)
 
     # ---- without a callback: API of the original NEP
 
@@ -219,7 +219,7 @@ class Server:
             try:
                 request = self._decode_request(call)
             except DecodeError as error:
-                call.reply(error_reply(CallKind.REFUSED, "", str(error)))
+                call.reply(error_reply(CallKind.REJECTED, "", str(error)))
                 continue
             with self._open_request_lock:
                 self._open_request = call

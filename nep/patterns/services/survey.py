@@ -136,18 +136,18 @@ class Surveyor:
                     raise outcome
                 pending -= 1
                 with contextlib.suppress(NepError):
-                    answer = self._decode_answer(outcome)
+                    answer = self._decode_reply(outcome)
                     remaining -= 1
                     yield answer
         finally:
             self._transport.cancel_all(calls)
 
-    def _decode_answer(self, outcome: Outcome) -> object:
+    def _decode_reply(self, outcome: Outcome) -> object:
         # Raises `NepError` for a failure.
         try:
             if isinstance(outcome, NepError):
                 raise outcome
-            if outcome.kind != CallKind.ANSWER:
+            if outcome.kind != CallKind.REPLY:
                 name, reason = read_error_reply(outcome.data)
                 raise NepError(f"{name}: {reason}" if name else reason)
             codec = codec_by_number(outcome.codec)

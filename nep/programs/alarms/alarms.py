@@ -30,7 +30,7 @@ class _Retry:
     event: AlarmEvent
     action: AlarmAction
     tries: int
-    due: float
+    due_at: float
 
 
 class Alarms:
@@ -107,7 +107,7 @@ class Alarms:
 
     def retry_in_s(self, rule_id: str) -> float | None:
         """Return the seconds until a failed action of a rule is retried, or None if no retry is pending."""
-        dues = [retry.due for (id, _kind), retry in self._retries.items() if id == rule_id]
+        dues = [retry.due_at for (id, _kind), retry in self._retries.items() if id == rule_id]
         return max(0.0, min(dues) - self._clock()) if dues else None
 
     @property
@@ -192,6 +192,6 @@ class Alarms:
             rule = self.rule(retry.event.rule.id)
             if rule is None or retry.action not in rule.actions:
                 del self._retries[key]
-            elif now >= retry.due and not rule.is_snoozed(now_s):
+            elif now >= retry.due_at and not rule.is_snoozed(now_s):
                 del self._retries[key]
                 self._start_action(retry.event, retry.action, retry.tries)

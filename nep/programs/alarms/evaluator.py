@@ -17,7 +17,7 @@ from nep.errors import DecodeError
 from nep.messages.message import Message
 from nep.programs.alarms.losses import TopicLosses
 from nep.programs.alarms.rule import MAX_CHARACTERS, AlarmRule, Scalar, problem_of, topics_of
-from nep.programs.alarms.track import AlarmTrack, Transition
+from nep.programs.alarms.track import AlarmStateMachine, Transition
 from nep.protocol.graph_view import GraphView
 from nep.protocol.topic_pattern import matches
 
@@ -75,7 +75,7 @@ class AlarmState:
 
     phase: AlarmPhase
     value: Scalar = None
-    on_for_s: float = 0.0
+    on_duration_s: float = 0.0
     count: int = 0
     problem: str = ""
 
@@ -84,7 +84,7 @@ class AlarmState:
 class _SubscribedTopic:
     """Subscribed topic: message count, time of the last message, and the rules that read its values."""
 
-    readers: list[AlarmTrack] = field(default_factory=list)
+    readers: list[AlarmStateMachine] = field(default_factory=list)
     present_since: float | None = None
     last: float | None = None
     count: int = 0
@@ -113,7 +113,7 @@ class AlarmEvaluator:
         self._clock, self._clock_s = clock, clock_s
         self._lock = threading.Lock()
         self._rules: tuple[AlarmRule, ...] = ()
-        self._tracks: dict[str, AlarmTrack] = {}
+        self._tracks: dict[str, AlarmStateMachine] = {}
         self._subscribed: dict[str, _SubscribedTopic] = {}
         self._losses: dict[str, TopicLosses] = {}
         self._events: deque[AlarmEvent] = deque(maxlen=MAX_EVENTS)
@@ -155,7 +155,7 @@ class AlarmEvaluator:
                     self._tracks[rule.id] = known
                     del before[rule.id]
                 else:
-                    self._tracks[rule.id] = AlarmTrack(rule)
+                    self._tracks[rule.id] = AlarmStateMachine(rule)
             for id, track in before.items():
                 turn = track.turn_off(now)
                 if turn is not None:
@@ -235,7 +235,7 @@ class AlarmEvaluator:
 
     def _evaluate_graph(
         self,
-        track: AlarmTrack,
+        track: AlarmStateMachine,
         nodes: frozenset[str],
         topics: frozenset[str],
         now: float,
@@ -246,17 +246,17 @@ class AlarmEvaluator:
         turn: Transition | None = None
         if kind == "leaves":
             is_there = name in self._nodes
-            if is_there or (track.was_seen and now - self._epoch_at >= MASTER_GRACE_S):
+            if is_there or (track.was_observed and now - self._epoch_at >= MASTER_GRACE_S):
                 turn = track.observe(not is_there, None, now)
         elif kind == "comes":
-            track.was_seen = track.was_seen or name in self._nodes
+            track.was_observed = track.was_observed or name in self._nodes
             if is_settled and name in nodes:
                 turn = track.trigger(now)
         elif kind == "appears":
             found = sorted(topic for topic in topics if matches(name, topic))
-            track.was_seen = True
+            track.was_observed = True
             if is_settled and found:
-                track.seen = found[0][:MAX_CHARACTERS]
+                track.last_value = found[0][:MAX_CHARACTERS]
                 turn = track.trigger(now)
         if turn is not None:
             self._emit(track, turn)
@@ -282,13 +282,13 @@ class AlarmEvaluator:
                 self._snoozed_on.discard(id)
                 track = self._tracks[id]
                 if track.is_on:
-                    event = AlarmEvent("still", track.rule, now_s, track.seen, count=track.count)
+                    event = AlarmEvent("still", track.rule, now_s, track.last_value, count=track.count)
                     self._events.append(event)
             events = list(self._events)
             self._events.clear()
         return events
 
-    def _evaluate_time(self, track: AlarmTrack, now: float) -> Transition | None:
+    def _evaluate_time(self, track: AlarmStateMachine, now: float) -> Transition | None:
         condition = track.rule.condition
         subscription = self._subscribed.get(condition.name) if condition.needs_topic else None
         if condition.kind == "silent" and subscription is not None and subscription.present_since is not None:
@@ -306,7 +306,7 @@ class AlarmEvaluator:
             return None  # without a master it is unknown which nodes exist
         return track.advance(now)
 
-    def _emit(self, track: AlarmTrack, turn: Transition) -> None:
+    def _emit(self, track: AlarmStateMachine, turn: Transition) -> None:
         rule, now_s = track.rule, self._clock_s()
         is_snoozed = rule.is_snoozed(now_s)
         if turn.is_on and is_snoozed:
@@ -336,16 +336,18 @@ class AlarmEvaluator:
                 return AlarmState("off" if problem_of(rule) is None else "faulty")
             condition = track.rule.condition
             subscription = self._subscribed.get(condition.name) if condition.needs_topic else None
-            was_seen = track.was_seen or (subscription is not None and subscription.present_since is not None)
+            was_seen = track.was_observed or (
+                subscription is not None and subscription.present_since is not None
+            )
             if condition.is_about_value:
                 was_seen = subscription is not None and subscription.last is not None
-            trouble = track.trouble or (
+            trouble = track.problem or (
                 "unreadable" if subscription is not None and subscription.is_undecodable else ""
             )
             if track.on_since is not None:
-                return AlarmState("on", track.seen, now - track.on_since, track.count, trouble)
+                return AlarmState("on", track.last_value, now - track.on_since, track.count, trouble)
             phase: AlarmPhase = "pending" if track.is_pending else "well" if was_seen else "waits"
-            return AlarmState(phase, track.seen, problem=trouble)
+            return AlarmState(phase, track.last_value, problem=trouble)
 
     @property
     def states(self) -> Mapping[str, AlarmState]:

@@ -99,7 +99,7 @@ class AlarmAction:
     name: str = ""
     payload: object = None
     msg_type: str = "json"
-    seconds: float = DEFAULT_RECORDING_S
+    recording_s: float = DEFAULT_RECORDING_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +237,7 @@ def _check_action(action: AlarmAction, check: _RuleChecker) -> None:
     elif action.kind == "send":
         check.check_name("send", check_topic, action.name)
     elif action.kind == "keep":
-        check.number("keep_s", action.seconds, 1, MAX_WINDOW_S)
+        check.number("keep_s", action.recording_s, 1, MAX_WINDOW_S)
 
 
 def _is_scalar(value: object) -> bool:

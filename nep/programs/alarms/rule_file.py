@@ -183,7 +183,7 @@ def _rule_to_plain(rule: AlarmRule) -> dict[str, object]:
 def _action_to_plain(action: AlarmAction) -> object:
     match action.kind:
         case "keep":
-            return {"keep_s": action.seconds}
+            return {"keep_s": action.recording_s}
         case "run":
             return {"run": action.name}
         case "call":
@@ -198,7 +198,7 @@ class NewerAlarmsError(NepError):
     """Error for an alarm file of a newer format, which a newer version of nep can read."""
 
 
-class _InvalidAlarm(Exception):  # noqa: N818 - never leaves this module
+class _InvalidAlarmError(Exception):
     """Error for an invalid alarm; its message names the file and the line."""
 
 
@@ -212,7 +212,7 @@ class _Reader:
     def file(self, value: object) -> AlarmFile:
         try:
             alarms = self._root(value)
-        except _InvalidAlarm as wrong:
+        except _InvalidAlarmError as wrong:
             raise NepError(str(wrong)) from None
         rules: list[AlarmRule] = []
         problems: list[str] = []
@@ -226,7 +226,7 @@ class _Reader:
                         _("another alarm already has this id; use a different id for each alarm, or omit it"),
                         index,
                     )
-            except _InvalidAlarm as wrong:
+            except _InvalidAlarmError as wrong:
                 if not self._lenient:
                     raise NepError(str(wrong)) from None
                 problems.append(str(wrong))
@@ -337,7 +337,7 @@ class _Reader:
             )
         self._check_keys(entry, (kind, *_ACTION_KEYS[kind]), index)
         if kind == "keep_s":
-            return AlarmAction("keep", seconds=self._number(entry, "keep_s", 60.0, index))
+            return AlarmAction("keep", recording_s=self._number(entry, "keep_s", 60.0, index))
         name, msg_type = entry[kind], entry.get("type", "json")
         if not isinstance(name, str) or not isinstance(msg_type, str) or not msg_type:
             self._fail(kind if not isinstance(name, str) else "type", _("must be a string"), index)
@@ -366,10 +366,10 @@ class _Reader:
         line = self._line(key, index)
         if key:
             template = _("line {line} of '{path}', '{key}': {sentence}")
-            raise _InvalidAlarm(
+            raise _InvalidAlarmError(
                 template.format(line=line, path=self._path, key=quotable(key), sentence=sentence)
             )
-        raise _InvalidAlarm(
+        raise _InvalidAlarmError(
             _("line {line} of '{path}': {sentence}").format(line=line, path=self._path, sentence=sentence)
         )
 

@@ -16,10 +16,10 @@ from nep.programs.alarms.rule import (
 )
 from nep.text import quotable, shortened
 
-_MAX_SHOWN_CHARACTERS = 40
-_NO_ACTION = lazy("add it to the alarm list")
+_MAX_DISPLAYED_CHARACTERS = 40
+_NO_ACTION_TEXT = lazy("add it to the alarm list")
 
-_CONDITIONS: Mapping[str, str] = {
+_CONDITION_TEXTS: Mapping[str, str] = {
     "silent": lazy("{subject} is silent for {time}"),
     "rate_below": lazy("{subject} has fewer than {limit}"),
     "rate_above": lazy("{subject} has more than {limit}"),
@@ -33,7 +33,7 @@ _CONDITIONS: Mapping[str, str] = {
     "leaves": lazy("{subject} disconnects"),
     "comes": lazy("{subject} connects"),
 }
-_LASTING_CONDITIONS: Mapping[str, str] = {
+_LASTING_CONDITION_TEXTS: Mapping[str, str] = {
     "rate_below": lazy("{subject} has fewer than {limit} for {time}"),
     "rate_above": lazy("{subject} has more than {limit} for {time}"),
     "below": lazy("{subject} is below {limit} for {time}"),
@@ -42,7 +42,7 @@ _LASTING_CONDITIONS: Mapping[str, str] = {
     "is_not": lazy("{subject} is not {limit} for {time}"),
     "leaves": lazy("{subject} is disconnected for {time}"),
 }
-_EVENTS: Mapping[str, str] = {
+_EVENT_TEXTS: Mapping[str, str] = {
     "silent": lazy("{subject} is silent"),
     "rate_below": lazy("{subject} has {seen}, fewer than {limit}"),
     "rate_above": lazy("{subject} has {seen}, more than {limit}"),
@@ -56,7 +56,7 @@ _EVENTS: Mapping[str, str] = {
     "leaves": lazy("{subject} disconnected"),
     "comes": lazy("{subject} connected"),
 }
-_ACTIONS: Mapping[str, str] = {
+_ACTION_TEXTS: Mapping[str, str] = {
     "banner": lazy("show a banner"),
     "sound": lazy("play a sound"),
     "keep": lazy("save the last {time}"),
@@ -88,7 +88,7 @@ def value_text(value: object) -> str:
     if isinstance(value, float):
         return number(value, ".6g")
     if isinstance(value, str):
-        return f"“{quotable(shortened(value, _MAX_SHOWN_CHARACTERS))}”"
+        return f"“{quotable(shortened(value, _MAX_DISPLAYED_CHARACTERS))}”"
     return _("a list") if isinstance(value, list | tuple) else _("an object")
 
 
@@ -113,9 +113,9 @@ def subject_text(condition: AlarmCondition) -> str:
 
 def condition_text(condition: AlarmCondition) -> str:
     """Format a condition, such as "/robot/camera is silent for 2 s"."""
-    words = _CONDITIONS[condition.kind]
+    words = _CONDITION_TEXTS[condition.kind]
     if condition.for_s > 0:
-        words = _LASTING_CONDITIONS.get(condition.kind, words)
+        words = _LASTING_CONDITION_TEXTS.get(condition.kind, words)
     return _(words).format(
         subject=subject_text(condition),
         limit=limit_text(condition, condition.limit),
@@ -125,8 +125,8 @@ def condition_text(condition: AlarmCondition) -> str:
 
 def action_text(action: AlarmAction) -> str:
     """Format an action, such as "show a banner" or "call restart_lidar"."""
-    return _(_ACTIONS[action.kind]).format(
-        name=quotable(action.name), time=duration_text(action.seconds or DEFAULT_RECORDING_S)
+    return _(_ACTION_TEXTS[action.kind]).format(
+        name=quotable(action.name), time=duration_text(action.recording_s or DEFAULT_RECORDING_S)
     )
 
 
@@ -134,13 +134,14 @@ def rule_text(rule: AlarmRule) -> str:
     """Format a rule as one sentence without full stop."""
     actions = [action_text(action) for action in rule.actions]
     return _("When {condition}: {actions}").format(
-        condition=condition_text(rule.condition), actions=format_list(actions) if actions else _(_NO_ACTION)
+        condition=condition_text(rule.condition),
+        actions=format_list(actions) if actions else _(_NO_ACTION_TEXT),
     )
 
 
 def event_text(condition: AlarmCondition, seen: Scalar) -> str:
     """Format an event for the history, such as "range of /distance is 0.36, below 0.4", without full stop."""
-    return _(_EVENTS[condition.kind]).format(
+    return _(_EVENT_TEXTS[condition.kind]).format(
         subject=subject_text(condition),
         limit=limit_text(condition, condition.limit),
         seen=quotable(seen)

@@ -37,14 +37,14 @@ class Transition(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Value:
+class _FieldValue:
     """Field path of a rule, and the last value of that field."""
 
     path: Path = ()
     last: object = MISSING
 
 
-class AlarmTrack:
+class AlarmStateMachine:
     """State machine of one alarm.
 
     Call `observe` with new input and `advance` as time passes. Methods return the `Transition` that
@@ -58,17 +58,17 @@ class AlarmTrack:
         self._calm_s = (
             max(rule.calm_s, MIN_EVENT_DURATION_S) if condition.kind in EVENT_KINDS else rule.calm_s
         )
-        self._value = _Value(parse_path(condition.path) if condition.is_about_value else ())
+        self._value = _FieldValue(parse_path(condition.path) if condition.is_about_value else ())
         self._is_below = condition.kind == "below"
         self._bound = condition.number if condition.kind in {"below", "above"} else None
         self._true_since: float | None = None
         self._false_since: float | None = None
         self.on_since: float | None = None
         self.count = 0
-        self.seen: Scalar = None
-        self.was_seen = False
+        self.last_value: Scalar = None
+        self.was_observed = False
         """True if the alarm's topic or node has ever existed."""
-        self.trouble: ValueProblem = ""
+        self.problem: ValueProblem = ""
         """Reason why the last value can't be compared; "" if it can."""
 
     @property
@@ -90,27 +90,27 @@ class AlarmTrack:
         """
         value = value_at(payload, self._value.path)
         if self._is_clearly_false(value):
-            self.seen, self.trouble, self.was_seen = value, "", True  # type: ignore[assignment]  # a number
+            self.last_value, self.problem, self.was_observed = value, "", True  # type: ignore[assignment]  # a number
             return None
-        self.was_seen = True
+        self.was_observed = True
         if value is MISSING:
-            self.trouble = "missing"
+            self.problem = "missing"
             return None
         kind, before = self.rule.condition.kind, self._value.last
         self._value.last = value
         if kind == "changes":
-            self.seen = scalar_of(value)
-            self.trouble = ""
+            self.last_value = to_scalar(value)
+            self.problem = ""
             return self.trigger(now) if before is not MISSING and not _are_equal(before, value) else None
         if kind in {"equals", "is_not"}:
-            self.trouble = ""
+            self.problem = ""
             same = _are_equal(value, self.rule.condition.limit)
-            return self.observe(same is (kind == "equals"), scalar_of(value), now)
+            return self.observe(same is (kind == "equals"), to_scalar(value), now)
         number = _number(value)
-        self.trouble = "no_number" if number is None else ""
+        self.problem = "no_number" if number is None else ""
         if number is None:
             return None
-        seen = scalar_of(value) if math.isfinite(number) else number
+        seen = to_scalar(value) if math.isfinite(number) else number
         return self.compare(number, now, is_below=kind == "below", seen=seen)
 
     def _is_clearly_false(self, value: object) -> bool:
@@ -138,8 +138,8 @@ class AlarmTrack:
 
     def trigger(self, now: float) -> Transition | None:
         """Process a momentary event: it turns the alarm on for `MIN_EVENT_DURATION_S`."""
-        turn = self.observe(True, self.seen, now)
-        self.observe(False, self.seen, now)
+        turn = self.observe(True, self.last_value, now)
+        self.observe(False, self.last_value, now)
         return turn
 
     def observe(self, is_so: bool, seen: Scalar, now: float) -> Transition | None:
@@ -151,8 +151,8 @@ class AlarmTrack:
             now: Monotonic time in seconds.
         """
         turn = self.advance(now)
-        self.was_seen = True
-        self.seen = seen
+        self.was_observed = True
+        self.last_value = seen
         if is_so:
             if self.is_on and self._false_since is not None:
                 self.count += 1  # false for less than calm_s
@@ -176,10 +176,10 @@ class AlarmTrack:
             if since is None or now - since < self._for_s:
                 return None
             self.on_since, self.count, self._false_since = now, 1, None
-            return Transition(True, self.seen, 0.0, 1)
+            return Transition(True, self.last_value, 0.0, 1)
         if false_since is None or now - false_since < self._calm_s:
             return None
-        turn = Transition(False, self.seen, max(0.0, false_since - self.on_since), self.count)
+        turn = Transition(False, self.last_value, max(0.0, false_since - self.on_since), self.count)
         self.on_since = self._false_since = None
         return turn
 
@@ -188,12 +188,12 @@ class AlarmTrack:
         if self.on_since is None:
             return None
         end = now if self._false_since is None else self._false_since
-        turn = Transition(False, self.seen, max(0.0, end - self.on_since), self.count)
+        turn = Transition(False, self.last_value, max(0.0, end - self.on_since), self.count)
         self.on_since = self._true_since = self._false_since = None
         return turn
 
 
-def scalar_of(value: object) -> Scalar:
+def to_scalar(value: object) -> Scalar:
     """Convert a value to a scalar for an event.
 
     A list or map is represented by its length in brackets, and long text is truncated. Integers beyond 64

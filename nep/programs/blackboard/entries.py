@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from nep.errors import BadValueError
 from nep.i18n import _
-from nep.programs.blackboard.keys import Key, key_matches, key_text, literal_levels
+from nep.programs.blackboard.keys import Key, key_matches, key_text, literal_prefix
 from nep.programs.blackboard.values import is_same, size_of
 
 AgeBy = Literal["stamp", "arrival"]
@@ -128,7 +128,7 @@ class Entries:
 
     def entries_matching(self, pattern: Key) -> Iterator[StoredEntry]:
         """Yield the entries whose keys match a pattern, in tree order."""
-        beginning = literal_levels(pattern)
+        beginning = literal_prefix(pattern)
         found = self.entries_below(beginning)
         if pattern == (*beginning, "**"):
             return found

@@ -17,9 +17,9 @@ MAX_LEVELS = 32
 _MAX_CHARACTERS = 1_000
 _MAX_KEY_TEXT_LENGTH = 2 * _MAX_CHARACTERS + MAX_LEVELS
 """Maximum length of a key as text, with every character escaped and the dots included."""
-_SPECIAL = re.compile(r"([.\\])")
+_SPECIAL_CHARACTER = re.compile(r"([.\\])")
 _NAME = re.compile(r"((?:[^.\\]|\\.|\\$)*)(?:\.|$)", re.DOTALL)
-_ESCAPE = re.compile(r"\\(.)", re.DOTALL)
+_ESCAPE_SEQUENCE = re.compile(r"\\(.)", re.DOTALL)
 _WILDCARDS = frozenset({"*", "**"})
 
 
@@ -59,7 +59,7 @@ def _split_names(text: str) -> Key:
         match = _NAME.match(text, at)
         if match is None:  # unreachable: the pattern matches the empty text
             raise BadKeyError(text, _("use a string such as 'human.1.position'"))
-        found.append(_ESCAPE.sub(r"\1", match[1]))
+        found.append(_ESCAPE_SEQUENCE.sub(r"\1", match[1]))
         if not text[match.end(1) :]:
             return tuple(found)
         at = match.end()
@@ -67,10 +67,12 @@ def _split_names(text: str) -> Key:
 
 def key_text(names: Key) -> str:
     """Join names into a key as text; the inverse of `parse_key`."""
-    return ".".join(_SPECIAL.sub(r"\\\1", name) if "." in name or "\\" in name else name for name in names)
+    return ".".join(
+        _SPECIAL_CHARACTER.sub(r"\\\1", name) if "." in name or "\\" in name else name for name in names
+    )
 
 
-def key_of_topic(topic: str) -> Key:
+def topic_to_key(topic: str) -> Key:
     """Convert a topic to a key: `/perception/humans` becomes `perception.humans`."""
     return tuple(level for level in topic.split("/") if level) or ("topic",)
 
@@ -83,7 +85,7 @@ def key_matches(pattern: Key, key: Key) -> bool:
     return levels_match(pattern, key)
 
 
-def literal_levels(pattern: Key) -> Key:
+def literal_prefix(pattern: Key) -> Key:
     """Return the names of a pattern before its first wildcard."""
     for number, name in enumerate(pattern):
         if name in _WILDCARDS:

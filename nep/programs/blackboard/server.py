@@ -71,7 +71,7 @@ class BlackboardServer:
         self._end = board.on_change("**", self._publish_change)
 
     def _publish_change(self, change: BlackboardChange) -> None:
-        change_map = {"blackboard": self._name, "cause": change.cause, **_entry_map(change.entry)}
+        change_map = {"blackboard": self._name, "cause": change.cause, **_entry_to_map(change.entry)}
         if change.is_gone:
             change_map["value"] = None
         self._changes.publish(change_map)
@@ -93,7 +93,7 @@ class BlackboardServer:
         entries: list[object] = []
         room = _MAX_REPLY_BYTES
         for each in young[:MAX_ENTRIES]:
-            entry = _entry_map(each)
+            entry = _entry_to_map(each)
             room -= len(orjson.dumps(entry, option=orjson.OPT_NON_STR_KEYS | numpy_option()))
             if room < 0 and entries:
                 break
@@ -149,7 +149,7 @@ def _text(fields: Mapping[object, object], field: str, default: str | None = Non
     return value
 
 
-def _entry_map(entry: BlackboardEntry) -> dict[str, object]:
+def _entry_to_map(entry: BlackboardEntry) -> dict[str, object]:
     return {
         "key": entry.key,
         "value": _to_sendable(entry.value),

@@ -88,12 +88,12 @@ def leaves(value: object, key: Key = ()) -> Iterator[tuple[Key, object]]:
         value: Map or other value.
         key: Key of `value`, with which the yielded keys start.
     """
-    if not isinstance(value, Mapping) or not value or len(key) >= MAX_LEVELS or not _has_names(value):
+    if not isinstance(value, Mapping) or not value or len(key) >= MAX_LEVELS or not _has_valid_names(value):
         yield key, value
         return
     for name, each in value.items():
         yield from leaves(each, (*key, str(name)))
 
 
-def _has_names(value: Mapping[object, object]) -> bool:
+def _has_valid_names(value: Mapping[object, object]) -> bool:
     return all(isinstance(name, str) or type(name) is int for name in value)

@@ -12,7 +12,7 @@ from nep.errors import DecodeError, NepError, WrongTypeError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
-from nep.programs.blackboard.keys import Key, key_of_topic, key_text, parse_key
+from nep.programs.blackboard.keys import Key, key_text, parse_key, topic_to_key
 from nep.programs.blackboard.perception import parse_perception
 from nep.programs.blackboard.values import leaves
 from nep.system.log_rarely import is_logged
@@ -90,7 +90,7 @@ class MessageMapping:
             for key, value in leaves(seen.values, (*beginning, *parse_key(seen.primitive))):
                 yield PerceivedValue(key, value, seen.robot)
             return
-        beginning = key_of_topic(topic) if self._key is None else self._key_for(item)
+        beginning = topic_to_key(topic) if self._key is None else self._key_for(item)
         robot = item.get("robot") if isinstance(item, Mapping) else None
         robot_name = robot if isinstance(robot, str) else ""
         for at, value in self._selected_fields(item):

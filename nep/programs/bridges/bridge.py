@@ -117,7 +117,7 @@ class Bridge:
             self._closed.wait(_WAIT_SLICE_S)
         return True
 
-    def refusals(self, timeout_s: float) -> tuple[str, ...]:
+    def denial_reasons(self, timeout_s: float) -> tuple[str, ...]:
         """Return the reasons why listed topics are not forwarded, because they would move robots.
 
         Waits at most `timeout_s` seconds until both graphs and the descriptions of their robots are known.
@@ -125,7 +125,7 @@ class Bridge:
         deadline = time.monotonic() + timeout_s
         while not all(side.is_guard_ready for side in self.sides.values()) and time.monotonic() < deadline:
             self._closed.wait(_WAIT_SLICE_S)
-        refusals = (each.refusal for each in self._routes if not each.is_found)
+        refusals = (each.denial_reason for each in self._routes if not each.is_found)
         return tuple(dict.fromkeys(filter(None, refusals)))
 
     def status(self) -> dict[str, object]:

@@ -235,12 +235,12 @@ class Route:
         return self._form is None and not self.end.msg_type and self.needs_publisher
 
     @property
-    def refusal(self) -> str:
+    def denial_reason(self) -> str:
         """Reason why the motion guard denies publishing; "" if publishing is allowed."""
         if self.end.guard is None:
             return ""
         msg_type = self.end.msg_type if self._form is None else self._form.msg_type
-        return self.end.guard.refusal(self.end.topic, msg_type)
+        return self.end.guard.denial_reason(self.end.topic, msg_type)
 
     # ---- called in the thread of the origin's side
 
@@ -458,7 +458,7 @@ class Route:
             if subscriber_count != self._subscriber_counts.get(publisher):  # a robot may have connected
                 self._subscriber_counts[publisher] = subscriber_count
                 self.end.guard.poll()
-            refusal = self.refusal
+            refusal = self.denial_reason
             if refusal:
                 self._fail(refusal)
                 return

@@ -11,12 +11,12 @@ from typing import Any
 import zmq
 
 from nep.i18n import _
-from nep.masters.graph import Outgoing
+from nep.masters.graph import OutgoingMessage
 from nep.programs.conformance.adapter import Adapter, AdapterError, AdapterStreams
 from nep.programs.conformance.other_socket import OtherSocket
 from nep.programs.conformance.peers import ScriptedPublisher, ScriptedSubscriber
 from nep.programs.conformance.scripted_master import RecordedRequest, ScriptedMaster
-from nep.programs.conformance.verdict import broken_rule
+from nep.programs.conformance.verdict import broken_rule_error
 from nep.protocol.requests import AddPublisher, AddSubscriber, Leave, PublisherAdded
 
 AdapterStarter = Callable[[str], AdapterStreams]
@@ -111,7 +111,9 @@ class Bench:
             BrokenRuleError: The time limit has passed.
         """
         if not self.wait_until(is_met, max(timeout_s * self.scale, 2.0 if self.scale < 1 else timeout_s)):
-            raise broken_rule(_("no '{what}' within {seconds:g} s").format(what=what, seconds=timeout_s))
+            raise broken_rule_error(
+                _("no '{what}' within {seconds:g} s").format(what=what, seconds=timeout_s)
+            )
 
     # ---- the adapter
 
@@ -226,7 +228,7 @@ class Bench:
         self.require(lambda: any(each.fields.get(field) == id for each in self.requests(do)), do)
         return next(each for each in self.requests(do) if each.fields.get(field) == id)
 
-    def record(self, kind: str, topic: str) -> Mapping[str, Any]:
+    def latest_record(self, kind: str, topic: str) -> Mapping[str, Any]:
         """Return the newest record with which the adapter registered a publisher or subscriber.
 
         Args:
@@ -240,7 +242,7 @@ class Bench:
             record = each.fields.get(kind)
             if isinstance(record, dict) and record.get("topic") == topic:
                 return record
-        raise broken_rule(_("no '{what}' was received").format(what=f"{kind}+ {topic}"))
+        raise broken_rule_error(_("no '{what}' was received").format(what=f"{kind}+ {topic}"))
 
     @property
     def node_id(self) -> str:
@@ -249,7 +251,7 @@ class Bench:
             node = each.fields.get("node")
             if isinstance(node, dict):
                 return str(node.get("id"))
-        raise broken_rule(_("no '{what}' was received").format(what="node"))
+        raise broken_rule_error(_("no '{what}' was received").format(what="node"))
 
     def wait_for_renewal(self, after: int, timeout_s: float = 5.0) -> RecordedRequest:
         """Wait for a renewal of the adapter's lease, and return the request. Raises `BrokenRuleError`.
@@ -281,7 +283,7 @@ class Bench:
         with closing(OtherSocket(endpoint, kind)) as other:
             self.require(other.has_disconnected, "connection", 10.0)
 
-    def publisher(
+    def create_publisher(
         self, topic: str, msg_type: str = "json", *, echoes: bool = True, is_listed: bool = True
     ) -> ScriptedPublisher:
         """Create a publisher of the tester.
@@ -302,7 +304,7 @@ class Bench:
         """Register a publisher of the tester at the master."""
         self.master.submit(AddPublisher(created.node, created.record))
 
-    def subscriber(
+    def create_subscriber(
         self, topic: str, msg_type: str = "json", *, level: int | None = 3, endpoint: str | None = None
     ) -> ScriptedSubscriber:
         """Create a subscriber of the tester.
@@ -321,18 +323,20 @@ class Bench:
             created.connect(endpoint)
         return created
 
-    def subscribed_publisher(self, topic: str, msg_type: str = "json") -> tuple[ScriptedPublisher, int]:
+    def create_subscribed_publisher(
+        self, topic: str, msg_type: str = "json"
+    ) -> tuple[ScriptedPublisher, int]:
         """Create a publisher of the tester and a subscriber of the adapter, and wait for the hello.
 
         Returns:
             The publisher, and the number of the subscriber.
         """
-        publisher = self.publisher(topic, msg_type)
+        publisher = self.create_publisher(topic, msg_type)
         sub = self.new_sub(topic, msg_type)
         self.require(lambda: bool(publisher.hellos), "hello")
         return publisher, sub
 
-    def _on_push(self, each: Outgoing) -> None:
+    def _on_push(self, each: OutgoingMessage) -> None:
         if isinstance(each.body, PublisherAdded) and self.connect_delay_s is not None:
             record = each.body.publisher.publisher
             due = time.monotonic() + self.connect_delay_s * self.scale

@@ -13,7 +13,7 @@ import zmq
 from nep.errors import WireError
 from nep.messages.codecs import codec_for
 from nep.programs.conformance.ports import bind_again
-from nep.protocol.batch import BATCH_FORM_FLAG, batch_part, read_parts
+from nep.protocol.batch import BATCH_FORM_FLAG, encode_batch, read_parts
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
 from nep.protocol.wire import (
     BYE,
@@ -21,7 +21,7 @@ from nep.protocol.wire import (
     Header,
     Hello,
     Parts,
-    form_of,
+    encode_form,
     hello_part,
     parse_hello,
     read_header,
@@ -179,9 +179,9 @@ class ScriptedPublisher:
 
     def send_batch(self, payloads: Sequence[bytes]) -> None:
         """Send the next messages as one batch."""
-        form = form_of(self.codec.number, 0) & ~BATCH_FORM_FLAG
+        form = encode_form(self.codec.number, 0) & ~BATCH_FORM_FLAG
         stamps = [time.time_ns()] * len(payloads)
-        part = batch_part(topic_part(self.topic), form, self.seq + 1, self.id, stamps, payloads)
+        part = encode_batch(topic_part(self.topic), form, self.seq + 1, self.id, stamps, payloads)
         self.seq += len(payloads)
         self.socket.send(part)
 
@@ -261,7 +261,7 @@ class ScriptedSubscriber:
         return [each for each in self.notices if each.payload is None and each.header.flags == BYE]
 
     @property
-    def raw(self) -> list[list[bytes]]:
+    def raw_messages(self) -> list[list[bytes]]:
         """Parts of all received messages whose first part is not the hello."""
         return [parts for parts in self.received if parts[0] != self.hello]
 
@@ -271,4 +271,4 @@ class ScriptedSubscriber:
 
         Raises `WireError` for malformed parts.
         """
-        return [each for parts in self.raw for each in read_parts(parts)]
+        return [each for parts in self.raw_messages for each in read_parts(parts)]

@@ -17,14 +17,14 @@ import msgpack  # type: ignore[import-untyped]
 import zmq
 
 from nep.errors import WireError
-from nep.masters.graph import Graph, Outgoing
+from nep.masters.graph import Graph, OutgoingMessage
 from nep.programs.conformance.ports import bind_again
 from nep.protocol.encoding import ReplyEncoder, decode_request
 from nep.protocol.requests import (
     NodeRecord,
     PublisherAdded,
     PublisherRecord,
-    Refused,
+    RejectedReply,
     RemotePublisher,
     Request,
 )
@@ -66,7 +66,7 @@ class ScriptedMaster:
         on_push: Called with each message that is pushed to one of the tester's nodes.
     """
 
-    def __init__(self, context: zmq.Context[Any], on_push: Callable[[Outgoing], None]) -> None:
+    def __init__(self, context: zmq.Context[Any], on_push: Callable[[OutgoingMessage], None]) -> None:
         self._context = context
         self._on_push = on_push
         self._encoder = ReplyEncoder()
@@ -112,7 +112,7 @@ class ScriptedMaster:
     def submit(self, request: Request) -> None:
         """Execute a request of one of the tester's nodes. Raises `WireError` if it is rejected."""
         for each in self.graph.apply(request, 1, 0.0, PEER):
-            if isinstance(each.body, Refused):
+            if isinstance(each.body, RejectedReply):
                 raise WireError(each.body.reason)
             if each.call is None:
                 self._push(each)
@@ -151,7 +151,10 @@ class ScriptedMaster:
             epoch, revision = self.graph.epoch, self.graph.revision
             error = received.request
             self._reply(
-                request, Outgoing(sender, Refused(epoch, revision, error.reason, error.code), request.call)
+                request,
+                OutgoingMessage(
+                    sender, RejectedReply(epoch, revision, error.reason, error.code), request.call
+                ),
             )
             return
         for each in self.graph.apply(received.request, received.call, 0.0, sender, is_foreign=True):
@@ -160,13 +163,13 @@ class ScriptedMaster:
             else:
                 self._reply(request, each)
 
-    def _reply(self, request: RecordedRequest, each: Outgoing) -> None:
+    def _reply(self, request: RecordedRequest, each: OutgoingMessage) -> None:
         encoded = self._encoder.encode(each.body, each.call or 0)
         reply = self.change(request, msgpack.unpackb(encoded, strict_map_key=False))
         if reply is not None:
             self._send(each.to, msgpack.packb(reply))
 
-    def _push(self, each: Outgoing) -> None:
+    def _push(self, each: OutgoingMessage) -> None:
         member = self.graph.members.get(each.to)
         if member is None:
             return

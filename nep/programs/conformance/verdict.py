@@ -16,7 +16,7 @@ class BrokenRuleError(NepError):
     """Error for a client that breaks a rule; the message describes the observed behaviour."""
 
 
-def broken_rule(sentence: str) -> BrokenRuleError:
+def broken_rule_error(sentence: str) -> BrokenRuleError:
     """Return a `BrokenRuleError` with this message."""
     return BrokenRuleError(sentence)
 
@@ -44,7 +44,7 @@ def time_limit(seconds: float) -> Iterator[None]:
     yield
     took_s = time.monotonic() - began
     if took_s > seconds:
-        raise broken_rule(_("the operation took {seconds:.1f} s").format(seconds=took_s))
+        raise broken_rule_error(_("the operation took {seconds:.1f} s").format(seconds=took_s))
 
 
 def printable(value: object) -> str:

@@ -46,7 +46,7 @@ else:
     metadata, psutil = lazy_module("importlib.metadata"), lazy_module("psutil")
 
 
-PORTS: Mapping[int, str] = {
+PORT_PURPOSES: Mapping[int, str] = {
     7000: lazy("used by programs of nep up to 0.5.4.5, nep-js and C#"),
     50000: lazy("which programs of nep 0.5.4.8 connect to"),
     7777: lazy("from which tools of the original NEP read the topics"),
@@ -104,7 +104,7 @@ def collect_in_steps(
     facts, master_pid, listening = _collect_master(facts)
     yield ("masters", "alerts", "clocks"), facts
     joins = os.environ.get("NEP_GATEWAY", "1").lower() not in _GATEWAY_OFF_VALUES
-    ports = tuple(_port(port, purpose, listening, master_pid) for port, purpose in PORTS.items())
+    ports = tuple(_port(port, purpose, listening, master_pid) for port, purpose in PORT_PURPOSES.items())
     facts = replace(facts, ports=ports, is_gateway_enabled=joins)
     yield ("ports", "originals"), facts
     holder = facts.master_port.holder if facts.master_port is not None else None

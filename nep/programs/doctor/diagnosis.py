@@ -10,7 +10,7 @@ from typing import Literal
 from nep.i18n import _
 from nep.programs.doctor.facts import Facts, FolderFact, PackageFact
 from nep.programs.doctor.finding import Finding, Severity
-from nep.programs.doctor.network import clocks, loopback, master_alerts, masters, originals
+from nep.programs.doctor.network import clocks, loopback, master_alerts, masters, original_programs
 from nep.programs.doctor.original_ports import ports
 
 MIN_FILES = 1024
@@ -53,7 +53,7 @@ def to_plain(found: Sequence[Finding]) -> list[dict[str, object]]:
     return [asdict(finding) for finding in found]
 
 
-def _packages(facts: Facts) -> Iterator[Finding]:
+def _package_findings(facts: Facts) -> Iterator[Finding]:
     originals = [each for each in facts.packages if each.name.lower() == "nep"]
     for each in originals:
         yield Finding(
@@ -92,12 +92,12 @@ def _packages(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "package", "ok", _("“import nep” uses the package in {folder}.").format(folder=facts.nep_folder)
         )
-    yield from _python_namesake(facts)
+    yield from _python_namesake_findings(facts)
     if facts.node_packages:
-        yield _node_package(facts.node_packages)
+        yield _node_package_finding(facts.node_packages)
 
 
-def _python_namesake(facts: Facts) -> Iterator[Finding]:
+def _python_namesake_findings(facts: Facts) -> Iterator[Finding]:
     if facts.path_package is not None:
         yield Finding(
             "package:python3",
@@ -112,7 +112,7 @@ def _python_namesake(facts: Facts) -> Iterator[Finding]:
         )
 
 
-def _node_package(packages: Sequence[PackageFact]) -> Finding:
+def _node_package_finding(packages: Sequence[PackageFact]) -> Finding:
     imported, *hidden = packages
     ours = next((each for each in hidden if each.is_ours), None)
     if imported.is_ours:
@@ -148,7 +148,7 @@ def _node_package(packages: Sequence[PackageFact]) -> Finding:
     )
 
 
-def _files(facts: Facts) -> Iterator[Finding]:
+def _file_findings(facts: Facts) -> Iterator[Finding]:
     files = facts.files
     if files.soft_limit is not None and files.soft_limit < MIN_FILES:
         yield Finding(
@@ -176,7 +176,7 @@ def _files(facts: Facts) -> Iterator[Finding]:
         )
 
 
-def _programs(facts: Facts) -> Iterator[Finding]:
+def _program_findings(facts: Facts) -> Iterator[Finding]:
     for program in facts.programs:
         if program.open_count > FILES_WARNING_RATIO * program.limit:
             yield Finding(
@@ -194,10 +194,10 @@ def _programs(facts: Facts) -> Iterator[Finding]:
             )
 
 
-def _folders(facts: Facts) -> Iterator[Finding]:
+def _folder_findings(facts: Facts) -> Iterator[Finding]:
     for folder in facts.folders:
         if folder.problem:
-            yield _folder_problem(folder)
+            yield _unwritable_folder_finding(folder)
         else:
             yield Finding(
                 f"folder:{folder.path}",
@@ -206,7 +206,7 @@ def _folders(facts: Facts) -> Iterator[Finding]:
             )
 
 
-def _folder_problem(folder: FolderFact) -> Finding:
+def _unwritable_folder_finding(folder: FolderFact) -> Finding:
     return Finding(
         f"folder:{folder.path}",
         "error",
@@ -217,7 +217,7 @@ def _folder_problem(folder: FolderFact) -> Finding:
     )
 
 
-def _clock(facts: Facts) -> Iterator[Finding]:
+def _clock_findings(facts: Facts) -> Iterator[Finding]:
     if facts.now_s < MIN_VALID_TIME_S:
         yield Finding(
             "clock",
@@ -227,7 +227,7 @@ def _clock(facts: Facts) -> Iterator[Finding]:
         )
 
 
-def _versions(facts: Facts) -> Iterator[Finding]:
+def _version_findings(facts: Facts) -> Iterator[Finding]:
     words = ", ".join(f"{name} {version}" for name, version in facts.versions.items())
     yield Finding("versions", "info", f"{words}.")
 
@@ -236,14 +236,14 @@ CHECKS: Mapping[str, Callable[[Facts], Iterator[Finding]]] = {
     "loopback": loopback,
     "masters": masters,
     "ports": ports,
-    "packages": _packages,
-    "originals": originals,
+    "packages": _package_findings,
+    "originals": original_programs,
     "alerts": master_alerts,
-    "files": _files,
-    "programs": _programs,
-    "folders": _folders,
+    "files": _file_findings,
+    "programs": _program_findings,
+    "folders": _folder_findings,
     "clocks": clocks,
-    "clock": _clock,
-    "versions": _versions,
+    "clock": _clock_findings,
+    "versions": _version_findings,
 }
 """Checks by name, in the order in which findings of equal severity are shown."""

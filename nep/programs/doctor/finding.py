@@ -31,7 +31,7 @@ class Finding:
     instead: str = ""
 
     @property
-    def as_error(self) -> str:
+    def error_message(self) -> str:
         """Finding in the form of an error message: lower case, hint after a semicolon, no full stop."""
         first = self.sentence.rstrip(".")
         step = self.fix.rstrip(".")

@@ -148,7 +148,9 @@ def _last_message_s(view: GraphView, each: PublisherInfo) -> float | None:
         return None
     offsets = _clock_offsets(view)
     offset_ns = offsets.get(each.node_id, 0)
-    here = next((offsets[id] for id, node in view.nodes.items() if id in offsets and _is_own(node.host)), 0)
+    here = next(
+        (offsets[id] for id, node in view.nodes.items() if id in offsets and _is_local_host(node.host)), 0
+    )
     return (each.last_stamp_ns + offset_ns - here) / 1e9
 
 
@@ -156,5 +158,5 @@ def _clock_offsets(view: GraphView) -> Mapping[str, int]:
     return {id: node.clock_offset_ns for id, node in view.nodes.items() if node.clock_offset_ns is not None}
 
 
-def _is_own(host: str) -> bool:
+def _is_local_host(host: str) -> bool:
     return host == platform.node()

@@ -36,11 +36,11 @@ def masters(facts: Facts) -> Iterator[Finding]:
     holder = port.holder if port is not None else None
     if facts.view is not None:
         yield _running_finding(facts, holder)
-        yield from _version_mismatch(facts, holder)
+        yield from _version_mismatch_findings(facts, holder)
     elif not facts.is_host_known:
-        yield _unknown_host(facts)
+        yield _unknown_host_finding(facts)
     elif facts.replying_address:
-        yield _loopback_only(facts)
+        yield _loopback_only_finding(facts)
     elif holder is not None and holder.is_master:
         yield _hung_finding(facts, holder)
     elif port is not None and port.is_taken:
@@ -51,10 +51,10 @@ def masters(facts: Facts) -> Iterator[Finding]:
         yield _not_loopback_finding(facts)
     else:
         yield _not_running_finding(facts)
-    yield from _multiple_masters(facts)
+    yield from _multiple_masters_findings(facts)
 
 
-def _unknown_host(facts: Facts) -> Finding:
+def _unknown_host_finding(facts: Facts) -> Finding:
     return Finding(
         "master:unknown",
         "error",
@@ -65,7 +65,7 @@ def _unknown_host(facts: Facts) -> Finding:
     )
 
 
-def _loopback_only(facts: Facts) -> Finding:
+def _loopback_only_finding(facts: Facts) -> Finding:
     return Finding(
         "master:closed",
         "error",
@@ -188,7 +188,7 @@ def _running_finding(facts: Facts, holder: ProcessFact | None) -> Finding:
     return Finding("master", "ok", f"{sentence}.")
 
 
-def _version_mismatch(facts: Facts, holder: ProcessFact | None) -> Iterator[Finding]:
+def _version_mismatch_findings(facts: Facts, holder: ProcessFact | None) -> Iterator[Finding]:
     install, own = facts.master_install, facts.versions.get("NEP Studio", "")
     if install is None or holder is None or not own[:1].isdigit():
         return
@@ -222,7 +222,7 @@ def _kill_command(facts: Facts, holder: ProcessFact) -> str:
     return f"kill {holder.pid}" if facts.platform != "win32" else f"taskkill /F /PID {holder.pid}"
 
 
-def _multiple_masters(facts: Facts) -> Iterator[Finding]:
+def _multiple_masters_findings(facts: Facts) -> Iterator[Finding]:
     if len(facts.masters) < 2:
         return
     places = ", ".join(
@@ -240,7 +240,7 @@ def _multiple_masters(facts: Facts) -> Iterator[Finding]:
     )
 
 
-def originals(facts: Facts) -> Iterator[Finding]:
+def original_programs(facts: Facts) -> Iterator[Finding]:
     """Report programs of the original NEP, including versions that the gateway can't serve."""
     if facts.view is None:
         return

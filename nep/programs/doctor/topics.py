@@ -31,10 +31,10 @@ def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
             ),
         )
     if not facts.publishers:
-        return tuple(_unpublished(facts))
-    found = [finding for each in facts.publishers for finding in _publisher(facts, each)]
-    found += [_from_alert(each.id, each.sentence, each.hint) for each in facts.alerts]
-    return (*found, *_arrival(facts, is_explained=any(each.severity == "error" for each in found)))
+        return tuple(_unpublished_findings(facts))
+    found = [finding for each in facts.publishers for finding in _publisher_findings(facts, each)]
+    found += [_alert_finding(each.id, each.sentence, each.hint) for each in facts.alerts]
+    return (*found, *_arrival_findings(facts, is_explained=any(each.severity == "error" for each in found)))
 
 
 def closest_topic(topic: str, names: Iterable[str]) -> str | None:
@@ -63,7 +63,7 @@ def _normalized(topic: str) -> str:
     return topic.strip("/").casefold()
 
 
-def _unpublished(facts: TopicFacts) -> Iterator[Finding]:
+def _unpublished_findings(facts: TopicFacts) -> Iterator[Finding]:
     sentence = _("{topic} has no publisher.").format(topic=facts.topic)
     near = closest_topic(facts.topic, facts.other_topics)
     service = facts.topic if facts.topic in facts.services else ""
@@ -114,16 +114,16 @@ def _similar_name_text(facts: TopicFacts, near: str) -> str:
     return words.format(topic=near, rate=number(rate_hz, ".3g" if rate_hz < 100 else ".0f"))
 
 
-def _publisher(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
+def _publisher_findings(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
     if each.generation in UNSUPPORTED_VERSIONS:
         yield unsupported_finding(f"topic:version:{each.node}", each.node, each.generation)
     elif each.reach_failure:
-        yield _unreachable(each)
+        yield _unreachable_finding(each)
     elif not facts.received:
-        yield from _silence(facts, each)
+        yield from _silence_findings(facts, each)
 
 
-def _unreachable(each: PublisherFact) -> Finding:
+def _unreachable_finding(each: PublisherFact) -> Finding:
     place = each.endpoint.removeprefix("tcp://")
     if each.reach_failure == "elsewhere":
         sentence = _("“{node}” can be reached only from its own computer, {host}.")
@@ -149,7 +149,7 @@ def _unreachable(each: PublisherFact) -> Finding:
     return Finding(f"topic:address:{each.node}", "error", sentence.format(**holes), fix.format(**holes))
 
 
-def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
+def _silence_findings(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
     quiet_s = facts.now_s - each.last_message_s if each.last_message_s is not None else None
     if quiet_s is not None and quiet_s < max(MIN_SILENCE_S, facts.listen_duration_s):
         return  # it sends; `_arrival` reports missing messages
@@ -177,11 +177,11 @@ def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
     )
 
 
-def _from_alert(id: str, sentence: str, hint: str) -> Finding:
+def _alert_finding(id: str, sentence: str, hint: str) -> Finding:
     return Finding(id, "error", sentence if sentence.endswith(".") else f"{sentence}.", hint)
 
 
-def _arrival(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
+def _arrival_findings(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
     if facts.decode_problem:
         yield Finding(
             "topic:unreadable",

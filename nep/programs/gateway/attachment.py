@@ -142,7 +142,7 @@ class NativeNetwork:
                 return
             self._publishers[topic, codec] = publisher
             self._own |= {publisher.id}
-        publisher.publish_bytes(data, image_codec.picture_info(data) if codec == "image" else None)
+        publisher.publish_bytes(data, image_codec.image_info(data) if codec == "image" else None)
 
     def stop_publishing(self, topic: str, codec: str) -> None:
         """Close the publisher of a topic."""

@@ -67,7 +67,7 @@ class FrameError(ValueError):
 
 
 @dataclass(frozen=True)
-class Shape:
+class FrameFormat:
     """Frame format of a topic.
 
     Attributes:
@@ -148,7 +148,7 @@ def has_replaced_nan(frame: bytes, data: bytes) -> bool:
     return _NON_FINITE.search(frame) is not None and data.count(b"null") > frame.count(b"null")
 
 
-def shield_javascript(data: bytes, topic: str) -> bytes:
+def escape_for_javascript(data: bytes, topic: str) -> bytes:
     r"""Escape occurrences of the topic's name in JSON, for subscribers with nep-js.
 
     nep-js splits a frame at every occurrence of the topic and parses the second piece, so a payload that
@@ -175,7 +175,7 @@ def shield_javascript(data: bytes, topic: str) -> bytes:
     return _JSON_TOKEN.sub(rewrite, data)
 
 
-def shield_csharp(data: bytes) -> bytes:
+def escape_for_csharp(data: bytes) -> bytes:
     """Remove or escape white space in JSON, for subscribers with the C# client.
 
     The C# client splits a frame at spaces and drops everything after the second piece.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from hashlib import blake2b
 
 from nep.errors import BadTopicError
-from nep.programs.gateway.processes import load_of
+from nep.programs.gateway.processes import cpu_load_of
 from nep.programs.gateway.programs import OriginalProgram, TopicLink
 from nep.programs.gateway.relay import Key
 from nep.programs.gateway.requests import LOOPBACK
@@ -68,7 +68,7 @@ class GraphRegistrar:
         self,
         submit: Callable[[Request], Reply | None],
         epoch: int,
-        load_of: Callable[[int], CpuLoad] = load_of,
+        load_of: Callable[[int], CpuLoad] = cpu_load_of,
     ) -> None:
         self._submit = submit
         self._epoch = epoch

@@ -22,7 +22,7 @@ from nep.text import escaped
 FIRST_PORT = 9000
 LAST_PORT = 9998
 _VERSION = 1
-_SAME_BOOT_S = 120.0
+_BOOT_TIME_TOLERANCE_S = 120.0
 
 
 @dataclass(frozen=True, order=True)
@@ -168,7 +168,7 @@ class PortMap:
                 port = entry["port"]
                 if isinstance(port, int) and FIRST_PORT <= port <= LAST_PORT:
                     self._ports[_parse_line(entry)] = port
-            if abs(document["boot"] - self._boot) > _SAME_BOOT_S:
+            if abs(document["boot"] - self._boot) > _BOOT_TIME_TOLERANCE_S:
                 return
             for entry in document["programs"]:
                 known = _parse_registration(entry)

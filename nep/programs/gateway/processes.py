@@ -23,7 +23,7 @@ class Processes(Protocol):
     def language(self, pid: int) -> str | None:
         """Return the programming language of a process according to its interpreter, or None if unknown."""
 
-    def is_joined(self, pid: int, port: int, *, binds: bool) -> bool | None:
+    def is_connected(self, pid: int, port: int, *, binds: bool) -> bool | None:
         """Return True if a process has an established connection over a port, None if access is denied.
 
         Args:
@@ -33,7 +33,7 @@ class Processes(Protocol):
         """
 
 
-def load_of(pid: int) -> CpuLoad:
+def cpu_load_of(pid: int) -> CpuLoad:
     """Return a CPU load meter for a process."""
 
     def used_s() -> float | None:
@@ -86,7 +86,7 @@ class SystemProcesses:
             return None
         return next((language for word, language in _INTERPRETERS.items() if name.startswith(word)), None)
 
-    def is_joined(self, pid: int, port: int, *, binds: bool) -> bool | None:
+    def is_connected(self, pid: int, port: int, *, binds: bool) -> bool | None:
         """Return True if a process has an established connection over a port, None if access is denied."""
         try:
             connections = psutil.Process(pid).net_connections(kind="tcp")

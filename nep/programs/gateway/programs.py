@@ -12,7 +12,7 @@ from nep.programs.gateway.processes import Processes
 from nep.programs.gateway.proxy_pair import Endpoint, ProxyPair
 from nep.programs.gateway.requests import Member, Role
 
-_SAME_PROCESS_S = 5.0
+_START_TIME_TOLERANCE_S = 5.0
 _CONNECT_GRACE_S = 10.0
 """Time in seconds that a program has to connect after its request.
 
@@ -95,7 +95,7 @@ class ProgramTable:
             if chosen is None or registration.line in chosen:
                 roles = frozenset(self._roles_of(registration))
                 self._roles[registration] = roles
-                if roles or self._was_briefly_joined(registration):
+                if roles or self._was_briefly_connected(registration):
                     self._was_joined.add(registration)
 
     def expect(self, registration: Registration) -> None:
@@ -108,7 +108,9 @@ class ProgramTable:
 
     def remove_ended(self) -> bool:
         """Remove programs that exited or closed their connections; return True if any was removed."""
-        ended = {registration for registration in self._port_map.registrations if self._is_gone(registration)}
+        ended = {
+            registration for registration in self._port_map.registrations if self._has_ended(registration)
+        }
         self._discard(ended)
         return bool(ended)
 
@@ -214,17 +216,17 @@ class ProgramTable:
         if pair is None:
             return
         for end in pair.ends:
-            if pair.connections[end.role] and self._is_joined(registration, end):
+            if pair.connections[end.role] and self._is_connected(registration, end):
                 yield end.role
 
-    def _is_joined(self, registration: Registration, end: Endpoint) -> bool:
+    def _is_connected(self, registration: Registration, end: Endpoint) -> bool:
         if registration.pid is not None and registration.started is not None:
-            known = self._processes.is_joined(registration.pid, end.port, binds=end.is_bound_by_program)
+            known = self._processes.is_connected(registration.pid, end.port, binds=end.is_bound_by_program)
             if known is not None:
                 return known
         return registration.socket == end.role
 
-    def _was_briefly_joined(self, registration: Registration) -> bool:
+    def _was_briefly_connected(self, registration: Registration) -> bool:
         # True if a program connected to the line after the request and left before it was seen.
         pair = self._pair_of(registration.line)
         if pair is None:
@@ -234,9 +236,9 @@ class ProgramTable:
         was_joined = pair.openings > before and not any(pair.connections.values())
         return was_joined and now - asked_at >= _CONNECT_GRACE_S
 
-    def _is_gone(self, registration: Registration) -> bool:
+    def _has_ended(self, registration: Registration) -> bool:
         if registration.pid is not None and registration.started is not None:
             started = self._processes.started(registration.pid)
-            if started is None or abs(started - registration.started) > _SAME_PROCESS_S:
+            if started is None or abs(started - registration.started) > _START_TIME_TOLERANCE_S:
                 return True
         return registration in self._was_joined and not self._roles.get(registration)

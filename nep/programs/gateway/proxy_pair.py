@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import zmq
 from zmq.utils.monitor import parse_monitor_message
 
-from nep.programs.gateway.framing import Shape, shield_csharp, shield_javascript
+from nep.programs.gateway.framing import FrameFormat, escape_for_csharp, escape_for_javascript
 from nep.programs.gateway.portmap import TopicLine
 from nep.programs.gateway.requests import LOOPBACK, Role
 
@@ -101,7 +101,7 @@ class ProxyPair:
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], line: TopicLine, base: int) -> None:
         self.line = line
         self.base = base
-        self.shape = Shape(line.topic, line.framing, line.codec)
+        self.frame_format = FrameFormat(line.topic, line.framing, line.codec)
         self.ends = endpoints_of(line, base)
         self.filters: set[bytes] = set()
         self.openings = 0
@@ -150,12 +150,12 @@ class ProxyPair:
     @property
     def has_subscribers(self) -> bool:
         """True if an original program has subscribed to this line."""
-        return any(self.shape.matches_filter(filter_) for filter_ in self.filters)
+        return any(self.frame_format.matches_filter(filter_) for filter_ in self.filters)
 
     @property
-    def has_0546(self) -> bool:
+    def has_0546_subscriber(self) -> bool:
         """True if a subscriber uses nep 0.5.4.6, according to its subscription filter."""
-        return any(self.shape.is_from_0546(filter_) for filter_ in self.filters)
+        return any(self.frame_format.is_from_0546(filter_) for filter_ in self.filters)
 
     def frames(self, limit: int) -> Iterator[bytes]:
         """Yield at most `limit` pending frames of original publishers."""
@@ -206,26 +206,26 @@ class ProxyPair:
             data: Frame converted to the native codec.
         """
         if self.has_subscribers:
-            self._send(self.shape.write(self._shield(data)) if self._needs_shield else frame)
+            self._send(self.frame_format.write(self._escape(data)) if self._needs_escaping else frame)
 
     def deliver(self, data: bytes | memoryview) -> None:
         """Convert data of the native codec to a frame and send it to the subscribers of this line."""
         if self.has_subscribers:
-            self._send(self.shape.write(self._shield(bytes(data)) if self._needs_shield else data))
+            self._send(self.frame_format.write(self._escape(bytes(data)) if self._needs_escaping else data))
 
     def close(self) -> None:
         """Close both sockets. Pending frames are sent for up to 0.2 s."""
         self._closing.close()
 
     @property
-    def _needs_shield(self) -> bool:
+    def _needs_escaping(self) -> bool:
         return self.line.codec == "json" and not self.languages.isdisjoint(("javascript", "csharp"))
 
-    def _shield(self, data: bytes) -> bytes:
+    def _escape(self, data: bytes) -> bytes:
         if "javascript" in self.languages:
-            data = shield_javascript(data, self.line.topic)
+            data = escape_for_javascript(data, self.line.topic)
         if "csharp" in self.languages:
-            data = shield_csharp(data)
+            data = escape_for_csharp(data)
         return data
 
     def _send(self, frame: bytes) -> None:

@@ -126,7 +126,7 @@ class Relay:
             pair.close()
             self.update_endpoints((line.topic, line.codec))
             for role in tuple(pair.unserved):
-                self._clear_version(pair, role)
+                self._clear_version_alert(pair, role)
 
     def close(self) -> None:
         """Close all lines."""
@@ -203,7 +203,7 @@ class Relay:
     def _relay_frame(self, pair: ProxyPair, frame: bytes) -> None:
         key = (pair.line.topic, pair.line.codec)
         try:
-            data = pair.shape.read(frame)
+            data = pair.frame_format.read(frame)
         except FrameError as error:
             self._reject(pair, error)
             return
@@ -228,7 +228,7 @@ class Relay:
 
     def _reject(self, pair: ProxyPair, error: FrameError) -> None:
         if error.version is not None:
-            self._report_version("publisher", pair, error.version)
+            self._report_version_alert("publisher", pair, error.version)
             return
         topic = pair.line.topic
         rejected = self._rejected.setdefault(topic, _RejectedMessages(str(error)))
@@ -243,17 +243,17 @@ class Relay:
         self._alerts.report(f"message:{topic}", words.format(reason=rejected.reason, count=rejected.count))
 
     def _check_versions(self, pair: ProxyPair) -> None:
-        if pair.has_0546:
-            self._report_version("subscriber", pair, "0.5.4.6")
+        if pair.has_0546_subscriber:
+            self._report_version_alert("subscriber", pair, "0.5.4.6")
         else:
-            self._clear_version(pair, "subscriber")
+            self._clear_version_alert(pair, "subscriber")
         version = pair.unserved.get("publisher")
         if version is not None and pair.connections["publisher"]:
-            self._report_version("publisher", pair, version)
+            self._report_version_alert("publisher", pair, version)
         else:
-            self._clear_version(pair, "publisher")
+            self._clear_version_alert(pair, "publisher")
 
-    def _report_version(self, role: Role, pair: ProxyPair, version: str) -> None:
+    def _report_version_alert(self, role: Role, pair: ProxyPair, version: str) -> None:
         pair.unserved[role] = version
         names = [f"“{name}”" for name in self._program_names(pair.line, role)]
         if not names:
@@ -275,6 +275,6 @@ class Relay:
             _("Install nep 0.5.4.8 or 0.5.4.5 for that program."),
         )
 
-    def _clear_version(self, pair: ProxyPair, role: Role) -> None:
+    def _clear_version_alert(self, pair: ProxyPair, role: Role) -> None:
         if pair.unserved.pop(role, None) is not None:
             self._alerts.resolve(f"version:{pair.line.topic}:{role}")

@@ -20,11 +20,11 @@ from nep.programs.robots.moving import (
     DESCRIPTION_TYPE,
     MovingTopics,
     RobotControls,
-    described_name,
     description_topics,
     moving_topics,
     original_robots,
     parse_controls,
+    robot_name_of,
 )
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
@@ -32,7 +32,7 @@ from nep.text import escaped, shortened
 MAX_DESCRIPTIONS = 200
 MAX_DESCRIPTION_BYTES = 1_000_000
 _MAX_CLAIMANTS = 8
-_MAX_WAITING_BYTES = 16 * 2**20
+_MAX_QUEUED_BYTES = 16 * 2**20
 _MAX_CACHED = 10_000
 _MAX_NAME_SHOWN, _MAX_NAMES_SHOWN = 100, 5
 _POLL_S = 0.05
@@ -126,7 +126,7 @@ class MotionGuard:
         with self._lock:
             return _denied_robots(topic, self._moving.robots_moved_by(topic, msg_type), self._allowed)
 
-    def refusal(self, topic: str, msg_type: str = "") -> str:
+    def denial_reason(self, topic: str, msg_type: str = "") -> str:
         """Return the reason why publishing is denied, with the option that allows it; "" if it is allowed.
 
         Args:
@@ -137,7 +137,7 @@ class MotionGuard:
         said = self._cache.get(key)
         if said is None:
             with self._lock:
-                said = refusal_text(topic, self._moving.robots_moved_by(topic, msg_type), self._allowed)
+                said = denial_text(topic, self._moving.robots_moved_by(topic, msg_type), self._allowed)
                 if len(self._cache) >= _MAX_CACHED:
                     self._cache.clear()
                 self._cache[key] = said
@@ -176,7 +176,7 @@ class MotionGuard:
                 self._received.pop(key, None)
                 if len(message.data) <= MAX_DESCRIPTION_BYTES:
                     self._received[key] = message
-            while sum(len(each.data) for each in self._received.values()) > _MAX_WAITING_BYTES:
+            while sum(len(each.data) for each in self._received.values()) > _MAX_QUEUED_BYTES:
                 del self._received[next(iter(self._received))]  # its robot counts as unread
             self._is_dirty = True
 
@@ -208,7 +208,7 @@ class MotionGuard:
 def _parse_description(message: Message, topic: str) -> RobotControls | None:
     # Every publisher's description is used, because it can only protect.
     try:
-        return parse_controls(message.payload, described_name(topic))
+        return parse_controls(message.payload, robot_name_of(topic))
     except Exception:  # noqa: BLE001 - untrusted input; an unread robot is protected by its subscriptions
         return None
 
@@ -217,7 +217,7 @@ def _denied_robots(topic: str, robots: Sequence[str], allowed: Collection[str]) 
     return () if topic in allowed else tuple(name for name in robots if name not in allowed)
 
 
-def refusal_text(topic: str, robots: Sequence[str], allowed: Collection[str]) -> str:
+def denial_text(topic: str, robots: Sequence[str], allowed: Collection[str]) -> str:
     """Return an error message that names the robots and the option that allows moving them.
 
     Args:

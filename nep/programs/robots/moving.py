@@ -162,7 +162,7 @@ def description_topics(view: GraphView) -> frozenset[str]:
     )
 
 
-def described_name(topic: str) -> str:
+def robot_name_of(topic: str) -> str:
     """Return the robot's name according to its description topic.
 
     For example, the name is ``Rover`` for ``/Rover/description``.

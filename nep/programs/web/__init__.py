@@ -6,7 +6,7 @@ ROS messages.
 """
 
 from nep.programs.web.access import Access
-from nep.programs.web.context import ConnectedPage, PageTopic, Refusal
+from nep.programs.web.context import ConnectedPage, PageTopic, Rejection
 from nep.programs.web.server import WebServer, WebSettings
 
-__all__ = ["Access", "ConnectedPage", "PageTopic", "Refusal", "WebServer", "WebSettings"]
+__all__ = ["Access", "ConnectedPage", "PageTopic", "Rejection", "WebServer", "WebSettings"]

@@ -32,12 +32,12 @@ def new_token() -> str:
     return secrets.token_urlsafe(24)
 
 
-def query_of(token: str) -> str:
+def path_with_token(token: str) -> str:
     """Return the path and query of a URL with a token ("/?token=..."); "/" if the token is ""."""
     return f"/?token={quote(token, safe='')}" if token else "/"
 
 
-def is_own_host(host: str) -> bool:
+def is_local_host(host: str) -> bool:
     """Return True if a host name refers to this computer: localhost or a loopback address."""
     if host == "localhost" or host.endswith(".localhost"):
         return True
@@ -84,7 +84,7 @@ class Access:
     origins: Collection[str] = ()
     token: str = ""
 
-    def origin_refusal(self, origin: str | None, own: str = "") -> str:
+    def origin_rejection_reason(self, origin: str | None, own: str = "") -> str:
         """Return the reason why a page with this origin may not connect; "" if the page may connect.
 
         Args:
@@ -95,7 +95,7 @@ class Access:
             return ""
         try:
             known = checked_origin(origin)
-            if known == own or known in self.origins or is_own_host(urlsplit(known).hostname or ""):
+            if known == own or known in self.origins or is_local_host(urlsplit(known).hostname or ""):
                 return ""
         except NepError:
             pass
@@ -122,7 +122,7 @@ class Access:
         return hmac.compare_digest(given.encode("utf-8", "replace"), self.token.encode())
 
 
-class AuthCheck:
+class AuthVerifier:
     """Validator of rosbridge's ``auth`` operations, each of which is valid once and for a few seconds.
 
     Args:

@@ -62,7 +62,7 @@ class PageConnection:
         self._dropped = 0
         self._thread = ThreadPoolExecutor(1, f"nep-{name[:40]}")
         self._node = new_node(name)
-        self._queue = SendQueue(asyncio.get_running_loop().time, self._close_slow)
+        self._queue = SendQueue(asyncio.get_running_loop().time, self._close_slow_page)
         self._closing: asyncio.Task[None] | None = None
         self.is_closing = False
         """True if the page's messages are ignored because it is being disconnected.
@@ -77,7 +77,7 @@ class PageConnection:
         """Topics that the page publishes or subscribes to. Thread-safe."""
         raise NotImplementedError
 
-    async def _frames_of(self, queued: QueuedMessage) -> list[Frame]:
+    async def _encode_frames(self, queued: QueuedMessage) -> list[Frame]:
         """Encode a message of a topic. Raises `NepError` if the protocol can't represent the message."""
         raise NotImplementedError
 
@@ -147,7 +147,7 @@ class PageConnection:
             if not self.is_closing:
                 return data
 
-    def _close_slow(self) -> None:
+    def _close_slow_page(self) -> None:
         _logger.warning("the page '%s' is closed: it does not read the answers that it asked for", self.name)
         self.start_closing("the page does not read its answers")
 
@@ -182,7 +182,7 @@ class PageConnection:
             self._counts.sent += 1
             return
         feed = item.feed
-        frames = await self._frames_of_message(item)
+        frames = await self._encode_message(item)
         del item  # a slow page may block; release the message, which may be in shared memory
         for frame in frames:
             await self._connection.send(frame.data, text=frame.is_text)
@@ -190,13 +190,13 @@ class PageConnection:
             self._counts.sent += 1
             feed.sent.count(sum(len(frame.data) for frame in frames))
 
-    async def _frames_of_message(self, queued: QueuedMessage) -> list[Frame]:
+    async def _encode_message(self, queued: QueuedMessage) -> list[Frame]:
         feed = queued.feed
         if feed.dropped_count:
             self._report_dropped(feed.topic, feed.dropped_count)
             feed.dropped_count = 0
         try:
-            return await self._frames_of(queued)
+            return await self._encode_frames(queued)
         except NepError as error:
             self._reject(error)
             return []

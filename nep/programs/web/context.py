@@ -18,8 +18,8 @@ from nep.programs.web.send_queue import SendQueue
 from nep.programs.web.visitors import Device
 
 Protocol = Literal["rosbridge", "foxglove"]
-RefusalKind = Literal["origin", "token", "robot", "limit", "kept out", "other"]
-_ROBOT_REFUSAL_INTERVAL_S = 10.0
+RejectionKind = Literal["origin", "token", "robot", "limit", "kept out", "other"]
+_ROBOT_REJECTION_INTERVAL_S = 10.0
 _MAX_REPORTED_ROBOTS = 50
 
 _P = ParamSpec("_P")
@@ -95,7 +95,7 @@ class ConnectedPage:
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class Rejection:
     """Rejected connection, or (kind "robot") rejected message that would have moved a robot.
 
     Rejected messages of a page to the same robot are listed at most once in ten seconds.
@@ -113,7 +113,7 @@ class Refusal:
     client: str
     reason: str
     origin: str = ""
-    kind: RefusalKind = "other"
+    kind: RejectionKind = "other"
     robot: str = ""
 
 
@@ -128,7 +128,7 @@ class WebCounts:
     operations: int = 0
     rejected: int = 0
     """Number of failed operations, for each of which the page received a status."""
-    motions_refused: int = 0
+    motions_rejected: int = 0
     """Number of rejected messages that would have moved a robot."""
     sent: int = 0
     dropped: int = 0
@@ -183,21 +183,21 @@ class PageContext:
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, lambda: function(*args, **named))
 
-    def motion_refusal(self, topic: str, msg_type: str) -> str:
+    def motion_denial_reason(self, topic: str, msg_type: str) -> str:
         """Return and report the reason why the page may not publish on a topic; "" if it may.
 
         Thread-safe.
         """
-        refusal = self.guard.refusal(topic, msg_type)
+        refusal = self.guard.denial_reason(topic, msg_type)
         if refusal:
             for robot in self.guard.denied_robots(topic, msg_type):
-                self._report_refused(robot, refusal)
+                self._report_rejected(robot, refusal)
         return refusal
 
-    def _report_refused(self, robot: str, reason: str) -> None:
+    def _report_rejected(self, robot: str, reason: str) -> None:
         now = time.monotonic()
         with self._refused_lock:
-            if now - self._refused_at.get(robot, float("-inf")) < _ROBOT_REFUSAL_INTERVAL_S:
+            if now - self._refused_at.get(robot, float("-inf")) < _ROBOT_REJECTION_INTERVAL_S:
                 return
             self._refused_at.pop(robot, None)
             self._refused_at[robot] = now

@@ -14,7 +14,7 @@ def is_handshake(request: Request) -> bool:
     return any("websocket" in each.lower() for each in request.headers.get_all("Upgrade"))
 
 
-def own_origin(connection: ServerConnection) -> str:
+def server_origin(connection: ServerConnection) -> str:
     """Return the origin of the server's own pages at the address to which the client connected.
 
     The host is always numeric, because another site can make its own host name resolve to this computer.

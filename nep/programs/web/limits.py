@@ -19,7 +19,7 @@ MAX_CALLS = 500
 """Maximum number of calls in flight that a page made; also the maximum number that it must reply to."""
 CALL_TIMEOUT_S = 10.0
 MAX_CALL_TIMEOUT_S = 3_600.0
-MAX_FRAGMENTED = 16
+MAX_FRAGMENTED_OPERATIONS = 16
 """Maximum number of incomplete operations of a page."""
 MAX_FRAGMENTS = 10_000
 """Maximum number of fragments of one operation."""

@@ -17,11 +17,11 @@ import orjson
 from nep.backends.ros.definition import Definition, FieldKind
 from nep.errors import EncodeError
 from nep.messages.message import Message
-from nep.messages.nesting import json_is_too_deep
+from nep.messages.nesting import is_json_too_deep
 from nep.programs.web.messages.fragments import cut
 from nep.programs.web.messages.operations import Compression
 from nep.programs.web.messages.payloads import ros_bytes, ros_type_of, to_ros
-from nep.programs.web.messages.png import text_as_png
+from nep.programs.web.messages.png import encode_png
 from nep.programs.web.messages.ros_definitions import bare_type, definition_of
 from nep.system.lazy_import import lazy_module
 
@@ -86,10 +86,12 @@ def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[
         definition = definition_of(bare_type(ros_type_of(message.msg_type)))
         if definition is not None and message.codec == "json" and isinstance(msg, Mapping):
             msg = _with_typed_arrays(msg, definition)
-        return [Frame(_cbor({"op": "publish", "topic": topic, "msg": msg}), is_text=False)]
+        return [Frame(_encode_cbor({"op": "publish", "topic": topic, "msg": msg}), is_text=False)]
     body = _json_payload(message) if message.codec == "json" else None
     if body is None:
-        text = json_bytes({"op": "publish", "topic": topic, "msg": to_ros(message, as_pixels=form.as_pixels)})
+        text = encode_json(
+            {"op": "publish", "topic": topic, "msg": to_ros(message, as_pixels=form.as_pixels)}
+        )
     else:
         text = b'{"op":"publish","topic":%b,"msg":%b}' % (orjson.dumps(topic), body)
     return _text_frames(text, form)
@@ -98,20 +100,20 @@ def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[
 def operation_frames(operation: Mapping[str, object], form: EncodingOptions) -> list[Frame]:
     """Encode any other operation, such as the reply of a service. Raises `EncodeError`."""
     if form.compression in {"cbor", "cbor-raw"}:
-        return [Frame(_cbor(operation), is_text=False)]
-    return _text_frames(json_bytes(operation), form)
+        return [Frame(_encode_cbor(operation), is_text=False)]
+    return _text_frames(encode_json(operation), form)
 
 
 def _text_frames(text: bytes, form: EncodingOptions) -> list[Frame]:
     if form.compression == "png":
-        text = json_bytes({"op": "png", "data": text_as_png(text)})
+        text = encode_json({"op": "png", "data": encode_png(text)})
     if form.fragment_size is None or len(text) <= form.fragment_size:
         return [Frame(text, is_text=True)]
     pieces = cut(text.decode(), form.fragment_size)
     id_ = f"fragment:{next(_fragment_numbers)}"
     return [
         Frame(
-            json_bytes({"op": "fragment", "id": id_, "data": piece, "num": number, "total": len(pieces)}),
+            encode_json({"op": "fragment", "id": id_, "data": piece, "num": number, "total": len(pieces)}),
             is_text=True,
         )
         for number, piece in enumerate(pieces)
@@ -121,7 +123,7 @@ def _text_frames(text: bytes, form: EncodingOptions) -> list[Frame]:
 def _json_payload(message: Message) -> bytes | None:
     """Return the data of a JSON message if pages can parse it, else None."""
     data = bytes(message.data)
-    if json_is_too_deep(data):
+    if is_json_too_deep(data):
         return None
     try:
         orjson.loads(data)
@@ -130,7 +132,7 @@ def _json_payload(message: Message) -> bytes | None:
     return data
 
 
-def json_bytes(value: object) -> bytes:
+def encode_json(value: object) -> bytes:
     """Encode a value as JSON, with bytes in base64. Raises `EncodeError`."""
     try:
         return orjson.dumps(value, _encode_default, orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY)
@@ -144,7 +146,7 @@ def _encode_default(value: object) -> object:
     raise TypeError(type(value).__name__)
 
 
-def _cbor(value: object) -> bytes:
+def _encode_cbor(value: object) -> bytes:
     try:
         return cbor2.dumps(value)
     except (cbor2.CBOREncodeError, OverflowError, RecursionError, UnicodeError) as error:

@@ -22,10 +22,10 @@ from nep.errors import AddressInUseError, NepError, TooManyFilesError
 from nep.i18n import _
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
-from nep.programs.web.access import Access, AuthCheck, is_own_host, query_of
-from nep.programs.web.context import ConnectedPage, Refusal, RefusalKind, WebCounts
+from nep.programs.web.access import Access, AuthVerifier, is_local_host, path_with_token
+from nep.programs.web.context import ConnectedPage, Rejection, RejectionKind, WebCounts
 from nep.programs.web.foxglove import SUBPROTOCOLS, ChannelFormat, FoxglovePage, is_offered
-from nep.programs.web.handshake import address_of, host_of, is_handshake, origin_of, own_origin
+from nep.programs.web.handshake import address_of, host_of, is_handshake, origin_of, server_origin
 from nep.programs.web.kept_out import BlockedPages
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
 from nep.programs.web.rosbridge.page import Page, authenticate
@@ -56,7 +56,7 @@ _SHUTDOWN_TIMEOUT_S = 1.0
 """Time in seconds that pages have to reply to a close frame when the server stops."""
 _JOIN_TIMEOUT_S = 10.0
 _POLICY_VIOLATION = 1008
-_MAX_REFUSALS = 50
+_MAX_REJECTIONS = 50
 LANGUAGE = "web"
 """Language of the pages' nodes in the graph, by which other programs recognize pages."""
 _MAX_UNAUTHENTICATED = 16
@@ -98,12 +98,12 @@ class WebSettings:
     @property
     def is_open(self) -> bool:
         """True if other computers can connect."""
-        return any(not is_own_host(each) for each in self.hosts)
+        return any(not is_local_host(each) for each in self.hosts)
 
 
-class _Rejection(NamedTuple):
+class _HandshakeRejection(NamedTuple):
     status: HTTPStatus
-    kind: RefusalKind
+    kind: RejectionKind
     message: str
 
 
@@ -128,8 +128,8 @@ class WebServer:
         self._locked = 0
         self._kept_out = BlockedPages()
         self._refusals_lock = threading.Lock()
-        self._refusals: tuple[Refusal, ...] = ()
-        self._auth = AuthCheck(settings.access.token)
+        self._refusals: tuple[Rejection, ...] = ()
+        self._auth = AuthVerifier(settings.access.token)
         self._started = threading.Event()
         self._problem: Exception | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -144,7 +144,7 @@ class WebServer:
     @property
     def test_page_url(self) -> str:
         """URL of the test page for a browser on this computer, with the token if one is required."""
-        return f"http://{_LOOPBACK}:{self.port}{query_of(self.settings.access.token)}"
+        return f"http://{_LOOPBACK}:{self.port}{path_with_token(self.settings.access.token)}"
 
     @property
     def page_names(self) -> tuple[str, ...]:
@@ -158,7 +158,7 @@ class WebServer:
         return tuple(each.snapshot for each in pages if not each.is_closing)
 
     @property
-    def refusals(self) -> tuple[Refusal, ...]:
+    def rejections(self) -> tuple[Rejection, ...]:
         """Latest rejected connections and messages, oldest first. Thread-safe.
 
         A repeated rejection, such as of a page that reconnects, is listed once with the time of the last
@@ -194,7 +194,7 @@ class WebServer:
         check_token(replace(self.settings, access=access))
         with self._lock:
             if access.token != self.settings.access.token:
-                self._auth = AuthCheck(access.token)
+                self._auth = AuthVerifier(access.token)
             self.settings = replace(self.settings, access=access)
             return self._disconnect(
                 lambda page, known: not self._is_still_allowed(page.connection, known),
@@ -342,7 +342,7 @@ class WebServer:
                 partial(self._serve_page, guard),
                 self.settings.hosts,  # type: ignore[arg-type] # asyncio takes several
                 self.settings.port,
-                process_request=self._refusal,
+                process_request=self._process_request,
                 select_subprotocol=self._subprotocol,
                 compression=None,
                 open_timeout=_OPEN_TIMEOUT_S,
@@ -390,28 +390,30 @@ class WebServer:
 
     # ---- who connects
 
-    def _refusal(self, connection: ServerConnection, request: Request) -> Response | None:
+    def _process_request(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the response to a rejected handshake or to an HTTP request; None accepts a handshake."""
         if not is_handshake(request):
             return self._page_response(connection, request)
         access = self.settings.access
         origins = request.headers.get_all("Origin")
         origin = origins[0] if origins else None
-        refusal: _Rejection | None
+        refusal: _HandshakeRejection | None
         if len(origins) > 1:
-            refusal = _Rejection(
+            refusal = _HandshakeRejection(
                 HTTPStatus.FORBIDDEN, "other", _("the request has more than one Origin header")
             )
         elif len(self._pages) + self._locked >= MAX_PAGES:
-            refusal = _Rejection(HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("too many connections"))
-        elif said := access.origin_refusal(origin, own_origin(connection)):
-            refusal = _Rejection(HTTPStatus.FORBIDDEN, "origin", said)
+            refusal = _HandshakeRejection(HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("too many connections"))
+        elif said := access.origin_rejection_reason(origin, server_origin(connection)):
+            refusal = _HandshakeRejection(HTTPStatus.FORBIDDEN, "origin", said)
         elif self._kept_out.is_blocked(connection, request):
-            refusal = _Rejection(HTTPStatus.FORBIDDEN, "kept out", _("the user disconnected this page"))
+            refusal = _HandshakeRejection(
+                HTTPStatus.FORBIDDEN, "kept out", _("the user disconnected this page")
+            )
         elif not (self.settings.rosbridge or is_offered(request.headers.get_all("Sec-WebSocket-Protocol"))):
-            refusal = _Rejection(HTTPStatus.FORBIDDEN, "other", _("rosbridge is turned off"))
+            refusal = _HandshakeRejection(HTTPStatus.FORBIDDEN, "other", _("rosbridge is turned off"))
         else:
-            refusal = self._token_refusal(connection, request, access)
+            refusal = self._token_rejection(connection, request, access)
         if refusal is None:
             return None
         self._record_rejection(
@@ -430,11 +432,11 @@ class WebServer:
             method,
             request.path,
             tuple(request.headers.get_all("Host")),
-            own_origin(connection),
+            server_origin(connection),
             authorizations[0] if len(authorizations) == 1 else None,
         )
         found = respond(asked, self.settings.access)
-        if found.is_token_refused:
+        if found.is_token_rejected:
             self._record_rejection(
                 connection, "token", _("a page connected without the token or with a wrong one")
             )
@@ -444,9 +446,9 @@ class WebServer:
         body = b"" if method == "HEAD" else found.body
         return Response(found.status.value, found.status.phrase, headers, body)
 
-    def _token_refusal(
+    def _token_rejection(
         self, connection: ServerConnection, request: Request, access: Access
-    ) -> _Rejection | None:
+    ) -> _HandshakeRejection | None:
         authorizations = request.headers.get_all("Authorization")
         is_given = access.check_token(request.path, authorizations[0] if authorizations else None)
         connection.is_unlocked = not access.token or is_given is True  # type: ignore[attr-defined]
@@ -454,9 +456,9 @@ class WebServer:
         if not access.token or is_given:
             return None
         if is_given is False:
-            return _Rejection(HTTPStatus.UNAUTHORIZED, "token", _("the token is wrong"))
+            return _HandshakeRejection(HTTPStatus.UNAUTHORIZED, "token", _("the token is wrong"))
         if self._locked >= _MAX_UNAUTHENTICATED:
-            return _Rejection(
+            return _HandshakeRejection(
                 HTTPStatus.UNAUTHORIZED,
                 "token",
                 _("a token is required; connect to ws://HOST:PORT/?token=TOKEN"),
@@ -472,23 +474,23 @@ class WebServer:
         return next((each for each in offered if each in SUBPROTOCOLS), None)
 
     def _record_rejection(
-        self, connection: ServerConnection, kind: RefusalKind, said: str, origin: str = ""
+        self, connection: ServerConnection, kind: RejectionKind, said: str, origin: str = ""
     ) -> None:
         who = escaped((origin or host_of(connection))[:200])
-        self._add_refusal(Refusal(time.time(), who, said, origin[:200], kind))
+        self._add_rejection(Rejection(time.time(), who, said, origin[:200], kind))
         self.counts.turned_away += 1
         if is_logged(self.counts.turned_away):
             where = address_of(connection)
             _logger.warning("refused %s: %s (%d so far)", where, said, self.counts.turned_away)
 
-    def _record_robot_refusal(self, connection: ServerConnection, robot: str, said: str) -> None:
+    def _record_robot_rejection(self, connection: ServerConnection, robot: str, said: str) -> None:
         who = escaped((origin_of(connection) or host_of(connection))[:200])
-        self._add_refusal(Refusal(time.time(), who, said, kind="robot", robot=escaped(robot[:200])))
+        self._add_rejection(Rejection(time.time(), who, said, kind="robot", robot=escaped(robot[:200])))
 
-    def _add_refusal(self, refusal: Refusal) -> None:
+    def _add_rejection(self, refusal: Rejection) -> None:
         with self._refusals_lock:
             others = (each for each in self._refusals if replace(each, time_s=refusal.time_s) != refusal)
-            self._refusals = (*others, refusal)[-_MAX_REFUSALS:]
+            self._refusals = (*others, refusal)[-_MAX_REJECTIONS:]
 
     async def _serve_page(self, guard: MotionGuard, connection: ServerConnection) -> None:
         access: Access = connection.access  # type: ignore[attr-defined]
@@ -518,7 +520,7 @@ class WebServer:
     def _new_page(self, connection: ServerConnection, guard: MotionGuard) -> Page | FoxglovePage:
         name = node_name(origin_of(connection), address_of(connection))
         channels = self.settings.foxglove
-        report = partial(self._record_robot_refusal, connection)
+        report = partial(self._record_robot_rejection, connection)
         if channels is not None and connection.subprotocol in SUBPROTOCOLS:
             return FoxglovePage(
                 connection,
@@ -536,10 +538,10 @@ class WebServer:
         access = self.settings.access
         if not self.settings.rosbridge and connection.subprotocol not in SUBPROTOCOLS:
             return False
-        is_refused = access.origin_refusal(origin_of(connection), own_origin(connection))
+        is_refused = access.origin_rejection_reason(origin_of(connection), server_origin(connection))
         return not is_refused and (not access.token or access.token == known.token)
 
-    async def _is_authenticated(self, connection: ServerConnection, auth: AuthCheck) -> bool:
+    async def _is_authenticated(self, connection: ServerConnection, auth: AuthVerifier) -> bool:
         self._locked += 1
         try:
             if await authenticate(connection, auth):

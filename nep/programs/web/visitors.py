@@ -9,7 +9,7 @@ from urllib.parse import parse_qs, unquote, urlsplit
 from nep.text import escaped
 
 Device = Literal["", "phone", "tablet"]
-MAX_SHOWN_LENGTH = 60
+MAX_DISPLAYED_LENGTH = 60
 _MAX_READ_LENGTH = 2_000
 _CLIENTS = (
     ("Lichtblick", "Lichtblick"),
@@ -29,7 +29,7 @@ _CLIENTS = (
 
 The order matters because most browsers also claim to be Chrome and Safari.
 """
-_PRODUCT = re.compile(r"[A-Za-z][\w.+-]*")
+_PRODUCT_TOKEN = re.compile(r"[A-Za-z][\w.+-]*")
 
 
 def client_name(user_agent: str, *, is_foxglove: bool = False) -> str:
@@ -45,8 +45,8 @@ def client_name(user_agent: str, *, is_foxglove: bool = False) -> str:
     for mark, name in _CLIENTS:
         if mark in given:
             return name
-    product = _PRODUCT.match(given)
-    return "" if product is None or product[0] == "Mozilla" else product[0][:MAX_SHOWN_LENGTH]
+    product = _PRODUCT_TOKEN.match(given)
+    return "" if product is None or product[0] == "Mozilla" else product[0][:MAX_DISPLAYED_LENGTH]
 
 
 def device_kind(user_agent: str) -> Device:
@@ -66,7 +66,7 @@ def page_title(path: str, referer: str, origin: str) -> str:
         origin: Origin of the page, which every browser sends. Its host and port have the lowest priority.
     """
     for title in (_title_parameter(path), _last_part(referer), _host(origin)):
-        if shown := escaped(title.strip())[:MAX_SHOWN_LENGTH]:
+        if shown := escaped(title.strip())[:MAX_DISPLAYED_LENGTH]:
             return shown
     return ""
 

@@ -8,10 +8,10 @@ from dataclasses import asdict
 from typing import IO
 
 from nep.messages.packing import pack, unpack
-from nep.recordings.file_reader import FileFacts
+from nep.recordings.file_reader import FileInfo
 from nep.recordings.formats.channels import ChannelDefinition
 from nep.recordings.formats.index import AttachedFile, CorruptRange
-from nep.recordings.formats.records import RawMessage, message_head
+from nep.recordings.formats.records import RawMessage, pack_message_head
 
 _LENGTH = struct.Struct("<I")
 _MAX_FRAME_BYTES = 2**31 - 1
@@ -46,7 +46,7 @@ def pack_messages(messages: Iterable[RawMessage]) -> bytes:
     pieces: list[bytes | memoryview] = []
     for raw in messages:
         size = raw.data.nbytes
-        pieces += (message_head(raw.channel, raw.sequence, raw.log_ns, raw.publish_ns, size), raw.data)
+        pieces += (pack_message_head(raw.channel, raw.sequence, raw.log_ns, raw.publish_ns, size), raw.data)
     return b"".join(pieces)
 
 
@@ -60,7 +60,7 @@ def corruption_from_plain(plain: object) -> tuple[CorruptRange, ...]:
     return tuple(CorruptRange(**each) for each in plain) if isinstance(plain, list) else ()
 
 
-def facts_to_plain(facts: FileFacts) -> dict[str, object]:
+def file_info_to_plain(facts: FileInfo) -> dict[str, object]:
     """Convert the properties of a file to plain values for a frame."""
     return {
         **{name: getattr(facts, name) for name in _SCALAR_FIELDS},
@@ -85,7 +85,7 @@ def facts_to_plain(facts: FileFacts) -> dict[str, object]:
 _SCALAR_FIELDS = ("start_ns", "end_ns", "size_bytes", "is_complete", "profile", "library")
 
 
-def facts_from_plain(plain: object) -> FileFacts:
+def file_info_from_plain(plain: object) -> FileInfo:
     """Convert plain values of a frame to the properties of a file.
 
     Raises `TypeError` or `KeyError` for invalid data.
@@ -96,7 +96,7 @@ def facts_from_plain(plain: object) -> FileFacts:
         number: ChannelDefinition(topic, encoding, name, kind, data, tuple(map(tuple, metadata)))
         for number, (topic, encoding, name, kind, data, metadata) in plain["channels"].items()
     }
-    return FileFacts(
+    return FileInfo(
         channels=definitions,
         counts=plain["counts"],
         metadata=tuple((name, values) for name, values in plain["metadata"]),

@@ -20,7 +20,7 @@ from nep.errors import NepError, RecordingError, RecordingTooLargeError
 from nep.i18n import _, set_initial_language
 from nep.recordings.apart.frames import (
     corruption_to_plain,
-    facts_to_plain,
+    file_info_to_plain,
     pack_messages,
     read_frame,
     write_frame,
@@ -99,7 +99,7 @@ class RecordingService:
         file = FileReader(path, cache_bytes=request["cache_bytes"], progress=progress, budget=budget)
         number = next(self._numbers)
         self._files[number] = file
-        return {"file": number, "facts": facts_to_plain(file.facts)}
+        return {"file": number, "facts": file_info_to_plain(file.info)}
 
     def _read_raw(self, request: Mapping[str, Any]) -> Reply:
         pieces = None if request["pieces"] is None else set(request["pieces"])

@@ -17,8 +17,8 @@ from typing import IO, TYPE_CHECKING, Any
 from nep.errors import ClosedError, RecordingError, RecordingTooLargeError
 from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
-from nep.recordings.apart.frames import corruption_from_plain, facts_from_plain, read_frame, write_frame
-from nep.recordings.file_reader import CACHE_BYTES, FileFacts
+from nep.recordings.apart.frames import corruption_from_plain, file_info_from_plain, read_frame, write_frame
+from nep.recordings.file_reader import CACHE_BYTES, FileInfo
 from nep.recordings.formats.index import CorruptRange
 from nep.recordings.formats.records import RawMessage, messages_in
 from nep.recordings.reader import Recording
@@ -213,7 +213,7 @@ class _RemoteFile:
         self._number = opened["file"]
         self._is_closed = False
         self._damage = corruption_from_plain(opened.get("damage"))
-        self.facts: FileFacts = facts_from_plain(opened["facts"])
+        self.info: FileInfo = file_info_from_plain(opened["facts"])
 
     @property
     def corruption(self) -> Sequence[CorruptRange]:

@@ -19,12 +19,12 @@ import orjson
 
 from nep.errors import DecodeError
 from nep.messages.codecs import codec_for
-from nep.messages.image_codec import picture_info, raw_layout
+from nep.messages.image_codec import image_info, raw_layout
 from nep.messages.message import NO_EXTENSION, Message, MessageKind, message_kind, received_message
 from nep.messages.packing import pack, unpack
 from nep.recordings.formats.protobuf import (
     EXTRA_FIELD,
-    bytes_field,
+    bytes_field_head,
     descriptor_set,
     fields,
     fixed_field,
@@ -37,7 +37,7 @@ METADATA_PREFIX = "nep."
 """Prefix of nep's keys in the metadata of channels."""
 _U32, _U64 = 2**32 - 1, 2**64 - 1
 Role = str
-OWN_TOPICS: Mapping[Role, str] = {
+RECORDER_TOPICS: Mapping[Role, str] = {
     "figures": "/nep/recording/figures",
     "alerts": "/nep/recording/alerts",
     "notes": "/nep/recording/notes",
@@ -112,7 +112,7 @@ def encoding_of(message: Message, log_ns: int, *, is_self_contained: bool = Fals
     """
     seq, stamp = message.seq, message.stamp_ns
     codec, extension = message.kind.codec, message.extension
-    form, is_decodable, before = _form(message, log_ns if stamp is None else stamp)
+    form, is_decodable, before = _determine_form(message, log_ns if stamp is None else stamp)
     extra: dict[str, Any] = {}
     if extension:
         extra["extension"] = dict(extension)
@@ -135,8 +135,8 @@ def encoding_of(message: Message, log_ns: int, *, is_self_contained: bool = Fals
     if form in _DATA_FIELD:
         if extra:
             packed = _pack_extra(extra)
-            before += bytes_field(EXTRA_FIELD, len(packed)) + packed
-        before += bytes_field(_DATA_FIELD[form], message.size_bytes)
+            before += bytes_field_head(EXTRA_FIELD, len(packed)) + packed
+        before += bytes_field_head(_DATA_FIELD[form], message.size_bytes)
     sequence = 0 if seq is None else seq & _U32
     publish_ns = log_ns if stamp is None else max(0, min(stamp, _U64))
     return Encoding(form, before, sequence, publish_ns, is_decodable, is_self_contained)
@@ -151,7 +151,7 @@ def _pack_extra(extra: Mapping[str, Any]) -> bytes:
         return pack(plain | numbers)
 
 
-def _form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
+def _determine_form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
     # (form, whether it can be decoded, fields before its data)
     codec = message.kind.codec
     if codec == "json":
@@ -161,7 +161,7 @@ def _form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
             return "wrapped", _is_decodable(message), b""
         return "json", True, b""
     if codec == "image":
-        return _picture_form(message, stamp_ns)
+        return _determine_image_form(message, stamp_ns)
     is_decodable = codec == "bytes" or _is_decodable(message)
     if codec == "string" and is_decodable:
         return "text", True, b""
@@ -178,16 +178,16 @@ def _is_decodable(message: Message) -> bool:
     return True
 
 
-def _picture_form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
+def _determine_image_form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
     encoding = message.extension.get("encoding")
     time = timestamp_field(1, max(0, min(stamp_ns, _U64)))
     layout = raw_layout(encoding)
     if layout is None:
-        info = picture_info(message.raw)
+        info = image_info(message.raw)
         if info is None:
             return "wrapped", False, b""
         kind = str(info["encoding"]).encode()
-        return "picture", True, time + bytes_field(3, len(kind)) + kind
+        return "picture", True, time + bytes_field_head(3, len(kind)) + kind
     shape = message.extension.get("shape")
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
     if len(sides) != 2 or not all(type(side) is int and 0 < side <= _U32 for side in sides):
@@ -199,7 +199,7 @@ def _picture_form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
     if encoding not in _VIEWABLE_LAYOUTS or step > _U32:
         return "wrapped", True, b""
     name = str(encoding).encode()
-    sizes = fixed_field(2, width) + fixed_field(3, height) + bytes_field(4, len(name)) + name
+    sizes = fixed_field(2, width) + fixed_field(3, height) + bytes_field_head(4, len(name)) + name
     return "raw", True, time + sizes + fixed_field(5, step)
 
 
@@ -232,9 +232,9 @@ def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
     return ChannelDefinition(kind.topic, encoded_as, *schema, tuple(metadata))
 
 
-def own_channel(role: Role) -> ChannelDefinition:
+def recorder_channel(role: Role) -> ChannelDefinition:
     """Return the channel for the recorder's own entries of a role, encoded as JSON."""
-    topic = OWN_TOPICS[role]
+    topic = RECORDER_TOPICS[role]
     return ChannelDefinition(
         topic, "json", f"nep/{role}", "jsonschema", b'{"type":"object"}', (("nep.role", role),)
     )

@@ -69,7 +69,7 @@ class Destination(Protocol):
         """Close the file without a summary, because an error has occurred."""
 
 
-class OneFile:
+class SingleFile:
     """Destination that writes a single file.
 
     Args:

@@ -25,16 +25,16 @@ from nep.recordings.formats.records import (
     HEAD_BYTES,
     MAGIC,
     MAX_CHUNK_BYTES,
-    MESSAGE_REST_BYTES,
+    MESSAGE_FIELDS_BYTES,
     MESSAGE_START,
     RECORD_HEAD,
     ChunkHead,
     ChunkInfo,
     Opcode,
     RawMessage,
-    chunk_head,
     messages_in,
     pack_offsets,
+    read_chunk_head,
     read_chunk_info,
     read_message_index,
     read_record,
@@ -53,7 +53,7 @@ Larger records are damaged, or are attachments, which are not read.
 """
 _MAX_SCHEMA_BYTES = 8_000_000
 _MAX_CHANNEL_BYTES = 256_000
-_MAX_SIZES: Mapping[int, int] = {Opcode.SCHEMA: _MAX_SCHEMA_BYTES, Opcode.CHANNEL: _MAX_CHANNEL_BYTES}
+_MAX_RECORD_SIZES: Mapping[int, int] = {Opcode.SCHEMA: _MAX_SCHEMA_BYTES, Opcode.CHANNEL: _MAX_CHANNEL_BYTES}
 _MAX_DEFINITION_BYTES = 64_000_000
 _MAX_OTHER_RECORDS = 200_000
 _UNCOUNTED_OPCODES = frozenset({Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX})
@@ -62,8 +62,8 @@ _MAX_METADATA_BYTES = 4_000_000
 _MAX_ATTACHMENTS = 1_000
 _MAX_HEADER_BYTES = 64_000
 _MAX_COUNTED_CHUNKS = 10_000
-_RUN_BYTES = 1_000_000
-_MAX_INSIDE_BYTES = 65_536
+_MAX_RUN_BYTES = 1_000_000
+_MAX_RUN_RECORD_BYTES = 65_536
 """Record size in bytes above which a run of messages ends, so that long records are not part of a run."""
 _READ_BYTES = 1_048_576
 
@@ -149,7 +149,7 @@ class Definitions:
         Returns:
             Numbers of the channels that are now complete.
         """
-        most = _MAX_SIZES.get(opcode, 0)
+        most = _MAX_RECORD_SIZES.get(opcode, 0)
         if not 2 <= len(content) <= most:
             return []
         whole = bytes(content)
@@ -230,10 +230,10 @@ def read_index(
         raise RecordingError(str(path), _("not an MCAP file"))
     work = budget or open_budget(path, size)
     footer = _footer(file, size)
-    index = None if footer is None else _Summary(file, path, size, work).read(footer)
+    index = None if footer is None else _SummaryReader(file, path, size, work).read(footer)
     if index is None:
         data_end = size if footer is None else size - _FOOTER_BYTES
-        index = _Scan(file, path, size, work, progress, data_end).run()
+        index = _Scanner(file, path, size, work, progress, data_end).run()
         index.is_complete = footer is not None
     _read_header(file, index)
     index.chunks.sort(key=lambda each: each.start_ns)
@@ -282,7 +282,7 @@ def _read_metadata(file: BinaryIO, place: RecordLocation, index: FileIndex) -> N
 # ---- from the summary
 
 
-class _Summary:
+class _SummaryReader:
     """Reader that validates the summary of a file."""
 
     def __init__(self, file: BinaryIO, path: Path, size: int, budget: ReadBudget) -> None:
@@ -388,7 +388,7 @@ class _Summary:
 # ---- from the records
 
 
-class _Scan:
+class _Scanner:
     """Builder of an index for a file without summary, from its chunks and runs of messages."""
 
     def __init__(
@@ -446,7 +446,7 @@ class _Scan:
             return
         self._end_chunk()
         self._others.add(opcode)
-        if opcode == Opcode.CHUNK or place.length > _MAX_INSIDE_BYTES:
+        if opcode == Opcode.CHUNK or place.length > _MAX_RUN_RECORD_BYTES:
             self._end_run()
         if opcode == Opcode.CHUNK:
             self._start_chunk(place)
@@ -461,11 +461,11 @@ class _Scan:
     # -- messages outside of chunks
 
     def _add_message(self, place: RecordLocation) -> None:
-        if place.length < MESSAGE_REST_BYTES:
+        if place.length < MESSAGE_FIELDS_BYTES:
             return
         channel, _sequence, log_ns = MESSAGE_START.unpack_from(place.prefix)
         run = self._run
-        if run is None or place.end - run.offset > _RUN_BYTES:
+        if run is None or place.end - run.offset > _MAX_RUN_BYTES:
             self._end_run()
             run = self._run = ChunkInfo(log_ns, log_ns, place.offset, 0, b"", 0, "", 0, 0, is_run=True)
         run.length = place.end - run.offset
@@ -488,7 +488,7 @@ class _Scan:
     # -- chunks
 
     def _start_chunk(self, place: RecordLocation) -> None:
-        head = chunk_head(RECORD_HEAD.pack(place.opcode, place.length) + place.prefix, place.length)
+        head = read_chunk_head(RECORD_HEAD.pack(place.opcode, place.length) + place.prefix, place.length)
         if head is None:
             self._index.corruption.append(CorruptRange(place.offset, HEAD_BYTES + place.length))
         else:
@@ -582,7 +582,7 @@ def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
         return record
     if len(record) < HEAD_BYTES or record[0] != Opcode.CHUNK:
         raise ValueError("cut")
-    head = chunk_head(record, info.length - HEAD_BYTES)
+    head = read_chunk_head(record, info.length - HEAD_BYTES)
     if head is None:
         raise ValueError("head")
     return decompress(record[head.data_offset :], head)

@@ -15,12 +15,12 @@ from nep.i18n import _
 
 MAX_PLAIN_CHUNK_BYTES = 64 * 2**20
 """Decompressed size in bytes up to which a chunk is always accepted."""
-_MAX_RATIO = 2
+_MAX_COMPRESSION_RATIO = 2
 _MAX_CHUNK_BYTES = 2**30
 RECORD_COST_BYTES = 200
 """Cost of parsing a record, in bytes that can be decompressed in the same time (1 µs, Python 3.11)."""
-_OPEN_BYTES = 400_000_000
-_OPEN_RATIO = 64
+_OPEN_BUDGET_BYTES = 400_000_000
+_OPEN_BUDGET_RATIO = 64
 
 
 def max_chunk_bytes(compressed_bytes: int) -> int:
@@ -32,7 +32,7 @@ def max_chunk_bytes(compressed_bytes: int) -> int:
     Args:
         compressed_bytes: Size of the chunk in the file.
     """
-    return min(_MAX_CHUNK_BYTES, max(MAX_PLAIN_CHUNK_BYTES, _MAX_RATIO * compressed_bytes))
+    return min(_MAX_CHUNK_BYTES, max(MAX_PLAIN_CHUNK_BYTES, _MAX_COMPRESSION_RATIO * compressed_bytes))
 
 
 class ReadBudget:
@@ -72,4 +72,4 @@ def open_budget(path: Path, size_bytes: int) -> ReadBudget:
         path: Path of the file, for error messages.
         size_bytes: Size of the file.
     """
-    return ReadBudget(path, _OPEN_BYTES + _OPEN_RATIO * size_bytes)
+    return ReadBudget(path, _OPEN_BUDGET_BYTES + _OPEN_BUDGET_RATIO * size_bytes)

@@ -23,9 +23,9 @@ from nep.recordings.formats.records import (
     ChunkInfo,
     Opcode,
     message_count,
-    message_head,
     pack_chunk,
     pack_chunk_info,
+    pack_message_head,
     pack_message_index,
     pack_offsets,
     pack_record,
@@ -112,7 +112,7 @@ class ChannelTable:
         ), channel
 
 
-def _open_private(path: str, flags: int) -> int:
+def _open_private_file(path: str, flags: int) -> int:
     # Readable by the owner only: recordings may contain camera images and sound.
     return os.open(path, flags, 0o600)
 
@@ -170,7 +170,7 @@ class FileWriter:
         """Number of messages by channel in the written chunks."""
         self._compression = compression
         self._file: BinaryIO = open(  # noqa: SIM115
-            path, "xb" if is_new else "wb", buffering=0, opener=_open_private
+            path, "xb" if is_new else "wb", buffering=0, opener=_open_private_file
         )
         self._at = 0
         self._chunk = _Chunk()
@@ -235,7 +235,7 @@ class FileWriter:
             chunk.start_ns = log_ns
         index.append(log_ns)
         index.append(chunk.size)
-        head = message_head(channel, sequence, log_ns, times[1], size)
+        head = pack_message_head(channel, sequence, log_ns, times[1], size)
         chunk.parts.append(head + before if before else head)
         chunk.parts.append(data)
         chunk.size += len(head) + size
@@ -253,7 +253,7 @@ class FileWriter:
         head = pack_chunk(payload, compression, size, crc, (chunk.start_ns, chunk.end_ns))
         indexes = {number: pack_message_index(number, entries) for number, entries in chunk.indexes.items()}
         counts = self.pending_counts
-        self.define(counts)
+        self.write_channels(counts)
         info = ChunkInfo(
             chunk.start_ns,
             chunk.end_ns,
@@ -279,7 +279,7 @@ class FileWriter:
         """
         self.flush()
         counts = {number: message_count(index) for number, index in indexes.items()}
-        self.define(counts)
+        self.write_channels(counts)
         copied = replace(info, offset=self._at, packed_offsets=b"", index_bytes=0)
         self._write_chunk(copied, [record], indexes, counts)
 
@@ -306,7 +306,7 @@ class FileWriter:
         for number, count in counts.items():
             self.counts[number] = self.counts.get(number, 0) + count
 
-    def define(self, channels: Mapping[int, object]) -> None:
+    def write_channels(self, channels: Mapping[int, object]) -> None:
         """Write the channels, and their schemas, that are not in the file yet.
 
         Args:

@@ -26,7 +26,7 @@ _U32, _U64 = struct.Struct("<I"), struct.Struct("<Q")
 _NS_PER_S = 1_000_000_000
 
 
-def _varint(number: int) -> bytes:
+def _encode_varint(number: int) -> bytes:
     encoded = bytearray()
     while number > 0x7F:
         encoded.append(number & 0x7F | 0x80)
@@ -35,23 +35,23 @@ def _varint(number: int) -> bytes:
     return bytes(encoded)
 
 
-def bytes_field(number: int, size_bytes: int) -> bytes:
+def bytes_field_head(number: int, size_bytes: int) -> bytes:
     """Encode the part of a field of bytes, text or a message that precedes its content.
 
     Args:
         number: Number of the field.
         size_bytes: Size of the content.
     """
-    return _varint(number << 3 | _BYTES) + _varint(size_bytes)
+    return _encode_varint(number << 3 | _BYTES) + _encode_varint(size_bytes)
 
 
 def _complete_field(number: int, data: bytes) -> bytes:
-    return bytes_field(number, len(data)) + data
+    return bytes_field_head(number, len(data)) + data
 
 
 def fixed_field(number: int, value: int) -> bytes:
     """Encode a field of type `fixed32`."""
-    return _varint(number << 3 | _FIXED32) + _U32.pack(value)
+    return _encode_varint(number << 3 | _FIXED32) + _U32.pack(value)
 
 
 def timestamp_field(number: int, stamp_ns: int) -> bytes:
@@ -62,7 +62,7 @@ def timestamp_field(number: int, stamp_ns: int) -> bytes:
         stamp_ns: Time in ns since 1970.
     """
     seconds, rest = divmod(stamp_ns, _NS_PER_S)
-    return _complete_field(number, b"\x08" + _varint(seconds) + b"\x10" + _varint(rest))
+    return _complete_field(number, b"\x08" + _encode_varint(seconds) + b"\x10" + _encode_varint(rest))
 
 
 def _read_varint(data: memoryview, at: int) -> tuple[int, int]:
@@ -135,18 +135,20 @@ SCHEMAS: Mapping[str, _Fields] = {
 """Fields of each message, by the name of the message."""
 
 
-def _message_type(name: str, fields_of_it: _Fields) -> bytes:
+def _message_descriptor(name: str, fields_of_it: _Fields) -> bytes:
     encoded = _complete_field(1, name.encode())
     for field_name, (number, kind) in fields_of_it.items():
         one = _complete_field(1, field_name.encode())
-        one += b"\x18" + _varint(number) + b"\x20\x01\x28" + _varint(kind)  # number, optional, type
+        one += (
+            b"\x18" + _encode_varint(number) + b"\x20\x01\x28" + _encode_varint(kind)
+        )  # number, optional, type
         if kind == _MESSAGE:
             one += _complete_field(6, f".{_STAMP}".encode())
         encoded += _complete_field(2, one)
     return encoded
 
 
-def _file(name: str, package: str, depends_on: str, message: bytes) -> bytes:
+def _file_descriptor(name: str, package: str, depends_on: str, message: bytes) -> bytes:
     encoded = _complete_field(1, name.encode()) + _complete_field(2, package.encode())
     if depends_on:
         encoded += _complete_field(3, depends_on.encode())
@@ -161,10 +163,10 @@ def descriptor_set(schema: str) -> bytes:
         schema: Name of the message.
     """
     package, name = schema.split(".")
-    message = _message_type(name, SCHEMAS[schema])
+    message = _message_descriptor(name, SCHEMAS[schema])
     needs = "google/protobuf/timestamp.proto" if "timestamp" in SCHEMAS[schema] else ""
     encoded = b""
     if needs:
-        stamp = _message_type("Timestamp", {"seconds": (1, _INT64), "nanos": (2, _INT32)})
-        encoded += _complete_field(1, _file(needs, "google.protobuf", "", stamp))
-    return encoded + _complete_field(1, _file(f"{package}/{name}.proto", package, needs, message))
+        stamp = _message_descriptor("Timestamp", {"seconds": (1, _INT64), "nanos": (2, _INT32)})
+        encoded += _complete_field(1, _file_descriptor(needs, "google.protobuf", "", stamp))
+    return encoded + _complete_field(1, _file_descriptor(f"{package}/{name}.proto", package, needs, message))

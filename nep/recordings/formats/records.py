@@ -34,7 +34,7 @@ HEAD_BYTES = RECORD_HEAD.size
 MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _MAX_OTHER_RECORDS = 200_000
 """Maximum number of schema and channel records in a chunk."""
-MESSAGE_REST_BYTES = MESSAGE_HEAD.size - HEAD_BYTES
+MESSAGE_FIELDS_BYTES = MESSAGE_HEAD.size - HEAD_BYTES
 MESSAGE_START = struct.Struct("<HIQ")  # channel, sequence, log time
 _CHUNK = struct.Struct("<QQQII")  # start, end, uncompressed size, CRC, length of the compression's name
 _SIZE = struct.Struct("<Q")
@@ -77,7 +77,7 @@ def read_record(kind: str, content: bytes | memoryview) -> Any:  # noqa: ANN401 
         kind: Name of the class in `mcap.records`.
         content: Content of the record.
     """
-    stream_class, record_class = _classes(kind)
+    stream_class, record_class = _record_classes(kind)
     try:
         return record_class.read(stream_class(io.BytesIO(content)))
     except (struct.error, OverflowError, EOFError, MemoryError, mcap_exceptions.McapError) as error:
@@ -85,7 +85,7 @@ def read_record(kind: str, content: bytes | memoryview) -> Any:  # noqa: ANN401 
 
 
 @cache
-def _classes(kind: str) -> tuple[Any, Any]:
+def _record_classes(kind: str) -> tuple[Any, Any]:
     return mcap_stream.ReadDataStream, getattr(mcap_records, kind)
 
 
@@ -125,7 +125,7 @@ class RawMessage(NamedTuple):
     data: memoryview
 
 
-def message_head(channel: int, sequence: int, log_ns: int, publish_ns: int, size_bytes: int) -> bytes:
+def pack_message_head(channel: int, sequence: int, log_ns: int, publish_ns: int, size_bytes: int) -> bytes:
     """Encode the part of a message record that precedes the data.
 
     Args:
@@ -136,7 +136,7 @@ def message_head(channel: int, sequence: int, log_ns: int, publish_ns: int, size
         size_bytes: Size of the data.
     """
     return MESSAGE_HEAD.pack(
-        Opcode.MESSAGE, MESSAGE_REST_BYTES + size_bytes, channel, sequence, log_ns, publish_ns
+        Opcode.MESSAGE, MESSAGE_FIELDS_BYTES + size_bytes, channel, sequence, log_ns, publish_ns
     )
 
 
@@ -157,7 +157,7 @@ def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessa
         if end > size:
             return
         if opcode == Opcode.MESSAGE:
-            if length < MESSAGE_REST_BYTES:
+            if length < MESSAGE_FIELDS_BYTES:
                 return
             _opcode, _length, channel, sequence, log_ns, publish_ns = MESSAGE_HEAD.unpack_from(whole, offset)
             yield RawMessage(
@@ -186,7 +186,7 @@ class ChunkHead(NamedTuple):
     data_bytes: int
 
 
-def chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None:
+def read_chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None:
     """Parse the header of a chunk record; return None if the bytes are invalid.
 
     Validation is strict, so that arbitrary bytes of a damaged file are not mistaken for a chunk.

@@ -19,7 +19,7 @@ import orjson
 from nep import geometry, sensor
 
 ANY_OBJECT = b'{"type":"object"}'
-_SCALARS: Mapping[object, str] = {str: "string", bool: "boolean", int: "integer", float: "number"}
+_SCALAR_TYPES: Mapping[object, str] = {str: "string", bool: "boolean", int: "integer", float: "number"}
 _MAX_DEPTH = 10
 
 
@@ -45,8 +45,8 @@ def json_schema(declared: type) -> bytes:
 def _schema_for(hint: Any, depth: int) -> dict[str, object] | None:  # noqa: ANN401 - any annotation
     # None if viewers don't support it.
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    if hint in _SCALARS:
-        return {"type": _SCALARS[hint]}
+    if hint in _SCALAR_TYPES:
+        return {"type": _SCALAR_TYPES[hint]}
     if origin in {typing.Union, types.UnionType}:
         known = [each for each in arguments if each is not type(None)]
         return _schema_for(known[0], depth) if len(known) == 1 else None

@@ -73,7 +73,7 @@ def test_compile_time_is_linear_in_number_of_blocks(make: Callable[[int], Saved]
 def test_duplicate_names_and_ids_keep_compile_time_linear() -> None:
     def name(count: int) -> None:
         names = PythonNames(frozenset())
-        assert len({names.new("when started", "script") for _ in range(count)}) == count
+        assert len({names.new_name("when started", "script") for _ in range(count)}) == count
 
     def parse(count: int) -> None:
         saved = workspace(*[block("x", "one id") for _ in range(count)])

@@ -11,7 +11,7 @@ from tests.blocks.samples import robot, say, started, text, workspace, write
 
 
 def begin(link: FakeLink, beat_s: float | None = None) -> Play:
-    pepper = replace(robot(), beat_s=beat_s)
+    pepper = replace(robot(), heartbeat_interval_s=beat_s)
     blocks = workspace(started(say("Hi") | {"id": "x"}, write(text("after"))))
     return Play(compile_behaviour(blocks, [pepper]), (pepper,), link).start()
 

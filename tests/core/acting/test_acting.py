@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import nep
-from app.core.run.acting.acting import FILE, call_text, result_text
+from app.core.run.acting.acting import FILE_NAME, call_text, result_text
 from app.core.run.acting.arming import Target
 from app.core.run.acting.sending import SendOrder, SendResult
 from app.core.run.acting.shelf import SavedMessage
@@ -59,7 +59,7 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
         assert first["id"] != second["id"]
         session.runs.stop()
         assert not acting.arming.is_on
-        assert acting.outbox.all_repeated == ()
+        assert acting.outbox.repeated_messages == ()
         while heard.receive(0.0) is not None:
             pass
         assert acting.repeat(sent.number) == "Sending to /cmd_vel isn't armed. Arm it first."
@@ -93,7 +93,7 @@ def test_shelf_is_saved_to_file_and_file_damage_is_reported(tmp_path: Path) -> N
     first.acting.shelf.set_message(STILL)
     first.acting.check()
     first.close()
-    path = tmp_path / FILE
+    path = tmp_path / FILE_NAME
     again = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
     assert again.acting.shelf.messages == (STILL,)
     assert not again.acting.arming.is_on
@@ -108,7 +108,7 @@ def test_shelf_is_saved_to_file_and_file_damage_is_reported(tmp_path: Path) -> N
 
 
 def test_shelf_file_of_newer_version_is_not_overwritten(tmp_path: Path) -> None:
-    path = tmp_path / FILE
+    path = tmp_path / FILE_NAME
     data = json.dumps({"format": 99, "messages": []})
     path.write_text(data, "utf-8")
     session = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
@@ -124,7 +124,7 @@ def test_send_results_are_formatted() -> None:
         (SendResult(order, "sent", subscriber_count=2), "received by 2"),
         (SendResult(order, "sent"), "no subscribers"),
         (SendResult(order, "began"), "started"),
-        (SendResult(order, "ended", count=412, skipped=3), "412 sent, 3 late messages skipped"),
+        (SendResult(order, "ended", count=412, dropped_count=3), "412 sent, 3 late messages skipped"),
         (SendResult(order, "failed", "not sent: no master was running"), "not sent: no master was running"),
         (SendResult(order, "failed", "it is closed", count=2), "2 sent, it is closed"),
         (SendResult(order, "ended"), "0 sent"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.run.acting.picture_point import TYPES, PicturePoint, default_topic
+from app.core.run.acting.picture_point import MESSAGE_TYPES, PicturePoint, default_topic
 from nep.messages.codecs import codec_for
 
 POINT = PicturePoint(16, 8, 320, 240, 1_795_164_093_000_000_007, "middle")
@@ -35,7 +35,7 @@ def test_ros_point_types_have_their_fields() -> None:
         "header": {"stamp": {"sec": 1_795_164_093, "nanosec": 7}, "frame_id": ""},
         "point": place,
     }
-    for msg_type in TYPES:
+    for msg_type in MESSAGE_TYPES:
         made = codec_for(msg_type).encode(POINT.payload("/camera", msg_type))
         assert codec_for(msg_type).decode(made.data, {}) == POINT.payload("/camera", msg_type)
 

@@ -9,7 +9,7 @@ import pytest
 import nep
 from app.core.run.acting import sending
 from app.core.run.acting.arming import Arming, Target
-from app.core.run.acting.sending import MAX_AGE_S, MAX_CONCURRENT, Outbox, RepeatedMessage, SendOrder
+from app.core.run.acting.sending import MAX_AGE_S, MAX_REPEATED_MESSAGES, Outbox, RepeatedMessage, SendOrder
 from nep.errors import NepError
 from nep.nodes.node import Node
 from tests.nep.programs import eventually
@@ -101,7 +101,7 @@ def test_invalid_message_fails_with_reason(bench, topic, msg_type, payload) -> N
     results = bench.outbox.pop_results()
     assert [each.kind for each in results] == ["failed", "failed"]
     assert all(each.message for each in results)
-    assert bench.outbox.all_repeated == ()
+    assert bench.outbox.repeated_messages == ()
 
 
 def test_message_repeats_until_stopped(bench) -> None:
@@ -151,11 +151,11 @@ def test_repeated_message_that_raises_ends_and_others_continue(bench) -> None:
 
 
 def test_number_and_rate_of_repeated_messages_are_limited(bench) -> None:
-    names = [f"/t{number}" for number in range(MAX_CONCURRENT + 1)]
+    names = [f"/t{number}" for number in range(MAX_REPEATED_MESSAGES + 1)]
     bench.arm(*names)
     begun = [bench.outbox.start(order(name, id=name), 1e-9) for name in names]
-    assert begun == [True] * MAX_CONCURRENT + [False]
-    assert {each.rate_hz for each in bench.outbox.all_repeated} == {0.1}
+    assert begun == [True] * MAX_REPEATED_MESSAGES + [False]
+    assert {each.rate_hz for each in bench.outbox.repeated_messages} == {0.1}
 
 
 def test_late_repetition_skips_missed_sends_without_a_burst(bench, monkeypatch) -> None:

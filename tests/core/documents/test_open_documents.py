@@ -11,7 +11,7 @@ import pytest
 from app.core.documents.document import Document
 from app.core.documents.file_format import BehaviourFile, write_file
 from app.core.documents.journal import Journal, unsaved_work
-from app.core.documents.open_documents import MAX_CLOSED, Documents
+from app.core.documents.open_documents import MAX_CLOSED_TABS, Documents
 from app.errors import DocumentError
 from app.robots import rize
 
@@ -267,10 +267,10 @@ def test_recovered_work_does_not_replace_newer_work(opened, documents, journals,
 
 
 def test_number_of_remembered_closed_tabs_is_limited(documents, tmp_path) -> None:
-    for number in range(MAX_CLOSED + 2):
+    for number in range(MAX_CLOSED_TABS + 2):
         documents.open(file(tmp_path, f"F{number}"))
         documents.close(documents.current)
     again = 0
     while documents.reopen() is not None:
         again += 1
-    assert again == MAX_CLOSED
+    assert again == MAX_CLOSED_TABS

@@ -92,12 +92,12 @@ def test_using_another_robot_fixes_the_problem_and_can_be_undone(tmp_path) -> No
     document.set_connected([pepper("Pepper 2")])
     before, fixes = document.workspace, document.fixes
     assert document.problems()
-    assert document.use_robot("Pepper", pepper("Pepper 2"))
+    assert document.replace_missing_robot("Pepper", pepper("Pepper 2"))
     assert document.problems() == ()
     assert document.program().robots == ("Pepper 2",)
     assert (document.fixes, document.dirty) == (fixes + 1, True)
     assert before == speaks_again(before), "the blocks of before are as they were: undo shows them"
-    assert not document.use_robot("Nobody", pepper("Pepper 2"))
+    assert not document.replace_missing_robot("Nobody", pepper("Pepper 2"))
 
 
 def speaks_again(saved):

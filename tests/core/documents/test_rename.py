@@ -121,7 +121,7 @@ def test_recent_files_entry_is_renamed_in_place(tmp_path: Path) -> None:
     settings.add_recent(second)
     rename_file(first, tmp_path / "C.nepb")
     settings.rename_recent(first, tmp_path / "C.nepb")
-    assert [each.name for each in settings.recent] == ["B", "C"]
+    assert [each.name for each in settings.recent_files] == ["B", "C"]
 
 
 def test_duplicate_opens_next_to_its_original(opened: Documents, tmp_path: Path) -> None:

@@ -82,11 +82,11 @@ def test_recent_files_have_the_same_titles_as_tabs(tmp_path) -> None:
     settings = Settings(tmp_path / "home")
     for folder in ("class 3", "class 4"):
         settings.add_recent(file(tmp_path / folder / "Greeting.nepb"), "An old name from inside")
-    assert [each.name for each in recent_titles(settings.recent)] == [
+    assert [each.name for each in recent_titles(settings.recent_files)] == [
         "Greeting — class 4",
         "Greeting — class 3",
     ]
-    assert [each.name for each in settings.recent] == ["Greeting", "Greeting"]
+    assert [each.name for each in settings.recent_files] == ["Greeting", "Greeting"]
 
 
 def test_work_closed_without_file_keeps_its_name(tmp_path) -> None:
@@ -96,8 +96,8 @@ def test_work_closed_without_file_keeps_its_name(tmp_path) -> None:
     assert document.name == "Quiz"
     settings = Settings(tmp_path / "home")
     settings.add_recent(closed_tabs_folder() / "Quiz 2026-11-23 08.00.nepb", "Quiz")
-    assert isinstance(settings.recent[0], RecentFile)
-    assert settings.recent[0].name == "Quiz"
+    assert isinstance(settings.recent_files[0], RecentFile)
+    assert settings.recent_files[0].name == "Quiz"
     again = Document(lambda: Journal(tmp_path / "journal"))
-    again.open(settings.recent[0].path)
+    again.open(settings.recent_files[0].path)
     assert again.name == "Quiz"

@@ -144,7 +144,7 @@ def test_newest_versions_and_a_sample_of_older_ones_are_kept(tmp_path: Path, fol
         kept(path, folder, str(when).encode(), when - hour, when)
     found = [each.replaced_s for each in versions_of(path, folder)]
     assert len(found) == versions.MAX_COPIES_PER_FILE
-    assert found[: versions.PROTECTED_COPIES] == times[: -versions.PROTECTED_COPIES - 1 : -1]
+    assert found[: versions.MIN_COPIES_PER_FILE] == times[: -versions.MIN_COPIES_PER_FILE - 1 : -1]
     assert len(set(times[:20]) & set(found)) >= 19, "one of nearly each day"
 
 

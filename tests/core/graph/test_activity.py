@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from app.core.graph.activity import QUIET_S, CallRates, QuietNodes
-from app.core.graph.node_graph import GraphFacts
+from app.core.graph.activity import QUIET_TIMEOUT_S, CallRates, QuietNodes
+from app.core.graph.node_graph import GraphInput
 from app.core.network.nodes import NodeEntry
 from app.core.network.topics import Topic
 from nep.protocol.graph_view import (
@@ -25,22 +25,22 @@ def heard(count: int, received: int | None, name: str = "/a") -> Topic:
     return Topic(name, info=info)
 
 
-def facts(*topics: Topic, calls: int = 0, generation: str = "native", network: str = "") -> GraphFacts:
+def facts(*topics: Topic, calls: int = 0, generation: str = "native", network: str = "") -> GraphInput:
     service = ServiceInfo(
         "s", "", (ServerInfo(1, "3", (), calls, 0, 0),), (ClientInfo(1, "4", None, None),), calls
     )
     entries = [NodeEntry(id, f"node {id}", generation=generation, network=network) for id in "1234"]
-    return GraphFacts(entries, topics, {"s": service}, (), "here")
+    return GraphInput(entries, topics, {"s": service}, (), "here")
 
 
 def test_node_without_traffic_for_a_minute_is_quiet() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(1, 1)), 0.0)
-    assert quiet.quiet_keys(QUIET_S - 1) == frozenset()
-    assert quiet.quiet_keys(QUIET_S) == {"1", "2", "3", "4"}
+    assert quiet.quiet_keys(QUIET_TIMEOUT_S - 1) == frozenset()
+    assert quiet.quiet_keys(QUIET_TIMEOUT_S) == {"1", "2", "3", "4"}
     quiet.update(facts(heard(2, 1), calls=1), 30.0)
-    assert quiet.quiet_keys(QUIET_S) == {"2", "4"}
-    assert quiet.quiet_keys(30.0 + QUIET_S) == {"1", "2", "3", "4"}
+    assert quiet.quiet_keys(QUIET_TIMEOUT_S) == {"2", "4"}
+    assert quiet.quiet_keys(30.0 + QUIET_TIMEOUT_S) == {"1", "2", "3", "4"}
 
 
 def test_counter_reset_counts_as_traffic() -> None:
@@ -53,23 +53,23 @@ def test_counter_reset_counts_as_traffic() -> None:
 def test_node_without_counters_is_not_quiet() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(1, None), generation="B"), 0.0)
-    assert quiet.quiet_keys(QUIET_S) == {"1", "3"}
+    assert quiet.quiet_keys(QUIET_TIMEOUT_S) == {"1", "3"}
     other = QuietNodes()
     other.update(facts(generation="native", network="ros2"), 0.0)
-    assert other.quiet_keys(QUIET_S) == frozenset()
+    assert other.quiet_keys(QUIET_TIMEOUT_S) == frozenset()
 
 
 def test_internal_nep_messages_do_not_count_as_traffic() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(1, 1, "/nep/log")), 0.0)
     quiet.update(facts(heard(9, 9, "/nep/log")), 50.0)
-    assert "1" in quiet.quiet_keys(QUIET_S)
+    assert "1" in quiet.quiet_keys(QUIET_TIMEOUT_S)
 
 
 def test_departed_node_is_removed() -> None:
     quiet = QuietNodes()
     quiet.update(facts(), 0.0)
-    quiet.update(GraphFacts(), 1.0)
+    quiet.update(GraphInput(), 1.0)
     assert quiet.quiet_keys(1000.0) == frozenset()
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.graph.dot import dot_of, quoted
+from app.core.graph.dot import format_dot, quote
 from app.core.graph.node_graph import DrawnNode, GraphGroup, GraphLine, NodeGraph
 
 GRAPH = NodeGraph(
@@ -23,7 +23,7 @@ GRAPH = NodeGraph(
 
 
 def test_dot_export_has_groups_nodes_and_lines() -> None:
-    made = dot_of(GRAPH, {"host:a": "This computer", "host:b": "b"}, lambda line: f"{line.topics[0]} 2/s")
+    made = format_dot(GRAPH, {"host:a": "This computer", "host:b": "b"}, lambda line: f"{line.topics[0]} 2/s")
     assert made.splitlines() == [
         "digraph nodes {",
         "  rankdir=LR;",
@@ -53,4 +53,4 @@ def test_dot_export_has_groups_nodes_and_lines() -> None:
     ],
 )
 def test_names_are_escaped_in_dot(text: str, wanted: str) -> None:
-    assert quoted(text) == wanted
+    assert quote(text) == wanted

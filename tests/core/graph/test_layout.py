@@ -47,7 +47,7 @@ def test_all_nodes_are_placed_inside_their_groups_without_overlap() -> None:
         left, top, wide, high = found.groups[node.group]
         assert left + 76 < x < left + wide - 76
         assert top + 24 + 30 < y < top + high - 24
-    assert not found.is_plain
+    assert not found.is_fallback
     assert len({*found.positions.values()}) == 7
 
 
@@ -132,7 +132,7 @@ def test_failed_layout_falls_back_to_rows_and_straight_lines(
 
     monkeypatch.setattr(layout_module.graphlay, "layout", fails)
     found = arrange(LAB)
-    assert found.is_plain
+    assert found.is_fallback
     assert found.positions.keys() == set("abcdefx")
     assert overlapping(found) == []
     assert all(len(points) == 2 for points in found.routes.values())

@@ -55,7 +55,7 @@ def test_layout_thread_falls_back_to_rows_when_process_fails(monkeypatch: pytest
     made = thread.pop_result()
     thread.close()
     assert made is not None
-    assert made[1].is_plain
+    assert made[1].is_fallback
     assert made[1].positions.keys() == {*KEYS}
 
 

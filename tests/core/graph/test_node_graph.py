@@ -6,7 +6,7 @@ import pytest
 
 from app.core.graph.node_graph import (
     WEB_GROUP,
-    GraphFacts,
+    GraphInput,
     GraphOptions,
     GroupBy,
     NodeGraph,
@@ -76,7 +76,7 @@ def facts(
     nodes: tuple[NodeInfo, ...] = NODES,
     topics: tuple[TopicInfo, ...] = TOPICS,
     patterns: tuple[PatternInfo, ...] = (),
-) -> GraphFacts:
+) -> GraphInput:
     view = GraphView(
         1,
         1,
@@ -88,7 +88,7 @@ def facts(
     known, heard = Nodes(), Topics(own=("nobody", 0))
     known.update(view, 0.0)
     heard.update(view, 0.0)
-    return GraphFacts([*known], [*heard], view.services, ["Pepper"], HERE)
+    return GraphInput([*known], [*heard], view.services, ["Pepper"], HERE)
 
 
 def lines(graph: NodeGraph) -> dict[tuple[str, ...], tuple[str, str]]:
@@ -169,20 +169,20 @@ def test_collapsed_group_is_one_box_with_all_lines_of_its_nodes() -> None:
 
 
 def test_quiet_nodes_are_hidden_and_counted_until_their_group_shows_them() -> None:
-    choices = GraphOptions(quiet=frozenset({"4", "5"}))
+    choices = GraphOptions(quiet_nodes=frozenset({"4", "5"}))
     graph = node_graph(facts(), choices)
     assert {each.name for each in graph.nodes} == {
         "pepper_driver", "blackboard", "greeting", "bridge-lab-to-ros2",
     }  # fmt: skip
     assert graph.hidden_quiet_count == 2
     assert [each.quiet_count for each in graph.groups] == [2, 0]
-    shown = node_graph(facts(), replace(choices, quiet_visible_groups=frozenset({"host:lab-pc"})))
+    shown = node_graph(facts(), replace(choices, groups_with_visible_quiet_nodes=frozenset({"host:lab-pc"})))
     assert {each.name for each in shown.nodes if each.is_quiet} == {"studio", "RIZE"}
     assert node_graph(facts(), replace(choices, hides_quiet=False)).hidden_quiet_count == 0
 
 
 def test_group_of_only_quiet_nodes_stays_visible() -> None:
-    graph = node_graph(facts(), GraphOptions(quiet=frozenset({"1"})))
+    graph = node_graph(facts(), GraphOptions(quiet_nodes=frozenset({"1"})))
     box = graph.node("host:pepper")
     assert box is not None
     assert (box.kind, box.member_count, box.quiet_count) == ("group", 1, 1)
@@ -219,7 +219,7 @@ def test_web_pages_are_grouped_and_titled_by_the_web_server(group_by: GroupBy) -
 
 
 def test_empty_network_data_gives_an_empty_graph() -> None:
-    assert node_graph(GraphFacts(), GraphOptions()) == NodeGraph()
+    assert node_graph(GraphInput(), GraphOptions()) == NodeGraph()
 
 
 def test_topic_of_unknown_node_has_no_line() -> None:

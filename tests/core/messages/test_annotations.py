@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.messages.annotations import MAX_POINTS, MAX_SHAPES, is_annotation, shapes_in
+from app.core.messages.annotations import MAX_POINTS, MAX_SHAPES, is_annotation, parse_shapes
 
 RED = {"r": 1, "g": 0, "b": 0, "a": 1}
 CLEAR = {"r": 1, "g": 1, "b": 1, "a": 0}
@@ -25,7 +25,7 @@ def test_circles_points_and_texts_are_drawn_at_their_positions() -> None:
             {"position": {"x": 32, "y": 48}, "text": " two\nlines ", "font_size": 24, "text_color": RED},
         ],
     }  # fmt: skip
-    circle, text = shapes_in(payload, 320, 240)
+    circle, text = parse_shapes(payload, 320, 240)
     assert (circle.kind, circle.points, circle.size) == ("circle", ((0.5, 0.5),), (0.1, 64 / 480))
     assert (circle.outline, circle.fill, circle.thickness) == ((1, 0, 0, 1), None, 2)
     assert (text.kind, text.points, text.text) == ("text", ((0.1, 0.2),), "two lines")
@@ -47,24 +47,24 @@ def test_circles_points_and_texts_are_drawn_at_their_positions() -> None:
     ],
 )
 def test_points_are_drawn_as_points_or_lines_by_type(kind, kinds) -> None:
-    assert [each.kind for each in shapes_in(points(kind), 320, 240)] == kinds
+    assert [each.kind for each in parse_shapes(points(kind), 320, 240)] == kinds
 
 
 def test_points_and_line_segments_have_individual_colours() -> None:
     colours = [{**RED, "g": n / 4} for n in range(4)]
-    greens = [each.outline[1] for each in shapes_in(points(1, outline_colors=colours), 320, 240)]  # type: ignore[index]
+    greens = [each.outline[1] for each in parse_shapes(points(1, outline_colors=colours), 320, 240)]  # type: ignore[index]
     assert greens == [0, 0.25, 0.5, 0.75]
-    greens = [each.outline[1] for each in shapes_in(points(4, outline_colors=colours[1:3]), 320, 240)]  # type: ignore[index]
+    greens = [each.outline[1] for each in parse_shapes(points(4, outline_colors=colours[1:3]), 320, 240)]  # type: ignore[index]
     assert greens == [0.25, 0.5]
 
 
 def test_rize_face_is_drawn_as_box_in_its_own_frame() -> None:
     payload = {"face": {"center": {"x": 320, "y": 120}, "size": {"w": 64, "h": 48}, "box": {}}}
-    (face,) = shapes_in(payload, 1280, 960)
+    (face,) = parse_shapes(payload, 1280, 960)
     assert face.points == ((0.5, 0.25), (0.6, 0.25), (0.6, 0.35), (0.5, 0.35))
     assert face.text == "face"
     assert is_annotation(payload)
-    assert shapes_in({"positions": []}, 1280, 960) == ()
+    assert parse_shapes({"positions": []}, 1280, 960) == ()
     assert is_annotation({"positions": []})
 
 
@@ -88,12 +88,12 @@ def test_rize_face_is_drawn_as_box_in_its_own_frame() -> None:
     ],
 )
 def test_message_without_valid_annotations_draws_nothing(payload) -> None:
-    assert shapes_in(payload, 320, 240) == ()
+    assert parse_shapes(payload, 320, 240) == ()
 
 
 def test_number_of_drawn_shapes_and_points_is_limited() -> None:
     many = [{"position": {"x": 1, "y": 1}, "diameter": 2, "outline_color": RED}] * (MAX_SHAPES + 50)
-    assert len(shapes_in({"circles": many}, 320, 240)) == MAX_SHAPES
-    (line,) = shapes_in(points(3, MAX_POINTS + 50), 320, 240)
+    assert len(parse_shapes({"circles": many}, 320, 240)) == MAX_SHAPES
+    (line,) = parse_shapes(points(3, MAX_POINTS + 50), 320, 240)
     assert len(line.points) == MAX_POINTS
-    assert shapes_in({"circles": many[:1]}, 0, 240) == ()
+    assert parse_shapes({"circles": many[:1]}, 0, 240) == ()

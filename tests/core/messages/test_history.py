@@ -65,7 +65,7 @@ def test_missed_messages_are_counted_and_rewind_clears_history() -> None:
     history = MessageHistory()
     history.process(Batch([message(1), message(2)], dropped=7), 0)
     assert (numbers(history), history.missed) == ([1, 2], 7)
-    history.rewind()
+    history.reset()
     assert (len(history), history.size_bytes, history.first, history.missed, history.at(0)) == (
         0,
         0,

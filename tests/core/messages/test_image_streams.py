@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.core.messages.image_streams import Images, Rate
+from app.core.messages.image_streams import ImageRateMeter, Images
 from app.core.messages.picture import decode, reuse_picture
 from app.core.network.watches import Watches
 from nep.messages.message import Message
@@ -190,22 +190,22 @@ def test_grey_and_alpha_images_are_decoded() -> None:
 
 
 def test_rate_needs_two_events_and_ignores_old_events() -> None:
-    rate = Rate()
+    rate = ImageRateMeter()
     rate.add(0.0)
-    assert rate.per_second(1.0) is None
+    assert rate.rate_hz(1.0) is None
     for number in range(1, 121):
         rate.add(number / 30)
-    assert rate.per_second(3.5) == pytest.approx(30, rel=0.02)
-    assert rate.per_second(20.0) is None
+    assert rate.rate_hz(3.5) == pytest.approx(30, rel=0.02)
+    assert rate.rate_hz(20.0) is None
 
 
 def test_displayed_rate_equals_arrival_rate_when_painting_lags() -> None:
-    arriving, shown = Rate(), Rate()
+    arriving, shown = ImageRateMeter(), ImageRateMeter()
     for number in range(90):
         arriving.add(number / 30)
         if number < 85:  # the newest wait for their turn
             shown.add(number / 30)
-    assert arriving.per_second(3.0) == shown.per_second(3.0)
+    assert arriving.rate_hz(3.0) == shown.rate_hz(3.0)
 
 
 def large(seq: int, value: int = 9) -> Message:
@@ -285,20 +285,20 @@ def test_suspended_stream_decodes_nothing_and_keeps_its_image(images: Images, wa
     stream, other = images.stream("/camera"), images.stream("/camera")
     images.offer([jpeg((1, 2, 3), seq=1)])
     until(lambda: stream.picture is not None and other.picture is not None)
-    assert not stream.is_awaiting_picture
+    assert not stream.is_awaiting_image
     stream.suspend()
     stream.suspend()
     images.offer([jpeg((1, 2, 3), seq=2)])
     until(lambda: other.picture is not None and other.picture.seq == 2)
-    assert (stream.picture is not None and stream.picture.seq, stream.is_awaiting_picture) == (1, True)
+    assert (stream.picture is not None and stream.picture.seq, stream.is_awaiting_image) == (1, True)
     other.suspend()
     assert watched == [], "nobody looks"
     stream.resume()
     assert watched == ["/camera"]
-    assert stream.is_awaiting_picture, "what it has may be old"
+    assert stream.is_awaiting_image, "what it has may be old"
     images.offer([jpeg((1, 2, 3), seq=3)])
     until(lambda: stream.picture is not None and stream.picture.seq == 3)
-    assert not stream.is_awaiting_picture
+    assert not stream.is_awaiting_image
     stream.close()
     stream.resume()
     assert watched == [], "a stream that was closed stays closed"
@@ -332,7 +332,7 @@ def test_frozen_image_of_suspended_stream_can_be_enlarged_after_resume(images: I
     stream.set_size(None)
     stream.resume()
     until(lambda: stream.picture is not None and stream.picture.is_full_resolution)
-    assert (stream.picture.seq, stream.is_awaiting_picture) == (1, True)
+    assert (stream.picture.seq, stream.is_awaiting_image) == (1, True)
 
 
 def test_streams_are_not_silent_while_source_is_paused(images: Images) -> None:

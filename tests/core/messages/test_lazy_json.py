@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.messages import lazy_json
-from app.core.messages.lazy_json import JsonIndex, LazyList, LazyObject, Unreadable
+from app.core.messages.lazy_json import JsonIndex, LazyList, LazyObject, UnreadableValue
 
 TEXTS = st.text(alphabet=st.sampled_from('ab"\\{}[],: \n\u00e9\u20ac'), max_size=12)
 NUMBERS = st.integers(-(2**53), 2**53) | st.floats(allow_nan=False, allow_infinity=False)
@@ -40,12 +40,12 @@ def index(text: str) -> JsonIndex:
 @given(VALUES, st.sampled_from([None, 1]), st.sampled_from([7, 64, 1 << 20]))
 def test_lazy_json_equals_full_decoding(value: object, indent: int | None, chunk: int) -> None:
     text = json.dumps([value], indent=indent, ensure_ascii=False)
-    before = lazy_json.CHUNK
-    lazy_json.CHUNK = chunk  # texts and backslashes reach over the edges of chunks
+    before = lazy_json.CHUNK_BYTES
+    lazy_json.CHUNK_BYTES = chunk  # texts and backslashes reach over the edges of chunks
     try:
         found = index(text).root
     finally:
-        lazy_json.CHUNK = before
+        lazy_json.CHUNK_BYTES = before
     assert whole(found) == json.loads(text)
 
 
@@ -67,7 +67,7 @@ def test_invalid_value_is_marked_and_other_values_are_readable() -> None:
     assert isinstance(root, LazyObject)
     assert (root["good"], root["last"]) == (1, 2)
     assert str(root["bad"]) == "no JSON: oops"
-    assert isinstance(root["none"], Unreadable)
+    assert isinstance(root["none"], UnreadableValue)
 
 
 @pytest.mark.parametrize("broken", ["[1, 2", "]", "][", '["a]', "", "{]]", "[" * 1001 + "]" * 1001])

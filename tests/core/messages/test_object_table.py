@@ -12,12 +12,12 @@ from app.core.messages.object_table import (
     MISSING,
     column_name,
     columns_of,
+    format_table_csv,
     is_list_of_objects,
     lists_of_objects,
-    rows_found,
+    query_rows,
     rows_of,
     sort_key,
-    table_csv,
     value_at,
 )
 from app.core.messages.reader import LARGE_BYTES, read
@@ -78,7 +78,7 @@ def test_values_of_mixed_types_are_sortable_and_missing_values_have_no_sort_key(
 
 def test_csv_export_escapes_text_and_formulas() -> None:
     rows = rows_of([*PEOPLE, {"name": 'say "hi", twice', "at": {"x": [1, 2], "y": b"\x01"}}])
-    lines = list(csv.reader(table_csv("#", columns_of(rows), rows).splitlines()))
+    lines = list(csv.reader(format_table_csv("#", columns_of(rows), rows).splitlines()))
     assert lines == [
         ["#", "name", "age", "at.x", "at.y", "note"],
         ["0", "Ann", "7", "1.5", "2", ""],
@@ -90,9 +90,9 @@ def test_csv_export_escapes_text_and_formulas() -> None:
 
 def test_query_result_with_objects_is_a_table() -> None:
     found = {"a[0]": {"x": 1}, "a[1]": 5, "a[2]": {"x": 2}}
-    assert [(row.name, row.at(("x",))) for row in rows_found(found.items())] == [("a[0]", 1), ("a[2]", 2)]
-    assert [row.name for row in rows_found([("seen.people", PEOPLE)])] == ["0", "1", "2"]
-    assert rows_found([]) == []
+    assert [(row.name, row.at(("x",))) for row in query_rows(found.items())] == [("a[0]", 1), ("a[2]", 2)]
+    assert [row.name for row in query_rows([("seen.people", PEOPLE)])] == ["0", "1", "2"]
+    assert query_rows([]) == []
 
 
 def test_large_message_becomes_table_without_full_decoding() -> None:

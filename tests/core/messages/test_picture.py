@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.core.messages.picture import decode, png_of
+from app.core.messages.picture import decode, encode_png
 from nep.errors import DecodeError, EncodeError, NepError
 from nep.messages import image_files
 from nep.messages.message import Message
@@ -163,7 +163,7 @@ def test_downscaled_depth_has_same_brightness_as_full_depth() -> None:
 
 def test_float_image_cannot_be_encoded_as_png() -> None:
     with pytest.raises(EncodeError, match="can't encode a 'image of float32' as 'png': only integers"):
-        png_of(raw(np.zeros((4, 6), np.float32), "32FC1"))
+        encode_png(raw(np.zeros((4, 6), np.float32), "32FC1"))
 
 
 def png_of_size(side: int) -> Message:
@@ -193,22 +193,22 @@ def test_header_with_huge_dimensions_is_rejected() -> None:
         with pytest.raises(DecodeError):
             _ = huge.payload
     with pytest.raises(DecodeError):
-        png_of(message(bytes(jpeg)))
+        encode_png(message(bytes(jpeg)))
 
 
 def test_snapshot_is_identical_to_received_image() -> None:
     frame = scene(64, 48)
     png = encoded(frame)
-    assert png_of(png) == bytes(png.data)
+    assert encode_png(png) == bytes(png.data)
     for sent in (raw(frame, "bgr8"), raw(frame[:, :, ::-1].copy(), "rgb8")):
         assert np.array_equal(
-            cv2.imdecode(np.frombuffer(png_of(sent), np.uint8), cv2.IMREAD_UNCHANGED), frame
+            cv2.imdecode(np.frombuffer(encode_png(sent), np.uint8), cv2.IMREAD_UNCHANGED), frame
         )
     jpeg = encoded(frame, "jpg")
-    back = cv2.imdecode(np.frombuffer(png_of(jpeg), np.uint8), cv2.IMREAD_UNCHANGED)
+    back = cv2.imdecode(np.frombuffer(encode_png(jpeg), np.uint8), cv2.IMREAD_UNCHANGED)
     assert np.array_equal(back, cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR))
     with pytest.raises(DecodeError):
-        png_of(message(b"nothing"))
+        encode_png(message(b"nothing"))
 
 
 JPEG = cv2.imencode(".jpg", scene(40, 30))[1].tobytes()
@@ -254,6 +254,6 @@ def look_at_a_picture(data, extension, fit) -> None:
         assert picture.bgra.dtype == np.uint8
         assert picture.bgra.shape[2] == 4
         assert picture.bgra.flags.c_contiguous, "QImage reads it as one piece"
-    for read in (lambda: sent.payload, lambda: png_of(sent)):
+    for read in (lambda: sent.payload, lambda: encode_png(sent)):
         with contextlib.suppress(NepError, OSError):
             read()

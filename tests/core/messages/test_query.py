@@ -23,7 +23,7 @@ SEEN = {
 
 
 def found(text: str, value: object = SEEN) -> dict[str, object]:
-    return {str(path): each for path, each in JsonQuery(text).evaluate(value).found.items()}
+    return {str(path): each for path, each in JsonQuery(text).evaluate(value).values.items()}
 
 
 def test_jsonpath_queries_find_matching_values() -> None:
@@ -41,9 +41,9 @@ def test_jsonpath_queries_find_matching_values() -> None:
 
 def test_query_results_are_the_message_values_with_their_paths() -> None:
     answer = JsonQuery("$.people[?@.name=='Bea'].at").evaluate(SEEN)
-    (path,) = answer.found
+    (path,) = answer.values
     assert path.steps == ("people", 1, "at")
-    assert answer.found[path] is SEEN["people"][1]["at"]  # type: ignore[index]
+    assert answer.values[path] is SEEN["people"][1]["at"]  # type: ignore[index]
     assert FoundPath.from_steps(()) == "$"
 
 
@@ -117,12 +117,12 @@ def test_comparing_long_lists_counts_towards_step_limit() -> None:
 
 def test_number_of_results_and_depth_are_limited() -> None:
     answer = JsonQuery("$..age").evaluate(MANY, most_found=10)
-    assert (len(answer.found), answer.cut) == (10, "Only the first 10 are shown.")
+    assert (len(answer.values), answer.cut) == (10, "Only the first 10 are shown.")
     deep: dict[str, object] = {}
     for _each in range(500):
         deep = {"a": deep}
     answer = JsonQuery("$..*").evaluate(deep)
-    assert answer.found
+    assert answer.values
     assert answer.cut
 
 

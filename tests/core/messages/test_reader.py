@@ -10,7 +10,7 @@ import pytest
 
 from app.core.messages import reader as reader_module
 from app.core.messages.lazy_json import LazyObject
-from app.core.messages.reader import LARGE_BYTES, Reader, Reading, read
+from app.core.messages.reader import LARGE_BYTES, MessageReader, ReadResult, read
 from nep.messages.message import Message
 
 WAIT_S = 30.0  # a busy computer may take long; the test ends as soon as it is there
@@ -21,13 +21,13 @@ def message(data: bytes, codec: str = "json", seq: int = 1) -> Message:
 
 
 @pytest.fixture
-def reader() -> Iterator[Reader]:
-    made = Reader()
+def reader() -> Iterator[MessageReader]:
+    made = MessageReader()
     yield made
     made.close()
 
 
-def taken(reader: Reader) -> Reading:
+def taken(reader: MessageReader) -> ReadResult:
     pause = threading.Event()
     for _ in range(int(WAIT_S * 100)):
         found = reader.pop_result()
@@ -60,11 +60,11 @@ def test_large_json_is_indexed_lazily_and_other_messages_are_decoded() -> None:
     assert read(message(large(b'{"a": '))).error == "unbalanced brackets"
 
 
-def test_reader_runs_in_another_thread(reader: Reader, monkeypatch) -> None:
+def test_reader_runs_in_another_thread(reader: MessageReader, monkeypatch) -> None:
     threads: list[int] = []
     before = reader_module.read
 
-    def watched(one: Message) -> Reading:
+    def watched(one: Message) -> ReadResult:
         threads.append(threading.get_ident())
         return before(one)
 
@@ -83,14 +83,14 @@ class SlowRead:
         self.seqs: list[int | None] = []
         monkeypatch.setattr(reader_module, "read", self)
 
-    def __call__(self, one: Message) -> Reading:
+    def __call__(self, one: Message) -> ReadResult:
         self.seqs.append(one.seq)
         self.began.set()
         self.go_on.wait(WAIT_S)
-        return Reading(one, one.seq)
+        return ReadResult(one, one.seq)
 
 
-def test_only_newest_pending_message_is_read(reader: Reader, monkeypatch) -> None:
+def test_only_newest_pending_message_is_read(reader: MessageReader, monkeypatch) -> None:
     slow = SlowRead(monkeypatch)
     reader.submit(message(b"1", seq=1))
     assert slow.began.wait(WAIT_S)
@@ -104,7 +104,7 @@ def test_only_newest_pending_message_is_read(reader: Reader, monkeypatch) -> Non
     assert slow.seqs == [1, 49]
 
 
-def test_result_of_cleared_message_is_discarded(reader: Reader, monkeypatch) -> None:
+def test_result_of_cleared_message_is_discarded(reader: MessageReader, monkeypatch) -> None:
     slow = SlowRead(monkeypatch)
     reader.submit(message(b"1", seq=1))
     assert slow.began.wait(WAIT_S)
@@ -115,7 +115,7 @@ def test_result_of_cleared_message_is_discarded(reader: Reader, monkeypatch) -> 
     assert taken(reader).value == 2
 
 
-def test_low_priority_reads_are_throttled_and_skipped_while_busy(reader: Reader) -> None:
+def test_low_priority_reads_are_throttled_and_skipped_while_busy(reader: MessageReader) -> None:
     assert reader.submit_throttled(message(b"[1]", seq=1), 10.0)
     assert taken(reader).message.seq == 1
     assert not reader.submit_throttled(message(b"[1]", seq=2), 10.9)

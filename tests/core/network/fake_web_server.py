@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from nep.programs.web.access import Access
-from nep.programs.web.context import ConnectedPage, PageTopic, Refusal
+from nep.programs.web.context import ConnectedPage, PageTopic, Rejection
 from nep.programs.web.server import WebSettings
 
 
@@ -36,7 +36,7 @@ class FakeWebServer:
         self.allow_moving: Collection[str] = self.settings.allow_moving
         self.foxglove = self.settings.foxglove
         self.pages: tuple[ConnectedPage, ...] = ()
-        self.refusals: tuple[Refusal, ...] = ()
+        self.refusals: tuple[Rejection, ...] = ()
         self.rosbridge = self.settings.rosbridge
         self.kept_out: set[int] = set()
         self.has_ended = False

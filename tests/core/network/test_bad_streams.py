@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.network.mailbox import MESSAGES_PER_TOPIC
+from app.core.network.mailbox import MAX_MESSAGES_PER_TOPIC
 from app.core.session import Session
 from nep.masters.master import Master
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC
@@ -61,7 +61,7 @@ def test_malformed_messages_at_1000_hz_are_one_alert_with_exact_count(
 def test_malformed_count_is_exact_after_window_was_busy(session: Session, talker: nep.Node) -> None:
     with session.watch("/bad"):
         publisher = publisher_of(session, talker, "/bad")
-        sent = 10 * MESSAGES_PER_TOPIC
+        sent = 10 * MAX_MESSAGES_PER_TOPIC
         for _ in range(sent):
             publisher.publish_bytes(BAD)
         tried = session._checks._found
@@ -69,8 +69,8 @@ def test_malformed_count_is_exact_after_window_was_busy(session: Session, talker
         tick_until(session, lambda: session.topics["/bad"].received == sent)
         assert bad_count(session, "/bad") == sent
         assert f"({sent} messages)" in session.alerts.active[0].title
-        assert session.topics["/bad"].displayed_and_sent == (
-            MESSAGES_PER_TOPIC,
+        assert session.topics["/bad"].displayed_and_sent_counts == (
+            MAX_MESSAGES_PER_TOPIC,
             sent,
         )  # the ring was full, and yet
 
@@ -107,7 +107,7 @@ def test_100_000_malformed_messages_are_all_counted(session: Session, talker: ne
         (alert,) = session.alerts.active
         health = session._health._bad["/bad"]
         assert alert.count == health.count
-        assert health.count + health.unchecked == topic.received
+        assert health.count + health.unchecked_count == topic.received
         assert bad_s < 3 * good_s  # a tick of the window takes hardly longer because of them
 
 

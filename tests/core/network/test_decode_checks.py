@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from app.core.network import decode_checks as module
-from app.core.network.decode_checks import Checks
+from app.core.network.decode_checks import DecodeChecker
 from nep.errors import NepError
 from nep.messages.message import Message
 
@@ -32,15 +32,15 @@ class Clock:
 
 
 def test_every_message_is_checked_and_newest_error_is_reported() -> None:
-    checks = Checks(Clock())
+    checks = DecodeChecker(Clock())
     checks.check("/a", messages(BAD, GOOD, BAD))
     checks.check("/a", messages(GOOD))
     checks.check("/b", messages(GOOD))
     found = checks.pop_results()
-    assert (found["/a"].checked, found["/a"].bad, found["/a"].unchecked) == (4, 2, 0)
+    assert (found["/a"].checked, found["/a"].bad_count, found["/a"].unchecked_count) == (4, 2, 0)
     assert "json" in found["/a"].error
-    assert found["/a"].is_last_good
-    assert (found["/b"].checked, found["/b"].bad, found["/b"].error) == (1, 0, "")
+    assert found["/a"].is_newest_readable
+    assert (found["/b"].checked, found["/b"].bad_count, found["/b"].error) == (1, 0, "")
     assert checks.pop_results() == {}
 
 
@@ -50,26 +50,26 @@ def test_burst_of_100_000_malformed_messages_is_counted_exactly() -> None:
         with pytest.raises(NepError):
             _ = message.payload
     each_s = (time.thread_time() - began) / len(some)
-    checks = Checks()  # the real clocks: the promise is about real work
+    checks = DecodeChecker()  # the real clocks: the promise is about real work
     for _ in range(10):
         checks.check("/a", messages(*[BAD] * 10_000))
     found = checks.pop_results()["/a"]
-    assert found.bad + found.unchecked == 100_000
-    assert not found.is_last_good
+    assert found.bad_count + found.unchecked_count == 100_000
+    assert not found.is_newest_readable
     # A machine that is slow may not get through all of them; then it has worked for all of the advance.
-    assert found.unchecked == 0 or found.checked * each_s > 0.3 * module.MAX_BUDGET_S
+    assert found.unchecked_count == 0 or found.checked * each_s > 0.3 * module.MAX_BUDGET_S
 
 
 def test_healthy_topic_leaves_reserve_time_to_failing_topics() -> None:
     clock = Clock(step_s=0.01)
-    checks = Checks(clock, clock)
+    checks = DecodeChecker(clock, clock)
     checks.check("/a", messages(*[GOOD] * 500))
     well = checks.pop_results()["/a"]
     assert 0 < well.checked < 60
-    assert well.checked + well.unchecked == 500
+    assert well.checked + well.unchecked_count == 500
     checks.check("/b", messages(*[BAD] * 500))
     bad = checks.pop_results()["/b"]
-    assert bad.bad == bad.checked > 40
+    assert bad.bad_count == bad.checked > 40
     checks.check("/b", messages(*[BAD] * 500))
     assert checks.pop_results()["/b"].checked < 10  # the advance is spent, the newest is always tried
     clock.now += 10.0
@@ -78,11 +78,11 @@ def test_healthy_topic_leaves_reserve_time_to_failing_topics() -> None:
 
 
 def test_malformed_message_allows_remaining_batch_to_use_reserve_time() -> None:
-    checks = Checks(work=Clock(step_s=0.01))
+    checks = DecodeChecker(work=Clock(step_s=0.01))
     checks.check("/a", messages(BAD, *[GOOD] * 200))
     found = checks.pop_results()["/a"]
-    assert found.bad == 1
-    assert found.checked > module.RESERVE_S / 0.01
+    assert found.bad_count == 1
+    assert found.checked > module.RESERVED_BUDGET_S / 0.01
 
 
 class Reads(Clock):
@@ -97,16 +97,16 @@ class Reads(Clock):
 
 def test_work_clock_is_not_read_for_every_message() -> None:
     clock = Reads(step_s=1e-6)
-    checks = Checks(Clock(), clock)
+    checks = DecodeChecker(Clock(), clock)
     checks.check("/a", messages(*[GOOD] * 5000, BAD, *[GOOD] * 5000))
     found = checks.pop_results()["/a"]
-    assert (found.checked, found.bad, found.unchecked) == (10_001, 1, 0)
+    assert (found.checked, found.bad_count, found.unchecked_count) == (10_001, 1, 0)
     assert clock.count < 100
 
 
 def test_work_clock_is_read_after_each_large_message() -> None:
     clock = Reads(step_s=1e-6)
-    checks = Checks(Clock(), clock)
+    checks = DecodeChecker(Clock(), clock)
     checks.check("/a", messages(*[GOOD] * 1000, *[b" " * 64_000 + GOOD] * 200))
     assert checks.pop_results()["/a"].checked == 1200
     assert clock.count > 190
@@ -114,15 +114,15 @@ def test_work_clock_is_read_after_each_large_message() -> None:
 
 def test_clock_that_jumps_back_does_not_reduce_checks() -> None:
     clock = Clock()
-    checks = Checks(clock, clock)
+    checks = DecodeChecker(clock, clock)
     clock.now -= 50.0
     checks.check("/a", messages(BAD, BAD))
-    assert checks.pop_results()["/a"].bad == 2
+    assert checks.pop_results()["/a"].bad_count == 2
 
 
 @pytest.mark.parametrize("codec", ["bytes", "image"])
 def test_undecodable_types_and_empty_batches_are_not_checked(codec: str) -> None:
-    checks = Checks()
+    checks = DecodeChecker()
     checks.check("/a", messages(BAD, codec=codec))
     checks.check("/b", [])
     assert checks.pop_results() == {}
@@ -130,13 +130,13 @@ def test_undecodable_types_and_empty_batches_are_not_checked(codec: str) -> None
 
 def test_large_message_is_not_checked() -> None:
     large = messages(b"[" * (module.LARGE_BYTES + 1))
-    checks = Checks()
+    checks = DecodeChecker()
     checks.check("/a", large)
-    assert checks.pop_results()["/a"].bad == 0
+    assert checks.pop_results()["/a"].bad_count == 0
 
 
 def test_counts_are_exact_across_threads() -> None:
-    checks = Checks()
+    checks = DecodeChecker()
     done = threading.Event()
     counted = 0
 
@@ -153,7 +153,7 @@ def test_counts_are_exact_across_threads() -> None:
     while not done.is_set():
         if not any(thread.is_alive() for thread in threads):
             done.set()
-        counted += sum(found.checked + found.unchecked for found in checks.pop_results().values())
+        counted += sum(found.checked + found.unchecked_count for found in checks.pop_results().values())
     for thread in threads:
         thread.join()
     assert counted == 2 * 300 * 2
@@ -161,11 +161,11 @@ def test_counts_are_exact_across_threads() -> None:
 
 def test_topic_without_recent_errors_loses_reserve_time() -> None:
     clock = Clock()
-    checks = Checks(clock, Clock(step_s=0.01))
+    checks = DecodeChecker(clock, Clock(step_s=0.01))
     checks.check("/a", messages(BAD))
-    clock.now += module.SUSPECT_S - 1
+    clock.now += module.SUSPECT_TIMEOUT_S - 1
     checks.check("/a", messages(*[GOOD] * 500))
     suspect = checks.pop_results()["/a"].checked
-    clock.now += module.SUSPECT_S + 20
+    clock.now += module.SUSPECT_TIMEOUT_S + 20
     checks.check("/a", messages(*[GOOD] * 500))
-    assert checks.pop_results()["/a"].checked < suspect - module.RESERVE_S / 0.01 / 2
+    assert checks.pop_results()["/a"].checked < suspect - module.RESERVED_BUDGET_S / 0.01 / 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 
-from app.core.network.doctor import Doctor, doctor_of
+from app.core.network.doctor import Doctor, create_doctor
 from nep.programs.doctor import Finding, ProgressCallback
 
 FINE = Finding("master", "ok", "A master runs.")
@@ -77,7 +77,7 @@ def test_topics_of_other_networks_are_not_checked(tmp_path) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
-    doctor = doctor_of(address, tmp_path)
+    doctor = create_doctor(address, tmp_path)
     doctor.expect_topic("ros2 /camera")
     doctor.close()
     assert not any(finding.id.startswith("topic") for finding in doctor.findings)
@@ -98,7 +98,7 @@ def test_doctor_checks_studio_folder(tmp_path) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
-    doctor = doctor_of(address, tmp_path)
+    doctor = create_doctor(address, tmp_path)
     doctor.start()
     doctor.close()
     found = {finding.id: finding for finding in doctor.findings}

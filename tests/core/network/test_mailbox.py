@@ -56,8 +56,8 @@ def test_events_keep_their_order_and_an_overflow_is_counted() -> None:
         mailbox.post_event(event)
     drained = mailbox.drain()
     assert drained.events == ["one", "two"]
-    assert drained.lost_events == 1
-    assert mailbox.drain().lost_events == 0
+    assert drained.lost_event_count == 1
+    assert mailbox.drain().lost_event_count == 0
 
 
 def test_every_message_is_counted_with_many_threads() -> None:

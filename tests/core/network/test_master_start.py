@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 import nep
-from app.core.network.master import AGAIN_AT_MOST_S, DISCOVERY_S, MasterChange, MasterStart
+from app.core.network.master import AGAIN_AT_MOST_S, DISCOVERY_TIMEOUT_S, MasterChangeDetector, MasterStarter
 from nep.protocol.graph_view import GraphView
 from tests.nep.programs import eventually
 
@@ -30,7 +30,7 @@ def foreign():
 def test_foreign_program_at_master_address_is_named_once_and_retried_with_backoff(foreign) -> None:
     now = [0.0]
     told: list[str] = []
-    start = MasterStart(foreign, told.append, lambda: now[0])
+    start = MasterStarter(foreign, told.append, lambda: now[0])
     asked = []
 
     def ask() -> None:
@@ -54,7 +54,7 @@ def test_foreign_program_at_master_address_is_named_once_and_retried_with_backof
 
 def test_running_master_is_joined(master) -> None:
     told: list[str] = []
-    start = MasterStart(master.address, told.append)
+    start = MasterStarter(master.address, told.append)
     start.ensure()
     start.close()
     assert (told, start.has_started, start.first) == ([], False, False)
@@ -72,7 +72,7 @@ def free(monkeypatch) -> str:
 
 def the_one_started(address: str) -> None:
     told: list[str] = []
-    start = MasterStart(address, told.append)
+    start = MasterStarter(address, told.append)
     start.ensure()
     start.ensure()  # one start at a time
     eventually(lambda: start.has_started)
@@ -105,19 +105,19 @@ def view(epoch: int) -> GraphView:
 
 
 def test_first_and_unchanged_master_are_accepted_at_once() -> None:
-    learning = MasterChange()
+    learning = MasterChangeDetector()
     assert not learning.is_incomplete(None, view(1), 0.0)
     assert not learning.is_incomplete(view(1), view(1), 1.0)
 
 
 def test_graph_of_new_master_is_accepted_after_discovery_time() -> None:
-    learning = MasterChange()
+    learning = MasterChangeDetector()
     assert learning.is_incomplete(view(1), view(2), 10.0)
-    assert learning.is_incomplete(view(1), view(2), 10.0 + DISCOVERY_S - 0.1)
-    assert not learning.is_incomplete(view(1), view(2), 10.0 + DISCOVERY_S)
+    assert learning.is_incomplete(view(1), view(2), 10.0 + DISCOVERY_TIMEOUT_S - 0.1)
+    assert not learning.is_incomplete(view(1), view(2), 10.0 + DISCOVERY_TIMEOUT_S)
 
 
 def test_third_master_restarts_discovery_time() -> None:
-    learning = MasterChange()
+    learning = MasterChangeDetector()
     learning.is_incomplete(view(1), view(2), 10.0)
-    assert learning.is_incomplete(view(1), view(3), 10.0 + DISCOVERY_S)
+    assert learning.is_incomplete(view(1), view(3), 10.0 + DISCOVERY_TIMEOUT_S)

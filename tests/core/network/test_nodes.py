@@ -37,8 +37,8 @@ def test_node_lists_each_published_and_subscribed_topic_once() -> None:
     a, b = nodes.get("a"), nodes.get("b")
     assert a is not None
     assert b is not None
-    assert (a.publishes, a.subscribes) == (("/c", "/z"), ("/c",))
-    assert (b.publishes, b.subscribes) == ((), ("/z",))
+    assert (a.published_topics, a.subscribed_topics) == (("/c", "/z"), ("/c",))
+    assert (b.published_topics, b.subscribed_topics) == ((), ("/z",))
     assert (a.host, a.pid, a.language, a.generation, a.since_ns) == ("lab", 7, "Python", "native", 5)
 
 
@@ -51,7 +51,7 @@ def test_wildcard_subscriptions_are_listed_with_topics_of_the_node() -> None:
     nodes.update(replace(seen, patterns={wide.name: wide}), 0)
     found = nodes.get("a")
     assert found is not None
-    assert found.subscribes == ("/robot/*/camera", "/z")
+    assert found.subscribed_topics == ("/robot/*/camera", "/z")
 
 
 def test_nodes_added_after_the_first_graph_are_marked_new_until_seen() -> None:
@@ -81,7 +81,7 @@ def test_removed_node_stays_listed_for_ten_seconds_with_its_topics() -> None:
     nodes.update(view(2, []), 5)
     nodes.update_ages(9)
     (gone,) = nodes
-    assert (gone.gone_s, gone.publishes, gone.cpu_ratio) == (4, ("/x",), None)
+    assert (gone.gone_s, gone.published_topics, gone.cpu_ratio) == (4, ("/x",), None)
     nodes.update_ages(5 + GONE_DISPLAY_S)
     assert len(nodes) == 0
 

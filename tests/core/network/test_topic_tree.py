@@ -10,7 +10,7 @@ from app.core.network.topic_tree import (
     TopicTree,
     TreeRow,
     folders_above,
-    parts_of_name,
+    split_name,
     topic_filter,
 )
 from app.core.network.topics import Topic
@@ -73,13 +73,13 @@ def test_networks_have_separate_folders() -> None:
     ],
 )
 def test_unusual_topic_names_are_shown_as_rows(name, parts) -> None:
-    assert parts_of_name(name) == parts
+    assert split_name(name) == parts
     assert len(TopicTree([Topic(name)]).rows(by_name)) == len(parts)
 
 
 def test_tree_depth_is_limited() -> None:
     name = "/x" * 10_000
-    assert len(parts_of_name(name)) == MAX_DEPTH + 1
+    assert len(split_name(name)) == MAX_DEPTH + 1
     assert len(folders_above(name)) == MAX_DEPTH
     assert max(folder.depth for folder in TopicTree([Topic(name)])) == MAX_DEPTH - 1
 

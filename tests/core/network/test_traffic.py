@@ -6,7 +6,7 @@ from collections.abc import ValuesView
 from dataclasses import replace
 
 from app.core.network.mailbox import Batch
-from app.core.network.topics import BATCH_SIZE, Topics
+from app.core.network.topics import MAX_TOPICS_PER_UPDATE, Topics
 from app.core.network.traffic import WINDOW_S, RecentLosses, Traffic
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
@@ -25,7 +25,7 @@ def test_dropped_and_missed_messages_count_as_sent_but_not_shown() -> None:
     traffic.count_lost({"/a": 10, "/unknown": 99}, 2.0)
     traffic.count_lost({"/a": 14}, 3.0)
     assert (traffic.shown_30s, traffic.sent_30s) == (3, 22)
-    assert topics["/a"].displayed_and_sent == (2, 7 + 14)
+    assert topics["/a"].displayed_and_sent_counts == (2, 7 + 14)
 
 
 def test_only_last_30_seconds_are_counted() -> None:
@@ -46,7 +46,7 @@ def test_new_subscription_counts_from_zero() -> None:
     topics.unwatch("/a")
     topics.add("/a", batch(1, 0), 1.0)
     traffic.count_lost({"/a": 2}, 1.0)
-    assert topics["/a"].displayed_and_sent == (1, 3)
+    assert topics["/a"].displayed_and_sent_counts == (1, 3)
     assert traffic.sent_30s == 9
 
 
@@ -77,7 +77,9 @@ def test_stats_of_many_topics_are_summed_twice_a_second_including_the_last_updat
     traffic = Traffic(Topics())
     one = TopicInfo("/a", "json", "json", lost=1, rate_hz=2.0)
     views = [
-        GraphView(1, 1, {}, Counted({f"/{n}": replace(one, lost=told) for n in range(BATCH_SIZE + 1)}))
+        GraphView(
+            1, 1, {}, Counted({f"/{n}": replace(one, lost=told) for n in range(MAX_TOPICS_PER_UPDATE + 1)})
+        )
         for told in range(1, 21)
     ]
     for number, view in enumerate(views):
@@ -86,8 +88,8 @@ def test_stats_of_many_topics_are_summed_twice_a_second_including_the_last_updat
     went = sum(view.topics.times for view in views if isinstance(view.topics, Counted))
     assert 4 <= went <= 6  # each time for what was lost and for the rates
     traffic.add({}, 2.0)
-    assert traffic.messages_per_s == 2.0 * (BATCH_SIZE + 1)
-    assert traffic.lost_30s == 19 * (BATCH_SIZE + 1)
+    assert traffic.messages_per_s == 2.0 * (MAX_TOPICS_PER_UPDATE + 1)
+    assert traffic.lost_30s == 19 * (MAX_TOPICS_PER_UPDATE + 1)
 
 
 def test_only_recent_losses_are_counted() -> None:

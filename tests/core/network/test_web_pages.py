@@ -13,7 +13,7 @@ from app.core.network.web_pages import WebPages, WebServerStarted
 from app.core.network.web_words import notices, page_name, share_text, terminal_command, web_status
 from nep.errors import NepError
 from nep.masters.master import master_address
-from nep.programs.web.context import PageTopic, Refusal
+from nep.programs.web.context import PageTopic, Rejection
 from nep.system.addresses import OwnAddress
 from tests.core.network.fake_web_server import FakeWebServer, page
 
@@ -99,7 +99,7 @@ def test_new_token_disconnects_pages_and_the_old_one_can_be_restored(studio: Stu
     server = studio.switch_on()
     server.pages = (page(1), page(2))
     before = studio.web.token
-    assert studio.web.new_token() == 2
+    assert studio.web.generate_token() == 2
     assert server.access.token == studio.web.token != before
     studio.web.set_token(before)
     assert server.access.token == before
@@ -147,11 +147,11 @@ def test_disconnected_page_stays_listed_for_a_while(studio: Studio) -> None:
     studio.web.refresh()
     studio.now += 4
     studio.web.refresh()
-    assert [(each.page.id, each.gone_s) for each in studio.web.listed] == [(1, 4.0), (2, None)]
+    assert [(each.page.id, each.gone_s) for each in studio.web.listed_pages] == [(1, 4.0), (2, None)]
     assert [each.id for each in studio.web.connected] == [2]
     studio.now += GONE_DISPLAY_S
     studio.web.refresh()
-    assert [each.page.id for each in studio.web.listed] == [2]
+    assert [each.page.id for each in studio.web.listed_pages] == [2]
 
 
 def test_page_is_slow_while_it_drops_messages() -> None:
@@ -169,10 +169,10 @@ def test_rejection_notices_offer_a_fix_until_allowed_or_dismissed(studio: Studio
     server = studio.switch_on()
     origin = "http://192.168.1.77:5173"
     server.refusals = (
-        Refusal(1.0, origin, "refused", origin, "origin"),
-        Refusal(2.0, "192.168.1.78", "wrong", kind="token"),
-        Refusal(3.0, origin, "refused", kind="robot", robot="Turtle"),
-        Refusal(4.0, origin, "refused", origin, "origin"),
+        Rejection(1.0, origin, "refused", origin, "origin"),
+        Rejection(2.0, "192.168.1.78", "wrong", kind="token"),
+        Rejection(3.0, origin, "refused", kind="robot", robot="Turtle"),
+        Rejection(4.0, origin, "refused", origin, "origin"),
     )
     found = notices(studio.web)
     assert [(each.next_step, each.value) for each in found] == [
@@ -191,7 +191,7 @@ def test_page_disconnected_by_user_can_be_allowed_again(studio: Studio) -> None:
     studio.web.block_page(first)
     assert (server.pages, server.kept_out) == ((), {1})
     assert notices(studio.web) == ()
-    server.refusals = (Refusal(5.0, first.origin, "disconnected", kind="kept out"),)
+    server.refusals = (Rejection(5.0, first.origin, "disconnected", kind="kept out"),)
     (notice,) = notices(studio.web)
     assert (notice.next_step, notice.value) == ("let in", "1")
     studio.web.unblock_page(1)

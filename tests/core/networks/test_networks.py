@@ -47,7 +47,7 @@ def test_topic_names_of_all_networks_are_distinct() -> None:
 
 def test_network_is_observed_only_when_selected_and_again_at_next_start(world: World) -> None:
     world.networks.start()
-    assert (world.made, world.networks.selected) == ([], [])
+    assert (world.made, world.networks.selected_networks) == ([], [])
     world.networks.select("ros2", " 7 ")
     world.networks.select("zenoh", "")
     assert [(fake.kind.name, fake.address, fake.said) for fake in world.made] == [
@@ -97,7 +97,7 @@ def test_invalid_address_is_rejected_with_reason_and_selection_is_unchanged(
         world.networks.select(kind, address)
     assert world.made == before
     assert world.networks.get(kind) is not None
-    assert [network.kind.name for network in world.networks.selected] == [kind]
+    assert [network.kind.name for network in world.networks.selected_networks] == [kind]
 
 
 def test_network_is_observed_even_if_selection_cannot_be_saved(
@@ -109,7 +109,7 @@ def test_network_is_observed_even_if_selection_cannot_be_saved(
     monkeypatch.setattr(world.settings, "set", refuse)
     with pytest.raises(SettingsError):
         world.networks.select("zenoh", "")
-    assert [network.kind.name for network in world.networks.selected] == ["zenoh"]
+    assert [network.kind.name for network in world.networks.selected_networks] == ["zenoh"]
 
 
 def test_topics_and_nodes_are_listed_with_their_network(world: World) -> None:
@@ -122,7 +122,12 @@ def test_topics_and_nodes_are_listed_with_their_network(world: World) -> None:
         ("ros /a", "ros", None)
     ]
     (node,) = world.networks.nodes
-    assert (node.key, node.network, node.is_original, node.publishes) == ("ros /arm", "ros", False, ("/a",))
+    assert (node.key, node.network, node.is_original, node.published_topics) == (
+        "ros /arm",
+        "ros",
+        False,
+        ("/a",),
+    )
     assert world.networks.topic("ros /a") is world.networks.topics[0]
     assert world.networks.topic("/a") is None
     assert world.networks.topic("zenoh /a") is None
@@ -133,7 +138,7 @@ def test_unreachable_network_is_stale_with_reason_until_it_reconnects(world: Wor
     world.tell(GraphReceived(graph("/a"), 0.0))
     revision = world.networks.revision
     world.tell(MasterLost("", "no ROS master answers"), 5.0)
-    (network,) = world.networks.selected
+    (network,) = world.networks.selected_networks
     assert (network.state, network.sentence) == ("lost", "no ROS master answers")
     assert [topic.is_stale for topic in network.topics] == [node.is_stale for node in network.nodes] == [True]
     assert lost_message(network) == "ROS 1: no ROS master answers."
@@ -222,7 +227,7 @@ def test_arrivals_are_counted_where_network_reports_no_rate() -> None:
 def test_every_network_kind_is_a_back_end_with_install_advice(monkeypatch: pytest.MonkeyPatch) -> None:
     for kind in KINDS:
         assert find_kind(kind.name) is kind
-        assert kind.checked(kind.example) == kind.checked("")
+        assert kind.checked(kind.default_address) == kind.checked("")
         assert kind.unknown_text == f"unknown on {kind.product_name}"
     assert find_kind("") is find_kind("zeromq") is None
     monkeypatch.setitem(sys.modules, "zenoh", None)

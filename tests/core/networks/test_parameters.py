@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 
 import nep
 from app.core.network.nodes import NodeEntry
-from app.core.networks.parameters import NodeParameters, parse_parameters, read_only_reason, text_of, value_of
+from app.core.networks.parameters import (
+    NodeParameters,
+    format_value,
+    parse_parameters,
+    parse_value,
+    read_only_reason,
+)
 from app.core.session import Session
 from nep.masters.master import Master
 from nep.patterns.parameters.owned import parameters_topic
@@ -69,7 +75,7 @@ def test_parameters_have_limits_and_updates_are_received(
     speed = shown.find("speed")
     assert speed is not None
     assert (speed.value, speed.kind, speed.minimum, speed.maximum) == (0.5, "float", 0, 2)
-    assert (shown.find("gait").choices, shown.find("serial").read_only) == (("walk", "run"), True)  # type: ignore[union-attr]
+    assert (shown.find("gait").choices, shown.find("serial").is_read_only) == (("walk", "run"), True)  # type: ignore[union-attr]
     assert shown.changed == {}, "what it was at first has not changed"
     robot.parameters["speed"] = 1.5
     tick_until(session, lambda: values(_refreshed(shown, 7.0))["speed"] == 1.5)
@@ -208,7 +214,7 @@ def test_any_state_is_decoded_or_rejected_with_explanation(state: object) -> Non
     except nep.NepError:
         assert not isinstance(state, list)
     else:
-        assert all(isinstance(text_of(each.value), str) for each in found)
+        assert all(isinstance(format_value(each.value), str) for each in found)
 
 
 @pytest.mark.parametrize(
@@ -219,8 +225,8 @@ def test_any_state_is_decoded_or_rejected_with_explanation(state: object) -> Non
     ],
 )  # fmt: skip
 def test_parameter_text_round_trips_to_same_value(value: object, kind: str) -> None:
-    assert value_of(text_of(value), kind) == value
-    assert type(value_of(text_of(value), kind)) is type(value)
+    assert parse_value(format_value(value), kind) == value
+    assert type(parse_value(format_value(value), kind)) is type(value)
 
 
 @pytest.mark.parametrize(
@@ -234,7 +240,7 @@ def test_parameter_text_round_trips_to_same_value(value: object, kind: str) -> N
 )  # fmt: skip
 def test_value_of_wrong_type_is_rejected_with_advice(text: str, kind: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        value_of(text, kind)
+        parse_value(text, kind)
 
 
 def test_read_only_parameters_are_explained() -> None:

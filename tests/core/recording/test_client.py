@@ -172,7 +172,7 @@ def test_flight_recorder_saves_last_seconds_and_is_restarted(made):
     assert client.save_last(Path("b.mcap"), 60.0)
     made.say("kept", path="a.mcap")
     made.say("problem", op="keep", path="b.mcap", sentence="the disk is full")
-    assert (client.state.saving, client.state.last) == ((), Path("a.mcap"))
+    assert (client.state.pending_saves, client.state.last) == ((), Path("a.mcap"))
     assert "recorder:keep" in made.told()
     waits = []
     for _each in range(6):
@@ -231,7 +231,7 @@ def test_real_recorder_process_records_saves_and_finishes(master, tmp_path):
             publisher.publish({"n": n})
         until(lambda: client.state.topics.get("/a") is not None and client.state.topics["/a"].received == 20)
         assert client.save_last(tmp_path / "kept.mcap", 60.0, "it fell")
-        until(lambda: not client.state.saving)
+        until(lambda: not client.state.pending_saves)
         client.close(30.0)  # as Studio's end: the recording is finished
     assert not [each.title for each in client._alerts.active]
     with Recording(tmp_path / "a.mcap") as recording, Recording(tmp_path / "kept.mcap") as kept:

@@ -115,19 +115,19 @@ def test_only_ongoing_events_are_repeated(told):
     told.events.on_alarm(event("off", "/a"))
     assert told.to == {""}
     told.said.clear()
-    told.events.repeat("ring")
+    told.events.resend("ring")
     assert told.to == {"", "ring"}
     assert [role for role, _value in told.said] == ["alarms", "runs"]
     assert all(value["until_ns"] is None for _role, value in told.said)
 
 
 def test_many_alarms_are_recorded_once_each_and_active_alarms_are_limited(told, monkeypatch):
-    monkeypatch.setattr(events_module, "MAX_ACTIVE", 3)
+    monkeypatch.setattr(events_module, "MAX_ACTIVE_ALARMS", 3)
     for number in range(5):
         told.events.on_alarm(event("on", f"/{number}"))
     assert len(told.said) == 5
     told.said.clear()
-    told.events.repeat("recording")
+    told.events.resend("recording")
     assert len(told.said) == 3
     told.events.on_alarm(event("off", "/4"))
     assert len(told.said) == 3  # its end is not known, and nothing goes wrong

@@ -6,7 +6,7 @@ import threading
 
 from app.core.recording import exporting as exporting_module
 from app.core.recording.exporting import RecordingExport
-from app.core.recording.folder import picture_in
+from app.core.recording.folder import read_picture
 from app.core.recording.opener import LocalOpener
 from nep.recordings.export import Part, export
 from tests.nep.programs import eventually
@@ -16,7 +16,7 @@ from tests.nep.recordings.messages import START_NS, STEP_NS, json_message, recor
 def test_export_reports_its_files(tmp_path):
     record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(250)]])
     job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")
-    eventually(lambda: job.is_over)
+    eventually(lambda: job.is_finished)
     assert (job.result_text(), job.progress) == ("Exported 1 file", 1.0)
     (made,) = job.files
     assert made.count == 250
@@ -28,14 +28,14 @@ def test_export_of_a_part_reports_progress(tmp_path):
     record(tmp_path / "a.mcap", [messages])
     part = Part(START_NS + 100 * STEP_NS, START_NS + 300 * STEP_NS, ["/a"])
     job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out", part)
-    eventually(lambda: job.is_over)
+    eventually(lambda: job.is_finished)
     assert ([(each.topic, each.count) for each in job.files], job.progress) == ([("/a", 100)], 1.0)
 
 
 def test_failed_export_is_reported(tmp_path):
     (tmp_path / "a.mcap").write_bytes(b"nothing of the kind")
     job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")
-    eventually(lambda: job.is_over)
+    eventually(lambda: job.is_finished)
     assert job.result_text().startswith("Not exported: ")
     assert not job.files
 
@@ -58,14 +58,14 @@ def test_canceled_export_leaves_no_partial_file(tmp_path, monkeypatch):
     assert job.result_text() == ""
     job.cancel()
     go_on.set()
-    eventually(lambda: job.is_over)
+    eventually(lambda: job.is_finished)
     assert job.result_text() == "The export was cancelled"
     assert list((tmp_path / "out").iterdir()) == []
 
 
 def test_recording_without_images_has_no_thumbnail(tmp_path):
     record(tmp_path / "a.mcap", [[json_message(1, topic="/odom")]])
-    assert picture_in(tmp_path / "a.mcap", (128, 96), LocalOpener()) is None
-    assert picture_in(tmp_path / "gone.mcap", (128, 96), LocalOpener()) is None
+    assert read_picture(tmp_path / "a.mcap", (128, 96), LocalOpener()) is None
+    assert read_picture(tmp_path / "gone.mcap", (128, 96), LocalOpener()) is None
     (tmp_path / "none.mcap").write_bytes(b"nothing of the kind")
-    assert picture_in(tmp_path / "none.mcap", (128, 96), LocalOpener()) is None
+    assert read_picture(tmp_path / "none.mcap", (128, 96), LocalOpener()) is None

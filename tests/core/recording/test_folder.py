@@ -52,7 +52,7 @@ def test_each_file_is_listed_with_its_contents(folder, tmp_path, monkeypatch):
     assert found["cut.MCAP"].message_count == 5
     assert found["fixed.mcap"].is_repaired
     assert "not an MCAP file" in found["none.mcap"].problem
-    monkeypatch.setattr(folder_module, "read_facts", pytest.fail)
+    monkeypatch.setattr(folder_module, "read_info", pytest.fail)
     assert {each.path.name: each for each in look(folder).files} == found  # nothing is opened again
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from app.core.alerts import Alerts
 from app.core.recording.film_strip import film_strip
-from app.core.recording.folder import RecordingFacts, read_facts
+from app.core.recording.folder import RecordingInfo, read_info
 from app.core.recording.opener import LocalOpener, process_opener
 from app.core.recording.replay.opening import MAX_TOPICS, open_recording
 from app.core.recording.replay.replay import FAILED, Replay
@@ -58,11 +58,11 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_file_too_expensive_to_read_is_listed_as_not_scanned(path: Path) -> None:
-    plain = RecordingFacts(path, path.stat().st_size, 1.0)
-    made = read_facts(plain, Failing(RecordingTooLargeError(str(path), "reading the file takes too long")))
+    plain = RecordingInfo(path, path.stat().st_size, 1.0)
+    made = read_info(plain, Failing(RecordingTooLargeError(str(path), "reading the file takes too long")))
     assert (made.path, made.is_read, made.problem) == (path, True, "")
     assert "reading the file takes too long" in made.scan_problem
-    made = read_facts(plain, Failing(RecordingError(str(path), "the process has ended")))
+    made = read_info(plain, Failing(RecordingError(str(path), "the process has ended")))
     assert "the process has ended" in made.problem
 
 

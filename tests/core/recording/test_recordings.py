@@ -12,7 +12,12 @@ import pytest
 from app.core.alerts import Alerts
 from app.core.recording.choice import RecordingChoice, RingSettings
 from app.core.recording.client import RecorderEvent, RecorderExited
-from app.core.recording.recordings import CHOOSE_FOLDER, NO_FOLDER, SessionRecordings, saved_file_name
+from app.core.recording.recordings import (
+    CHOOSE_FOLDER_COMMAND,
+    NO_FOLDER_ALERT,
+    SessionRecordings,
+    saved_file_name,
+)
 from app.core.storage.settings import Settings
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmEvent, AlarmRule
 from tests.core.recording.test_client import OrdersOnly, status
@@ -118,7 +123,7 @@ def test_missing_selected_folder_is_reported_not_created(made):
     assert made.again().folder == away
     assert made.recordings.record() == "The recordings folder is missing."
     (alert,) = made.alerts.active
-    assert (alert.id, alert.action) == (NO_FOLDER, CHOOSE_FOLDER)
+    assert (alert.id, alert.action) == (NO_FOLDER_ALERT, CHOOSE_FOLDER_COMMAND)
     assert not away.exists()
     assert made.lines == []
     away.mkdir(parents=True)
@@ -129,7 +134,7 @@ def test_missing_selected_folder_is_reported_not_created(made):
 def test_folder_creation_failure_is_reported(made):
     (made.home / "Recordings").write_bytes(b"a file in its place")
     assert made.recordings.record() == "The recordings folder is missing."
-    assert made.alerts.has(NO_FOLDER)
+    assert made.alerts.has(NO_FOLDER_ALERT)
 
 
 def test_flight_recorder_is_off_by_default_and_restored_at_next_start(made):
@@ -147,7 +152,7 @@ def test_flight_recorder_is_off_by_default_and_restored_at_next_start(made):
 
 
 def alarm() -> tuple[AlarmEvent, AlarmAction]:
-    action = AlarmAction("keep", seconds=20.0)
+    action = AlarmAction("keep", recording_s=20.0)
     rule = AlarmRule("r", AlarmCondition("silent", "/camera", for_s=2.0), (action,))
     return AlarmEvent("on", rule, 1000.0), action
 

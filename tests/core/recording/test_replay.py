@@ -9,7 +9,7 @@ import pytest
 
 from app.core.alerts import Alerts
 from app.core.network.mailbox import Batch
-from app.core.recording.replay.replay import Replay, graph_of
+from app.core.recording.replay.replay import Replay, create_graph
 from app.core.storage.settings import Settings
 from nep.messages.message import Message
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
@@ -244,7 +244,7 @@ def test_topic_without_sequence_numbers_is_listed_with_unknown_losses(tmp_path):
     path = tmp_path / "original.mcap"
     record(path, [[Message("/original", b"{}", "json", "json")]])
     with Recording(path) as recording:
-        view = graph_of(recording.topics, recording.stats())
+        view = create_graph(recording.topics, recording.stats())
     assert len(view.topics["/original"].publishers) == 1
     assert view.topics["/original"].lost is None
 

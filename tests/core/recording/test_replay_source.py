@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.network.mailbox import MESSAGES_PER_TOPIC
+from app.core.network.mailbox import MAX_MESSAGES_PER_TOPIC
 from app.core.recording.replay.source import ReplayResults, ReplaySource
 from nep.errors import RecordingError
 from nep.messages.message import Message
@@ -221,7 +221,7 @@ def test_loop_replays_its_part_repeatedly(replay, whole):
 
 
 def test_slow_window_drops_and_counts_messages_while_playhead_stays_correct(tmp_path, replay):
-    count = 4 * MESSAGES_PER_TOPIC
+    count = 4 * MAX_MESSAGES_PER_TOPIC
     path = tmp_path / "fast.mcap"
     with RecordingWriter(path, clock=TestClock(step_ns=1_000_000), limits=limits()) as writer:
         for seq in range(count):
@@ -232,7 +232,7 @@ def test_slow_window_drops_and_counts_messages_while_playhead_stays_correct(tmp_
     played.do(Playback.play)
     handed = played.pass_time(5.0)
     batch = handed.drained.batches["/a"]
-    assert (len(batch.messages), batch.arrived_count) == (MESSAGES_PER_TOPIC, count - 1)
+    assert (len(batch.messages), batch.arrived_count) == (MAX_MESSAGES_PER_TOPIC, count - 1)
     assert batch.messages[-1].seq == count - 1
     assert played.source.status.player.position_ns == played.source.opened.recording.end_ns
 

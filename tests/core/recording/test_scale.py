@@ -43,7 +43,7 @@ def test_visible_range_stays_within_the_recording(seed):
                 scale.with_time(chance.randint(100 * S, 860 * S)),
             )
         )
-        assert scale.first_ns <= scale.begin_ns < scale.end_ns <= scale.last_ns
+        assert scale.first_ns <= scale.start_ns < scale.end_ns <= scale.last_ns
         assert scale.span_ns >= MIN_SPAN_NS
         assert 1 <= len(list(scale.marks(8))) <= 10
 
@@ -59,7 +59,7 @@ def test_tick_marks_are_multiples_of_the_step_from_the_recording_start():
     marks = list(WHOLE.marks(8))
     assert [each - 100 * S for each in marks] == [k * 120 * S for k in range(7)]
     inside = WHOLE.zoomed(0.1, 480 * S)
-    assert all((each - 100 * S) % round(inside.step_s(8) * 1e9) == 0 for each in inside.marks(8))
+    assert all((each - 100 * S) % round(inside.mark_interval_s(8) * 1e9) == 0 for each in inside.marks(8))
 
 
 def test_recording_of_a_single_moment_has_a_visible_range():

@@ -11,7 +11,7 @@ import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.program import Program
-from app.core.network.master import MasterStart
+from app.core.network.master import MasterStarter
 from app.core.reports.crash import Crash
 from app.core.robots.launcher import TAIL_LETTERS, LaunchFailed
 from app.core.run.runner import Runner
@@ -139,7 +139,7 @@ def test_crashed_master_is_reported_at_next_master_start(crashes) -> None:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
     told: list[str] = []
-    start = MasterStart(address, told.append)
+    start = MasterStarter(address, told.append)
     for number_of_crashes in (0, 1):
         start.ensure()
         assert start._thread is not None

@@ -11,7 +11,14 @@ import pytest
 
 from app.core.alerts import Alerts
 from app.core.reports.crash import PARTS, Crash, crash_extra
-from app.core.reports.crash_reports import ALERT, MAX_REPORTS, CrashLog, CrashReports, show_crash_alert, texts
+from app.core.reports.crash_reports import (
+    ALERT_ID,
+    MAX_REPORTS,
+    CrashLog,
+    CrashReports,
+    read_reports,
+    show_crash_alert,
+)
 from nep.version import __version__
 from tests.pseudo import untranslated
 
@@ -62,7 +69,7 @@ def test_ten_newest_crash_reports_are_kept(reports: CrashReports, clock: Clock) 
         clock.now += 60
         reports.add(Crash("editor", f"number {number}"))
     assert len(reports.all()) == MAX_REPORTS
-    told = [text.decode() for _name, text in texts(reports.all())]
+    told = [text.decode() for _name, text in read_reports(reports.all())]
     assert "number 13" in told[0]
     assert "number 4" in told[-1]
 
@@ -74,7 +81,8 @@ def test_crash_reports_of_the_same_second_have_separate_files(
         reports.add(Crash("studio", how))
     assert len(reports.take_new()) == 2
     reports.add(Crash("studio", "three"))
-    assert sorted(text.decode().split("how: ")[1].split()[0] for _name, text in texts(reports.all())) == [
+    assert sorted(text.decode().split("how: ")[1].split()[0] for _name,
+    text in read_reports(reports.all())) == [
         "one", "three", "two",
     ]  # fmt: skip
 
@@ -127,7 +135,7 @@ def test_only_crash_log_records_become_reports(reports: CrashReports) -> None:
 def test_next_start_offers_the_most_severe_crash_once(reports: CrashReports) -> None:
     alerts = Alerts()
     show_crash_alert(alerts, reports)
-    assert not alerts.has(ALERT)
+    assert not alerts.has(ALERT_ID)
     for part in ("robot", "studio", "editor"):
         reports.add(Crash(part, "how"))  # type: ignore[arg-type]
     show_crash_alert(alerts, reports)

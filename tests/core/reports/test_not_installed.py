@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.reports.not_installed import LIBRARIES, MissingLibraries, missing_libraries
+from app.core.reports.not_installed import PACKAGES_BY_LIBRARY, MissingLibraries, missing_libraries
 
 BROUGHT = ("libQt6", "libicu", "ld-linux")
 C_RUNTIME = {
@@ -114,4 +114,4 @@ def test_all_system_libraries_of_qt_are_checked() -> None:
     wanted = {name for file in files for name in needed(file)}
     of_system = {name for name in wanted if not name.startswith(BROUGHT)} - C_RUNTIME
     assert "libnss3.so" in of_system
-    assert of_system <= set(LIBRARIES)
+    assert of_system <= set(PACKAGES_BY_LIBRARY)

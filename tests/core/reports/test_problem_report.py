@@ -11,16 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from app.core.documents.file_format import BehaviourFile, file_bytes, read_file
+from app.core.documents.file_format import BehaviourFile, encode_file, read_file
 from app.core.reports.crash import Crash
 from app.core.reports.crash_reports import CrashReports
 from app.core.reports.problem_report import (
     ReportedWork,
     ReportParts,
     ReportWriter,
+    create_report,
     describe_contents,
     file_name,
-    make_report,
     work_text,
     write_report,
 )
@@ -55,7 +55,7 @@ def opened(data: bytes) -> dict[str, str]:
 
 def test_report_contains_description_doctor_findings_logs_and_settings(parts: ReportParts) -> None:
     parts.crashes.add(Crash("robot", "by signal 11", "where it was"))
-    found = opened(make_report(parts, "  It stood still.\nThen it fell. ñ "))
+    found = opened(create_report(parts, "  It stood still.\nThen it fell. ñ "))
     assert found["what-happened.txt"] == "It stood still.\nThen it fell. ñ"
     assert found["doctor.txt"] == "+ All is well in ~.\n"
     assert found["log/studio.log"].splitlines() == [f"the newest line, of {Path('~') / 'a.py'}"]
@@ -77,14 +77,14 @@ def test_report_contains_description_doctor_findings_logs_and_settings(parts: Re
 
 
 def test_report_contains_no_secrets_or_personal_data(parts: ReportParts) -> None:
-    whole = "".join(opened(make_report(parts, "")).values())
+    whole = "".join(opened(create_report(parts, "")).values())
     for words in ("swordfish", "Private", str(Path.home())):
         assert words not in whole
 
 
 def test_report_includes_only_given_documents_with_unique_names(parts: ReportParts, tmp_path: Path) -> None:
-    data = file_bytes(BehaviourFile("A/B: c", BLOCKS, {}))
-    found = make_report(
+    data = encode_file(BehaviourFile("A/B: c", BLOCKS, {}))
+    found = create_report(
         parts, "", [ReportedWork("A/B: c", data), ReportedWork("A_B_ c", data), ReportedWork("...", data)]
     )
     names = sorted(name for name in opened(found) if name.startswith("work/"))
@@ -96,7 +96,7 @@ def test_report_includes_only_given_documents_with_unique_names(parts: ReportPar
 
 def test_report_is_created_without_a_log(tmp_path: Path) -> None:
     parts = ReportParts((), {}, lambda: "", tmp_path / "none", CrashReports(tmp_path / "none" / "crashes"))
-    found = opened(make_report(parts, ""))
+    found = opened(create_report(parts, ""))
     assert "README.txt" in found
     assert not [name for name in found if name.startswith(("log/", "crashes/"))]
     assert "(empty)" in describe_contents(parts)[1]
@@ -120,7 +120,7 @@ def test_report_file_name_has_the_date() -> None:
 
 
 def test_report_is_written_atomically(parts: ReportParts, tmp_path: Path) -> None:
-    writer = ReportWriter(tmp_path / "report.zip", lambda: make_report(parts, "words"))
+    writer = ReportWriter(tmp_path / "report.zip", lambda: create_report(parts, "words"))
     assert writer.wait(60)
     assert writer.problem == ""
     assert opened((tmp_path / "report.zip").read_bytes())["what-happened.txt"] == "words"

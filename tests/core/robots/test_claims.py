@@ -412,7 +412,7 @@ def test_parsing_repeated_descriptions_uses_at_most_a_fifth_of_main_thread_time(
 
     def parse(topic: str, newest: nep.Message) -> None:
         reads.append(topic)
-        announcements._topics[topic].parsed = newest
+        announcements._topics[topic].parsed_message = newest
         clock.now += 0.5
 
     announcements._parse = parse  # the real one takes as long as the machine likes

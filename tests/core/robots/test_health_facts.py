@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from app.core.network.topics import Topic
-from app.core.robots.health_facts import LOW_PERCENT, HealthFact, facts_of
+from app.core.robots.health_facts import LOW_BATTERY_PERCENT, HealthItem, health_items
 from app.core.robots.reported_count import GROWTH_WINDOW_S, ReportedCount
 from app.core.robots.robot_link import RobotLink
 from app.robots import rize, simulated
@@ -28,7 +28,7 @@ class Case:
         self.link = RobotLink(
             "Pepper",
             PEPPER,
-            replied_s=NOW - 3,
+            last_reply_s=NOW - 3,
             last_stop="confirmed in 41 ms, at 8:40",
             last_stop_status="ok",
         )
@@ -37,8 +37,8 @@ class Case:
             sensor.topic: Topic(sensor.topic, rate_hz=15.2, age_s=0.1) for sensor in PEPPER.sensors
         }
 
-    def facts(self) -> tuple[HealthFact, ...]:
-        return facts_of(self.link, self.topics, NOW, seconds)  # type: ignore[arg-type]
+    def facts(self) -> tuple[HealthItem, ...]:
+        return health_items(self.link, self.topics, NOW, seconds)  # type: ignore[arg-type]
 
     def says(self, title: str) -> tuple[str, str]:
         fact = next(fact for fact in self.facts() if fact.title == title)
@@ -62,13 +62,13 @@ def test_healthy_robot_has_only_ok_facts(case: Case) -> None:
         ("Camera", "ok", "sends 15 images per second"),
         ("Sensors", "ok", f"all {len(PEPPER.sensors) - 1} are sending"),
         ("Safety stop", "ok", "stops by itself after 1 s"),
-        ("Last response", "ok", f"every {PEPPER.beat_s:g} s during actions"),
+        ("Last response", "ok", f"every {PEPPER.heartbeat_interval_s:g} s during actions"),
     ]
     assert not any(fact.needs_attention for fact in case.facts())
 
 
 def test_unknown_facts_are_not_warnings(case: Case) -> None:
-    case.link.replied_s = case.link.last_stop = None
+    case.link.last_reply_s = case.link.last_stop = None
     case.link.values.clear()
     case.topics.clear()
     assert case.says("Connection") == ("ok", "connected; no request sent yet")
@@ -91,7 +91,7 @@ def test_unwatched_camera_is_not_a_warning(case: Case) -> None:
 def test_unresponsive_robot_shows_duration_and_advice(case: Case) -> None:
     case.link.is_unresponsive = True
     assert case.says("Connection") == ("error", "not responding for 3 s; restart it")
-    case.link.replied_s = None
+    case.link.last_reply_s = None
     case.link.robot = replace(PEPPER, virtual=False)
     assert case.says("Connection") == ("error", "not responding; check that it is switched on")
 
@@ -108,7 +108,7 @@ def test_driver_rejections_and_exceptions_are_a_warning_while_they_increase(
     status, words = case.says(title)
     assert status == "warn"
     assert "12" in words
-    count.grew_s = NOW - GROWTH_WINDOW_S
+    count.last_increase_s = NOW - GROWTH_WINDOW_S
     status, words = case.says(title)
     assert status == "off"
     assert "12" in words
@@ -126,9 +126,9 @@ def test_disconnected_robot_shows_no_outdated_facts(case: Case) -> None:
 
 
 def test_low_battery_is_the_first_fact(case: Case) -> None:
-    case.link.values["battery"] = LOW_PERCENT - 1
-    assert case.facts()[0] == HealthFact("Battery", "warn", "19 %; charge it soon")
-    case.link.values["battery"] = LOW_PERCENT
+    case.link.values["battery"] = LOW_BATTERY_PERCENT - 1
+    assert case.facts()[0] == HealthItem("Battery", "warn", "19 %; charge it soon")
+    case.link.values["battery"] = LOW_BATTERY_PERCENT
     assert case.says("Battery") == ("ok", "20 %")
 
 
@@ -159,7 +159,7 @@ def test_last_stop_is_shown_with_its_status(case: Case, last: str, status: str) 
 
 
 def test_silent_camera_is_an_error(case: Case) -> None:
-    case.link.silent = "camera silent"
+    case.link.silence_reason = "camera silent"
     case.topics["/Pepper/camera"].silent_s = 4.0
     assert case.says("Camera") == ("error", "silent for 4 s")
 

@@ -9,7 +9,7 @@ import pytest
 
 from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
-from app.core.robots.known import KEY, MAX_ROBOTS, KnownRobot, KnownRobots
+from app.core.robots.known import MAX_ROBOTS, SETTING_KEY, KnownRobot, KnownRobots
 from app.core.storage.settings import Settings
 from app.robots import rize
 
@@ -50,7 +50,8 @@ def test_removed_known_robot_is_added_again_when_it_returns(settings) -> None:
 
 def test_invalid_entries_are_ignored(settings) -> None:
     settings.set(
-        KEY, ["NAO", {"name": 3, "seen_s": 1}, {"name": "A", "seen_s": True}, {"name": "B", "seen_s": 2}]
+        SETTING_KEY,
+        ["NAO", {"name": 3, "seen_s": 1}, {"name": "A", "seen_s": True}, {"name": "B", "seen_s": 2}],
     )
     assert KnownRobots(settings).robots == (KnownRobot("B", 2.0),)
 

@@ -11,7 +11,7 @@ import pytest
 import nep
 from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
-from app.core.robots.launcher import FIRST_GRAPH_TIMEOUT_S, REQUEST_LIFETIME_S, STARTING_S, Launcher
+from app.core.robots.launcher import FIRST_GRAPH_TIMEOUT_S, REQUEST_LIFETIME_S, STARTUP_TIMEOUT_S, Launcher
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
@@ -42,7 +42,7 @@ class World:
 
     def after(self, seconds: float) -> None:
         self.now += seconds
-        self.launcher.start_requested()
+        self.launcher.start_requested_robots()
 
 
 @pytest.fixture
@@ -175,5 +175,5 @@ def test_robot_is_starting_until_connected_or_failed(world: World) -> None:
     launcher.check()
     assert launcher.starting_robots == (), "it ended by itself"
     launcher.start_virtual_robot("Turtle", "diffdrive")
-    world.after(STARTING_S)
+    world.after(STARTUP_TIMEOUT_S)
     assert launcher.starting_robots == (), "it never came"

@@ -110,9 +110,9 @@ def test_shelf_asks_and_ends_repetition_when_a_real_robot_connects(session: Sess
     acting.on_moved = lambda robots, by: moved.append((robots, by))
     acting.shelf.set_message(ORDER)
     assert acting.send(ORDER, rate_hz=20.0) == ""
-    tick_until(session, lambda: acting.outbox.all_repeated)
+    tick_until(session, lambda: acting.outbox.repeated_messages)
     with real_robot(session, master.address) as told:
-        tick_until(session, lambda: not acting.outbox.all_repeated)
+        tick_until(session, lambda: not acting.outbox.repeated_messages)
         if acting.question is None:  # its thread saw the robot before the window did
             assert acting.send(ORDER) == ""
         acting.answer(let=True)

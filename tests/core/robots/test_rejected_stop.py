@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.robots.health_facts import facts_of
+from app.core.robots.health_facts import health_items
 from app.core.robots.robot_link import RobotLink
 from app.core.run.runner import RunnerEvent
 from app.core.session import Session
@@ -67,7 +67,7 @@ def the_link(session: Session, name: str = "Arm") -> RobotLink:
 
 def test_rejected_stop_is_shown_everywhere(session: Session, arm: Driver) -> None:
     link = the_link(session)
-    assert link.chip_text == "virtual, ready" if link.virtual else "ready"
+    assert link.chip_text == "virtual, ready" if link.is_virtual else "ready"
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
     view = session.runs.view()
@@ -79,7 +79,7 @@ def test_rejected_stop_is_shown_everywhere(session: Session, arm: Driver) -> Non
     assert (link.state, link.chip_text.removeprefix("virtual, ")) == ("not stopped", "may still move")
     words, status = robots_chip(session)
     assert (words, status) == ("Arm: may still move", "error")
-    (fact,) = (each for each in facts_of(link, session.topics, 0.0, str) if each.title == "Stop")
+    (fact,) = (each for each in health_items(link, session.topics, 0.0, str) if each.title == "Stop")
     assert fact.status == "error"
     assert "the brake does not answer" in fact.text
     (alert,) = (each for each in session.alerts.active if each.id == "stop")
@@ -161,7 +161,7 @@ def test_run_prints_the_rejection_message_of_the_robot(master: Master, arm: Driv
 def patient(session: Session, monkeypatch: pytest.MonkeyPatch) -> Session:
     """Waits for the answers to a stop as long as a test needs."""
     monkeypatch.setattr("app.core.robots.stop.stopper.STOP_TIMEOUT_S", 120.0)
-    monkeypatch.setattr("app.core.robots.stop.stopper.MAX_STOP_S", 120.0)
+    monkeypatch.setattr("app.core.robots.stop.stopper.MAX_STOP_TIMEOUT_S", 120.0)
     return session
 
 
@@ -179,7 +179,7 @@ def test_pending_stop_is_shown_as_not_ready_everywhere(patient: Session, pepper:
     tick_until(patient, lambda: link.state == "stopping", LONG_S)
     assert link.chip_text.removeprefix("virtual, ") == "stopping"
     assert robots_chip(patient) == ("Pepper stopping", "running")
-    (fact,) = (each for each in facts_of(link, patient.topics, 0.0, str) if each.title == "Stop")
+    (fact,) = (each for each in health_items(link, patient.topics, 0.0, str) if each.title == "Stop")
     assert (fact.status, fact.text) == ("off", "Stop sent; waiting for confirmation")
     answers(patient, pepper)
     tick_until(patient, lambda: patient.runs.view().state == "proven", LONG_S)
@@ -285,7 +285,7 @@ def test_robot_lost_after_reporting_possible_motion_stays_an_error(session: Sess
     with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node) as arm:
         link = the_link(session)
         told = {"op": "alive", "id": "", "action": "", "state": "running", "not_ended": ["the stop function"]}
-        arm._publish(arm.robot.topics.answer, {**told, "error": SAID})
+        arm._publish(arm.robot.topics.reply, {**told, "error": SAID})
         tick_until(session, lambda: link.state == "not stopped")
     tick_until(session, lambda: not link.is_connected)
     assert (link.state, link.stop_problem) == ("not stopped", SAID)
@@ -338,7 +338,7 @@ def test_stop_is_resent_to_robots_that_did_not_reply_to_the_program(
     session.runs.run()
     runner = session.runs._runner
     assert runner is not None
-    session.runs.on_runner(RunnerEvent("ended", runner.run, unresponsive_robots=("Pepper",)))
+    session.runs.on_runner_event(RunnerEvent("ended", runner.run, unresponsive_robots=("Pepper",)))
     tick_until(session, lambda: session.runs.view().state == "unanswered")
     assert session.runs.view().title == "Pepper didn't reply"
     runner.close()

@@ -30,7 +30,7 @@ def test_value_that_is_not_a_count_is_ignored(hostile: object) -> None:
     assert (count.value, count.is_growing(1.0)) == (0, False)
     count.update(7, 2.0)
     count.update(hostile, 3.0)
-    assert (count.value, count.grew_s) == (7, 2.0)
+    assert (count.value, count.last_increase_s) == (7, 2.0)
 
 
 def test_count_of_restarted_driver_starts_over() -> None:

@@ -17,7 +17,7 @@ from types import FrameType
 import pytest
 
 import nep
-from app.core.network.mailbox import MESSAGES_PER_TOPIC
+from app.core.network.mailbox import MAX_MESSAGES_PER_TOPIC
 from app.core.robots.robot_link import Invocation, RobotLink
 from app.core.session import Session
 from app.robots.description.description import thing_description
@@ -205,7 +205,7 @@ def test_malformed_replies_are_ignored(session: Session, liar: Liar, tried: Invo
     tick_until(session, lambda: tried.state == "succeeded")
 
 
-MAX_CALLS_A_TICK = 64 * MESSAGES_PER_TOPIC
+MAX_CALLS_A_TICK = 64 * MAX_MESSAGES_PER_TOPIC
 """Limit of function calls for the answers of a full topic, about 48 each; independent of the load."""
 
 

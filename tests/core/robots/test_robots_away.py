@@ -122,8 +122,8 @@ def test_moved_robot_that_left_is_still_named_by_stop(strangers: Strangers) -> N
     strangers.leave()
     strangers.pass_by(1000)
     fleet = strangers.fleet
-    assert fleet.unresponsive == ("Pepper",)
-    assert "Pepper" in fleet.stoppable
+    assert fleet.unresponsive_robots == ("Pepper",)
+    assert "Pepper" in fleet.stoppable_robots
     (target,) = (each for each in fleet.stop_targets if each.robot.name == "Pepper")
     assert target.is_expected
     link = fleet.link("Pepper")
@@ -139,7 +139,7 @@ def test_stopped_selected_or_used_robots_are_not_evicted(strangers: Strangers, w
     if why == "proven":
         report = StopReport((RobotStop("Pepper", True, 41.0),), 41.0)
         fleet.apply_stop({"Pepper": ("41 ms", "ok")}, report)
-        assert link.has_proven_stop
+        assert link.has_confirmed_stop
     elif why == "chosen":
         fleet.select("Pepper")
     elif why == "used":
@@ -155,7 +155,7 @@ def test_stopped_selected_or_used_robots_are_not_evicted(strangers: Strangers, w
 
 
 def test_robots_that_replied_are_evicted_last(strangers: Strangers) -> None:
-    strangers.come("Pepper").replied_s = 1.0
+    strangers.come("Pepper").last_reply_s = 1.0
     strangers.come("Silent")
     strangers.leave()
     strangers.pass_by(1000)

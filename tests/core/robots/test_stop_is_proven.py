@@ -11,7 +11,7 @@ import pytest
 
 import nep
 from app.core.robots.stop.lines import StopTarget
-from app.core.robots.stop.report import RobotStop, StopReport, not_reached
+from app.core.robots.stop.report import RobotStop, StopReport, unreached_result
 from app.core.robots.stop.stopper import RobotStopper
 from app.robots.description.description import RobotTopics
 from app.robots.identity import first_announcer, identity_of
@@ -70,7 +70,7 @@ def test_foreign_reply_does_not_confirm_stop_of_a_frozen_robot(stopper, pepper, 
     pepper.silent = {"stop"}
     report = stopper.stop_all(["Pepper"], timeout_s=SHORT_S)
     assert stranger.answered.is_set()
-    assert not report.is_proven
+    assert not report.is_confirmed
     assert report.robots[0] == RobotStop("Pepper", False, None)
 
 
@@ -85,8 +85,8 @@ def test_foreign_node_that_only_replies_is_named(master, stopper, pepper) -> Non
         until(lambda: bool(pepper.heard("stop")))
         forged.publish({"id": pepper.heard("stop")[0]["id"], "op": "stop", "state": "succeeded"})
         asking.join()
-    assert not reports[0].is_proven
-    assert reports[0].strangers == (("Pepper", "liar"),)
+    assert not reports[0].is_confirmed
+    assert reports[0].impostors == (("Pepper", "liar"),)
 
 
 def test_two_robots_of_the_same_name_must_both_reply(master, stopper, pepper) -> None:
@@ -94,13 +94,13 @@ def test_two_robots_of_the_same_name_must_both_reply(master, stopper, pepper) ->
     try:
         stopper.update_graph(stopper._node.graph())
         report = stopper.stop_all(timeout_s=LONG_S)
-        assert report.is_proven
+        assert report.is_confirmed
         assert [robot.full_name for robot in report.robots] == ["Pepper", "Pepper (“Pepper”)"]
         twin.silent = {"stop"}
         told: list[RobotStop] = []
         report = stopper.stop_all(timeout_s=SHORT_S, on_answer=told.append)
         assert [(each.is_confirmed, each.is_waiting) for each in told] == [(True, True), (False, False)]
-        assert (report.is_proven, report.unconfirmed_names) == (False, ("Pepper",))
+        assert (report.is_confirmed, report.unconfirmed_names) == (False, ("Pepper",))
         assert report.robots[1].message == "Pepper (“Pepper”) didn't reply. Switch it off by hand."
         twin.silent, pepper.silent = set(), {"stop"}
         report = stopper.stop_all(timeout_s=SHORT_S)
@@ -114,7 +114,7 @@ def test_other_subscriber_of_the_commands_is_named(master, stopper) -> None:
         node.new_sub("/Pepper/command", "robot/command")
         stopper.update_graph(stopper._node.graph())
         report = stopper.stop_all(timeout_s=LONG_S)
-    assert report.is_proven
+    assert report.is_confirmed
     said = "Pepper (“motor box”) also receives the commands and can't confirm"
     assert [robot.message for robot in report.robots][1:] == [said]
 
@@ -128,7 +128,7 @@ def test_many_other_subscribers_are_summarized_in_one_line(master, stopper) -> N
     for node in nodes:
         node.close()
     assert [robot.program for robot in report.robots] == ["", "6 programs"]
-    assert report.is_proven
+    assert report.is_confirmed
 
 
 def test_first_program_that_announces_a_robot_counts_as_the_robot(master, stopper, pepper) -> None:
@@ -156,18 +156,18 @@ def test_stop_is_also_sent_to_topics_of_earlier_descriptions(master, stopper, pe
     changed = replace(pepper.described, topics=moved)
     stopper.set_robots([StopTarget(changed, earlier_topics=(pepper.described.topics,))])
     report = stopper.stop_all(timeout_s=LONG_S)
-    assert report.is_proven
+    assert report.is_confirmed
     assert pepper.heard("stop")
 
 
 def test_robot_that_did_not_receive_stop_is_named() -> None:
     report = StopReport((RobotStop("Pepper", True, 3.0),), 3.0)
     whole = report.with_unreached(["Pepper", "Turtle"], "no master answers")
-    assert (whole.is_proven, whole.unconfirmed_names) == (False, ("Turtle",))
+    assert (whole.is_confirmed, whole.unconfirmed_names) == (False, ("Turtle",))
     said = "Stop wasn't sent to Turtle: no master answers. Switch it off by hand."
     assert whole.robots[1].message == said
     assert report.with_unreached(["Pepper"]) is report
-    assert not_reached("Turtle").problem == "Stop wasn't sent to Turtle"
+    assert unreached_result("Turtle").problem == "Stop wasn't sent to Turtle"
 
 
 class Broken:
@@ -202,7 +202,7 @@ def test_failed_connection_is_named_and_does_not_affect_other_robots(master, bro
         assert stopper.robots == ("Turtle",)
         assert list(stopper.problems) == ["Pepper"]
         report = stopper.stop_all(timeout_s=LONG_S)
-        assert (report.is_proven, report.unconfirmed_names) == (False, ("Pepper",))
+        assert (report.is_confirmed, report.unconfirmed_names) == (False, ("Pepper",))
         assert report.robots[0].message.startswith("Stop can't be sent to Pepper: ")
         assert broken.tried == 2  # once more at the stop
     finally:
@@ -216,7 +216,7 @@ def test_failed_connection_is_retried_at_stop(broken, pepper) -> None:
         stopper.set_robots([pepper.described])
         broken.full.clear()
         report = stopper.stop_all(timeout_s=LONG_S)
-        assert report.is_proven
+        assert report.is_confirmed
         assert [robot.name for robot in report.robots] == ["Pepper"]
         assert (stopper.robots, dict(stopper.problems)) == (("Pepper",), {})
     finally:
@@ -227,20 +227,20 @@ def test_late_stop_reply_is_accepted(stopper, pepper) -> None:
     pepper.silent = {"stop"}
     late: list[RobotStop] = []
     report = stopper.stop_all(timeout_s=0.1, on_late=late.append)
-    assert not report.is_proven
+    assert not report.is_confirmed
     (command,) = pepper.heard("stop")
     pepper._say(command, "failed", "the brake is stuck")
     until(lambda: len(late) == 1)
     assert late[0].problem == "Pepper may still move: the brake is stuck"
-    assert report.with_late(late[0]).robots == (late[0],)
+    assert report.with_late_reply(late[0]).robots == (late[0],)
     pepper._say(command, "succeeded")
     until(lambda: len(late) == 2)
-    assert report.with_late(late[1]).is_proven
+    assert report.with_late_reply(late[1]).is_confirmed
     pepper._say(command, "failed", "moves again")
     pepper._say(command, "succeeded")
     assert stopper.stop_all(timeout_s=0.1, on_late=late.append).unconfirmed_names == ("Pepper",)
     assert len(late) == 2
-    assert report.with_late(RobotStop("Other", True, 1.0)) is report
+    assert report.with_late_reply(RobotStop("Other", True, 1.0)) is report
 
 
 def test_late_reply_callback_can_use_the_stopper(stopper, pepper) -> None:
@@ -259,7 +259,7 @@ def test_late_reply_callback_can_use_the_stopper(stopper, pepper) -> None:
     (asked,) = stopper._asked.values()
     answer = {"id": command["id"], "op": "stop", "action": "stop", "state": "failed", "error": "stuck"}
     publisher = pepper._answer._spec.id
-    topic, payload = pepper.described.topics.answer, json.dumps(answer).encode()
+    topic, payload = pepper.described.topics.reply, json.dumps(answer).encode()
     with stopper._changed:
         asked.unknown_replies.add(nep.Message(topic, payload, "json", "robot/answer", publisher=publisher))
     stopper.update_graph(stopper._node.graph())

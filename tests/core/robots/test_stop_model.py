@@ -25,7 +25,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from app.core.faults import ALERT
+from app.core.faults import ALERT_ID
 from nep.messages.message import Message
 from tests.core.robots.stop_model.lab import SimulatedLab
 from tests.core.robots.stop_model.robots import SimulatedRobot
@@ -292,7 +292,7 @@ class StopModel(RuleBasedStateMachine):
         answered = self.answered[self.press_of_all]
         for robot, commands in self.told.items():
             if robot.id not in answered and any(place < self.pressed_at for place in commands.values()):
-                assert not report.is_proven, f"{robot} is called stopped and did not answer"
+                assert not report.is_confirmed, f"{robot} is called stopped and did not answer"
                 assert robot.name in report.unconfirmed_names, (
                     f"{robot} was told to move, did not answer and is not named"
                 )
@@ -310,7 +310,7 @@ class StopModel(RuleBasedStateMachine):
     def _check_alive(self) -> None:
         ended = [each for each in self.robots if each.node.is_running and not each.is_deciding]
         assert not ended, f"{ended} decides nothing any more"
-        wrong = [each for each in self.studio.session.alerts.active if each.id == ALERT]
+        wrong = [each for each in self.studio.session.alerts.active if each.id == ALERT_ID]
         assert not wrong, wrong
 
     def teardown(self) -> None:

@@ -63,7 +63,7 @@ def test_robot_lost_while_moving_is_named_until_it_replies_or_the_user_confirms(
     link, runs, moved = lab.wait_for_link("Pepper"), lab.studio.session.runs, lab.studio.session.fleet.moved
     lab.studio.move("Pepper", "turn")
     lab.settle()
-    assert link.running
+    assert link.running_invocations
     silence(pepper, how)
     lab.advance(LEASE_S + CHECK_INTERVAL_S)
     if how == "replaced":
@@ -170,7 +170,7 @@ def flood(lab: SimulatedLab, topic: str) -> None:
 
 def test_flood_of_foreign_replies_does_not_evict_the_reply_of_the_robot(lab: SimulatedLab) -> None:
     pepper, runs = lab.start_robot("Pepper"), lab.studio.session.runs
-    topic = lab.wait_for_link("Pepper").robot.topics.answer
+    topic = lab.wait_for_link("Pepper").robot.topics.reply
     pepper.node.is_held = True
     runs.stop()
     lab.settle()

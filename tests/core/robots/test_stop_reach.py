@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import nep
-from app.core.network.master import DISCOVERY_S
+from app.core.network.master import DISCOVERY_TIMEOUT_S
 from app.core.session import Session
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
 from tests.core.waiting import tick_until
@@ -114,7 +114,7 @@ def test_robots_unknown_to_a_new_master_stay_connected_during_discovery(session:
             session._on_graph(empty, now + later_s)
             assert session.graph is graph
             assert session.fleet.connected
-        session._on_graph(empty, now + DISCOVERY_S)
+        session._on_graph(empty, now + DISCOVERY_TIMEOUT_S)
         assert session.graph is empty
         assert not session.fleet.connected
 

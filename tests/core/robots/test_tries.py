@@ -59,7 +59,7 @@ def test_trial_passes_through_its_states_and_is_recorded(bench) -> None:
     assert bench.sent[0]["input"] == {"distance": 0.5}
     assert made.state == "sent"
     bench.answer(made, "accepted", replaces=["turn"])
-    assert (made.state, made.replaces, made.remaining_s) == ("accepted", ("turn",), None)
+    assert (made.state, made.replaced_actions, made.remaining_s) == ("accepted", ("turn",), None)
     bench.answer(made, "running")
     bench.now += 4
     bench.answer(made, "running", feedback={"moved": 0.2})
@@ -124,7 +124,7 @@ def test_time_in_robot_queue_does_not_count_towards_time_limit(bench) -> None:
     bench.answer(made, "accepted", waits_for=["turn", "turn"])
     for _ in range(200):
         bench.pass_time(0.5, alive=True)
-    assert (made.state, made.waits_for) == ("accepted", ("turn", "turn"))
+    assert (made.state, made.awaited_actions) == ("accepted", ("turn", "turn"))
 
 
 @pytest.mark.parametrize(

@@ -133,7 +133,7 @@ def test_foreign_robot_that_claims_to_be_virtual_needs_permission(fleet: Fleet) 
     fleet.connect(turtle(), "/Turtle/description", STRANGE)
     link = fleet.link("Turtle")
     assert link is not None
-    assert (link.virtual, link.robot.virtual, link.chip_text) == (False, False, "ready")
+    assert (link.is_virtual, link.robot.virtual, link.chip_text) == (False, False, "ready")
     assert asks(fleet)
 
 
@@ -162,7 +162,7 @@ def test_world_of_a_foreign_robot_is_not_changed_before_permission(fleet: Fleet)
     fleet.connect(turtle(), "/Turtle/description", STRANGE)
     link, world = fleet.link("Turtle"), World()
     assert link is not None
-    link.world = cast("Publisher", world)
+    link.world_publisher = cast("Publisher", world)
     fleet.change_world("Turtle", {"touch": "head"})
     assert fleet.permission.question is not None
     assert world.changes == []
@@ -200,7 +200,7 @@ def test_foreign_virtual_robot_on_the_network_needs_permission(session: Session,
         tick_until(session, lambda: session.fleet.link("Turtle"), 30.0)
         link = session.fleet.link("Turtle")
         assert link is not None
-        assert not link.virtual
+        assert not link.is_virtual
         assert asks(session.fleet)
         assert session.fleet.permission.question is not None
     finally:
@@ -215,7 +215,7 @@ def test_only_virtual_robots_return_to_start_position_and_only_on_request(fleet:
     for name, world in worlds.items():
         link = fleet.link(name)
         assert link is not None
-        link.world = cast("Publisher", world)
+        link.world_publisher = cast("Publisher", world)
     fleet.return_to_start(["Turtle", "Other", "Nobody"])
     assert worlds["Turtle"].changes == [{"start": ["Turtle"]}]
     assert worlds["Other"].changes == []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.core.robots.stop.report import StopReport
-from app.core.robots.voices import MAX_S, MAX_WAITING, SOUND_SETTING, Notes, RobotSound, RobotVoices, Speaker
+from app.core.robots.voices import MAX_QUEUED, MAX_S, SOUND_SETTING, Notes, RobotSound, RobotVoices, Speaker
 from app.core.storage.settings import Settings
 from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT as PEPPER
@@ -109,16 +109,16 @@ def test_two_robots_speak_in_turn_and_caption_names_the_speaker(case) -> None:
 
 def test_queue_of_waiting_utterances_is_bounded_and_drops_are_logged(case) -> None:
     case.tell("Pepper", "A long story")
-    for count in range(MAX_WAITING + 1):
+    for count in range(MAX_QUEUED + 1):
         case.tell("Ginger", f"word {count}", 0.95)
     lines = [line.text for line in case.session.console.records if line.origin == "Ginger"]
     assert lines == ["“word 0” was shown but not spoken: too many texts were waiting"]
     heard = []
-    for _turn in range(MAX_WAITING + 2):
+    for _turn in range(MAX_QUEUED + 2):
         case.speaker.is_busy = False
         case.session.tick()
         heard = case.said
-    assert heard == ["A long story", *(f"word {count}" for count in range(1, MAX_WAITING + 1))]
+    assert heard == ["A long story", *(f"word {count}" for count in range(1, MAX_QUEUED + 1))]
 
 
 def test_voice_that_never_ends_times_out(case) -> None:

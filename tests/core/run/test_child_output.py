@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterable
 import pytest
 
 from app.core.run.child_output import (
-    BYTES_PER_S,
-    CHUNK,
-    LINES_PER_S,
+    CHUNK_BYTES,
+    MAX_BYTES_PER_S,
     MAX_LINE_LENGTH,
-    PAUSE_S,
-    Output,
+    MAX_LINES_PER_S,
+    THROTTLE_PAUSE_S,
+    OutputReader,
     RateLimiter,
 )
 
@@ -43,8 +43,8 @@ class CountedWaits(threading.Event):
         return False
 
 
-def output(*chunks: bytes) -> Output:
-    return Output(Pipe(chunks), CountedWaits())  # type: ignore[arg-type]
+def output(*chunks: bytes) -> OutputReader:
+    return OutputReader(Pipe(chunks), CountedWaits())  # type: ignore[arg-type]
 
 
 def test_protocol_lines_are_assembled_and_other_bytes_counted() -> None:
@@ -62,10 +62,12 @@ def test_oversized_line_is_discarded_to_its_end() -> None:
 @pytest.mark.parametrize(
     ("chunk", "lines_in_it", "count"),
     [
-        pytest.param(b"y\n" * (CHUNK // 2), 0, 600, id="short lines of no block"),
-        pytest.param(b"x" * CHUNK, 0, 600, id="no end of a line"),
-        pytest.param(b'{"is"' + b"x" * (CHUNK - 5), 0, 600, id="a line of the protocol without an end"),
-        pytest.param(LINE * (CHUNK // len(LINE)), CHUNK // len(LINE), 120, id="lines of the protocol"),
+        pytest.param(b"y\n" * (CHUNK_BYTES // 2), 0, 600, id="short lines of no block"),
+        pytest.param(b"x" * CHUNK_BYTES, 0, 600, id="no end of a line"),
+        pytest.param(b'{"is"' + b"x" * (CHUNK_BYTES - 5), 0, 600, id="a line of the protocol without an end"),
+        pytest.param(
+            LINE * (CHUNK_BYTES // len(LINE)), CHUNK_BYTES // len(LINE), 120, id="lines of the protocol"
+        ),
     ],
 )
 def test_output_flood_is_counted_exactly_in_constant_memory(
@@ -85,32 +87,34 @@ def test_output_flood_is_counted_exactly_in_constant_memory(
 
 def rested(chunks: Iterable[bytes], clock: Callable[[], float]) -> CountedWaits:
     rests = CountedWaits()
-    for _ in Output(Pipe(chunks), rests, clock):  # type: ignore[arg-type]
+    for _ in OutputReader(Pipe(chunks), rests, clock):  # type: ignore[arg-type]
         pass
     return rests
 
 
 def test_reader_pauses_after_exceeding_its_rate() -> None:
-    assert rested([LINE] * LINES_PER_S, lambda: 5.0).count == 0
-    tired = rested([LINE] * (LINES_PER_S + 3), lambda: 5.0)
+    assert rested([LINE] * MAX_LINES_PER_S, lambda: 5.0).count == 0
+    tired = rested([LINE] * (MAX_LINES_PER_S + 3), lambda: 5.0)
     assert tired.count >= 3
-    assert tired.seconds == pytest.approx(tired.count * PAUSE_S)
-    assert rested([b"y" * CHUNK] * (BYTES_PER_S // CHUNK), lambda: 5.0).count == 0
-    assert rested([b"y" * CHUNK] * (BYTES_PER_S // CHUNK + 3), lambda: 5.0).count >= 2
+    assert tired.seconds == pytest.approx(tired.count * THROTTLE_PAUSE_S)
+    assert rested([b"y" * CHUNK_BYTES] * (MAX_BYTES_PER_S // CHUNK_BYTES), lambda: 5.0).count == 0
+    assert rested([b"y" * CHUNK_BYTES] * (MAX_BYTES_PER_S // CHUNK_BYTES + 3), lambda: 5.0).count >= 2
 
 
 def test_reader_below_its_rate_does_not_pause() -> None:
     steps = itertools.count()
-    slow = 1.0 / LINES_PER_S  # the clock goes on with each look at it: fewer lines than may come in a second
-    assert rested([LINE] * (5 * LINES_PER_S), lambda: next(steps) * slow).count == 0
+    slow = (
+        1.0 / MAX_LINES_PER_S
+    )  # the clock goes on with each look at it: fewer lines than may come in a second
+    assert rested([LINE] * (5 * MAX_LINES_PER_S), lambda: next(steps) * slow).count == 0
 
 
 def test_rate_limit_reopens_after_a_second() -> None:
     now = [0.0]
     gate = RateLimiter(3, lambda: now[0])
-    assert [gate.passes() for _ in range(5)] == [True, True, True, False, False]
+    assert [gate.try_acquire() for _ in range(5)] == [True, True, True, False, False]
     assert gate.take_rejected_count() == 0  # not while it is shut
     now[0] = 1.1
-    assert gate.passes()
+    assert gate.try_acquire()
     assert gate.take_rejected_count() == 2
     assert gate.take_rejected_count() == 0

@@ -7,7 +7,7 @@ from typing import cast
 
 import pytest
 
-from app.core.robots.stop.report import RobotStopped, StopDone, StopReport
+from app.core.robots.stop.report import RobotStopped, StopCompleted, StopReport
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner
 from app.core.run.stop_job import stop_program, stop_robot
@@ -67,7 +67,7 @@ def test_stop_is_unconfirmed_when_stopper_and_runner_raise(monkeypatch: pytest.M
     monkeypatch.setattr(Steps, "stop_all", failing)
     stop(steps, posted.append, 2, "Arm")
     (_, done) = posted
-    assert isinstance(done, StopDone)
+    assert isinstance(done, StopCompleted)
     assert (done.number, done.report.unconfirmed_names) == (2, ("Arm",))
     assert done.report.robots[0].problem == "Stop wasn't sent to Arm: OSError: out of order"
 
@@ -91,7 +91,7 @@ def test_error_in_stop_message_does_not_leave_run_stopping(
     runs._stop(("Arm",))
     monkeypatch.setattr(f"app.core.run.{place}", failing)
     with pytest.raises(OSError, match="out of order"):
-        runs.on_stop(StopDone(runs._stop_number, StopReport((), 1.0).with_unreached(["Arm"])))
+        runs.on_stop(StopCompleted(runs._stop_number, StopReport((), 1.0).with_unreached(["Arm"])))
     assert (runs._run.state, session.fleet.moved.names) == ("unanswered", ("Arm",))
 
 

@@ -33,11 +33,11 @@ def test_repeated_warning_does_not_flood_the_console() -> None:
         warnings.reset()
         for count in range(1, 124):
             warnings.add("a", SAID, count)
-        warnings.end()
-        warnings.end()
+        warnings.log_final_counts()
+        warnings.log_final_counts()
         assert log == [SAID, f"{SAID} (10 times)", f"{SAID} (100 times)", f"{SAID} (123 times)"]
         log.clear()
     warnings.reset()
     warnings.add("a", SAID, 1)
-    warnings.end()
+    warnings.log_final_counts()
     assert log == [SAID]

@@ -103,7 +103,7 @@ def stopping_s(begin: Callable[[], Runner]) -> float:
     it is told from one that does not, however busy the computer is.
     """
     with pytest.MonkeyPatch.context() as slower:
-        slower.setattr(runner_module, "END_TIMEOUT_S", 60.0)
+        slower.setattr(runner_module, "EXIT_TIMEOUT_S", 60.0)
         slower.setattr(runner_module, "PIPE_TIMEOUT_S", 60.0)
         made = begin()
         began = time.monotonic()

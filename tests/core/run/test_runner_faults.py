@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 from app.core.run.child_process import MAX_MEMORY_BYTES
-from app.core.run.runner import EVENTS_PER_S, Runner
+from app.core.run.runner import MAX_EVENTS_PER_S, Runner
 from tests.core.run.test_runner import LONG_S, STOP_WITHIN_S, Heard, heard, program, stopping_s
 
 __all__ = ["heard"]
@@ -118,7 +118,7 @@ def test_line_flood_is_throttled_and_counted(started, heard) -> None:
     assert stopping_s(begin) < STOP_WITHIN_S
     heard.until("ended")
     seconds = time.monotonic() - began
-    assert printed(heard).count("x") <= EVENTS_PER_S * (seconds + 1)
+    assert printed(heard).count("x") <= MAX_EVENTS_PER_S * (seconds + 1)
     left_out = [text for text in printed(heard) if text.endswith("lines were dropped: too many at once")]
     assert left_out
     assert len(left_out) <= seconds + 2  # one in a second, and one at the end

@@ -39,7 +39,7 @@ def stopper(master, robots):
 def test_all_robots_reply_to_stop(stopper, robots):
     answered: list[RobotStop] = []
     report = stopper.stop_all(timeout_s=LONG_S, on_answer=answered.append)
-    assert report.is_proven
+    assert report.is_confirmed
     assert {robot.name for robot in report.robots} == {"Pepper", "Turtle"}
     assert all(robot.is_confirmed and robot.elapsed_ms is not None for robot in report.robots)
     assert max(robot.elapsed_ms or 0 for robot in report.robots) <= report.elapsed_ms
@@ -51,7 +51,7 @@ def test_silent_robot_is_named(stopper, robots):
     robots[1].silent = {"stop"}
     answered: list[RobotStop] = []
     report = stopper.stop_all(timeout_s=SILENT_S, on_answer=answered.append)
-    assert (report.is_proven, report.unconfirmed_names) == (False, ("Turtle",))
+    assert (report.is_confirmed, report.unconfirmed_names) == (False, ("Turtle",))
     by_name = {robot.name: robot for robot in report.robots}
     assert by_name["Pepper"].is_confirmed
     assert by_name["Turtle"].message == "Turtle didn't reply. Switch it off by hand."
@@ -69,21 +69,21 @@ def test_only_named_robots_are_stopped(stopper, robots):
 
 def test_unknown_robot_name_is_reported_as_unconfirmed(stopper, robots):
     report = stopper.stop_all(["Turtle", "Nobody"], timeout_s=LONG_S)
-    assert (report.is_proven, report.unconfirmed_names) == (False, ("Nobody",))
+    assert (report.is_confirmed, report.unconfirmed_names) == (False, ("Nobody",))
     assert report.robots[1].message == "Stop wasn't sent to Nobody. Switch it off by hand."
 
 
 def test_stop_without_robots_is_not_confirmed(stopper):
     stopper.set_robots(())
     report = stopper.stop_all()
-    assert (report.robots, report.is_proven, report.status) == ((), False, "off")
+    assert (report.robots, report.is_confirmed, report.status) == ((), False, "off")
 
 
 def test_failed_stop_is_reported_with_robot_message(stopper, robots):
     say_ = robots[0]._say
     robots[0]._say = lambda command, state, error="": say_(command, "failed", "the brake is stuck")
     report = stopper.stop_all(["Pepper"], timeout_s=LONG_S)
-    assert (report.is_proven, report.robots[0].is_refused) == (False, True)
+    assert (report.is_confirmed, report.robots[0].has_failed) == (False, True)
     assert report.robots[0].message == "Pepper may still move: the brake is stuck. Switch it off by hand."
 
 
@@ -105,14 +105,14 @@ def test_replies_for_another_robot_and_duplicate_replies_do_not_confirm_a_stop(s
         ("Pepper", True),
         ("Turtle", False),
     ]
-    assert (report.is_proven, report.unconfirmed_names) == (False, ("Turtle",))
+    assert (report.is_confirmed, report.unconfirmed_names) == (False, ("Turtle",))
 
 
 def test_robots_can_be_added_and_removed(stopper, robots):
     stopper.set_robots([robots[0].described])
     assert stopper.robots == ("Pepper",)
     stopper.set_robots([each.described for each in robots])
-    assert stopper.stop_all(timeout_s=LONG_S).is_proven
+    assert stopper.stop_all(timeout_s=LONG_S).is_confirmed
     assert stopper.robots == ("Pepper", "Turtle")
 
 
@@ -122,7 +122,7 @@ def test_rize_robot_cannot_confirm_stop(master, stopper):
         stopper.set_robots([rosie.described])
         report = stopper.stop_all(timeout_s=LONG_S)
         assert report.robots[0].message == "Rosie: Stop sent; this robot can't confirm"
-        assert (report.is_proven, report.unconfirmed_names) == (True, ())
+        assert (report.is_confirmed, report.unconfirmed_names) == (True, ())
         assert report.elapsed_ms < LONG_S * 1000  # nobody is waited for
         until(lambda: bool(rosie.commands))
         assert rosie.commands[0]["node"] == "cancel"
@@ -135,7 +135,7 @@ def test_stop_over_closed_node_is_reported(master, robots):
         stopper = RobotStopper(node)
         stopper.set_robots([robots[0].described])
     report = stopper.stop_all()
-    assert not report.is_proven
+    assert not report.is_confirmed
     assert report.robots[0].message.startswith("Stop can't be sent to Pepper: ")
 
 
@@ -154,7 +154,7 @@ def test_two_simultaneous_stops_both_receive_replies(stopper):
         thread.start()
     for thread in threads:
         thread.join(LONG_S)
-    assert [report.is_proven for report in reports] == [True, True]
+    assert [report.is_confirmed for report in reports] == [True, True]
 
 
 @pytest.mark.parametrize("how", ["obeys", "computes for ever", "was killed"])
@@ -176,7 +176,7 @@ def test_robots_stay_stopped_regardless_of_the_program(master, stopper, robots, 
     runner.stop()
     report = stopper.stop_all()
     runner.close()
-    assert report.is_proven
+    assert report.is_confirmed
     operations = [command["op"] for command in robots[0].commands]
     assert operations[-1] == "stop"
     assert "invoke" not in operations[operations.index("stop") :]

@@ -34,10 +34,10 @@ def test_running_state_shows_elapsed_time_and_activity() -> None:
     run = RunState("running", "Greeting", description="Pepper says “Touch my head.”", started_s=100.0)
     view = view_of(run, ["Pepper"], 114.9)
     assert (view.title, view.detail) == ("Running, 14 s", "Pepper says “Touch my head.”")
-    assert view.compact == "Greeting is running, 14 s"
+    assert view.compact_text == "Greeting is running, 14 s"
     assert (view.can_run, view.can_pause, view.can_step) == (False, True, True)
     early = view_of(replace(run, is_started=False, description=""), ["Pepper"], 100.1)
-    assert (early.title, early.detail, early.compact) == ("Starting", "", "Greeting is starting")
+    assert (early.title, early.detail, early.compact_text) == ("Starting", "", "Greeting is starting")
     assert (early.state, early.can_pause) == ("running", True)
     elsewhere = view_of(replace(run, is_started=False), ["Pepper"], 100.1, elsewhere=True)
     assert elsewhere.title == "Greeting is starting"
@@ -52,7 +52,7 @@ def test_paused_state_warns_of_actions_that_resume_will_skip() -> None:
 
 
 def test_elapsed_time_stops_while_paused() -> None:
-    run = RunState("paused", "Greeting", paused_at="wait 2 s", started_s=100.0, pause_began_s=110.0)
+    run = RunState("paused", "Greeting", paused_at="wait 2 s", started_s=100.0, pause_start_s=110.0)
     view = view_of(run, ["Pepper"], 200.0)
     assert (view.title, view.detail) == ("Paused at “wait 2 s”", "Robots and timers are paused")
     assert (view.run_label, view.can_run, view.can_step) == ("Resume", True, True)
@@ -61,7 +61,7 @@ def test_elapsed_time_stops_while_paused() -> None:
 
 def test_stopping_state_appears_after_100_ms_and_counts_replies() -> None:
     run = RunState(
-        "stopping", "Greeting", pressed_s=10.0, robots_to_stop=("Pepper", "Turtle"), elapsed_s=14.0
+        "stopping", "Greeting", stop_pressed_s=10.0, robots_to_stop=("Pepper", "Turtle"), elapsed_s=14.0
     )
     assert view_of(run, [], 10.05).stop_label == "Stop"
     run = replace(run, replies=(PEPPER,))
@@ -72,7 +72,9 @@ def test_stopping_state_appears_after_100_ms_and_counts_replies() -> None:
 
 
 def test_repeated_stop_after_unconfirmed_stop_never_shows_ready() -> None:
-    run = RunState("stopping", "Greeting", pressed_s=10.0, robots_to_stop=("Pepper",), is_stop_repeated=True)
+    run = RunState(
+        "stopping", "Greeting", stop_pressed_s=10.0, robots_to_stop=("Pepper",), is_stop_repeated=True
+    )
     view = view_of(run, [], 10.01)
     assert (view.state, view.title, view.stop_label) == ("stopping", "Stopping", "Stopping")
 
@@ -97,17 +99,17 @@ def test_unanswered_stop_names_the_robot_and_manual_action() -> None:
     )
     assert (view.result, view.result_status) == ("1 of 2 robots stopped", "error")
     assert (view.stop_label, view.confirm_label) == ("Stop again", "Turtle isn't moving")
-    assert view.compact == "Turtle didn't reply; switch it off by hand"
+    assert view.compact_text == "Turtle didn't reply; switch it off by hand"
     assert (view.can_run, view.can_pause, view.can_step) == (False, False, False)
 
 
 def test_robot_message_is_shown_first() -> None:
-    stuck = RobotStop("Arm", False, 9.0, error="Arm may still move: the brake is stuck", is_refused=True)
+    stuck = RobotStop("Arm", False, 9.0, error="Arm may still move: the brake is stuck", has_failed=True)
     view = view_of(after(PEPPER, stuck, SILENT), [], 0)
     assert view.title == "Arm may still move: the brake is stuck; Turtle didn't reply"
     assert view.detail == "Pepper stopped (38 ms). Switch Arm and Turtle off by hand."
     assert view.confirm_label == "Arm and Turtle aren't moving"
-    twin = RobotStop("Arm", False, 9.0, error=stuck.error, is_refused=True, program="arm 2")
+    twin = RobotStop("Arm", False, 9.0, error=stuck.error, has_failed=True, program="arm 2")
     assert view_of(after(twin), [], 0).title == "Arm may still move: the brake is stuck (from “arm 2”)"
     assert stop_text(stuck, "8:40") == "Arm may still move: the brake is stuck, at 8:40"
 
@@ -117,7 +119,7 @@ def test_long_list_of_silent_robots_is_shortened() -> None:
     title = view_of(after(*many), [], 0).title
     assert title.endswith("Pepper (“copy 3”) and 26 more didn't reply")
     refused = [
-        RobotStop(f"R{n}", False, 1.0, error=f"R{n} may still move: no", is_refused=True) for n in range(9)
+        RobotStop(f"R{n}", False, 1.0, error=f"R{n} may still move: no", has_failed=True) for n in range(9)
     ]
     assert view_of(after(*refused), [], 0).title.endswith("R3 may still move: no; 5 more may still move")
 
@@ -143,7 +145,7 @@ def test_stop_result_counts_robots_not_their_programs() -> None:
 
 
 def test_robot_is_not_shown_as_stopped_while_its_other_program_is_pending() -> None:
-    run = RunState("stopping", "Greeting", pressed_s=10.0, robots_to_stop=("Pepper",))
+    run = RunState("stopping", "Greeting", stop_pressed_s=10.0, robots_to_stop=("Pepper",))
     run = replace(run, replies=(replace(PEPPER, is_waiting=True),))
     view = view_of(run, [], 10.2)
     assert (view.detail, view.result) == ("Waiting for Pepper, 0.2 s", "Stop not confirmed")

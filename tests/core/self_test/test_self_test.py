@@ -67,7 +67,7 @@ def test_report_is_valid_at_any_moment(tmp_path: Path) -> None:
     assert half["why"] == "Studio exited during the self-test; its last step was “window”."
     assert half["steps"][0]["ms"] is None
     report.record_success("it was painted")
-    report.mark("first_paint")
+    report.record_time("first_paint")
     assert report.finish()
     whole = told(tmp_path)
     assert (whole["ok"], whole["why"], whole["web"], whole["frozen"]) == (True, "", True, False)

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.network.mailbox import Batch
-from app.core.series.csv_export import columns_of, csv_lines
+from app.core.series.csv_export import columns_of, csv_chunks
 from app.core.series.curves import Curve, Curves
 from app.core.series.feed import SeriesFeed
 from app.core.series.field_path import MISSING, FieldPath
@@ -148,7 +148,7 @@ def test_value_can_change_its_type() -> None:
     )
     assert points(x) == [(0.0, 1, False), (0.3, 2, True)]
     assert x.states is not None
-    runs = [(run.begin_s, run.end_s, run.value) for run in x.states.runs(0, 9)]
+    runs = [(run.start_s, run.end_s, run.value) for run in x.states.runs(0, 9)]
     assert runs == [(0.1, 0.3, "up"), (0.3, 0.4, None), (0.4, 0.4, "true")]
     assert x.is_state
     assert x.last is True
@@ -210,7 +210,7 @@ def test_curves_stay_sorted_and_finite_for_any_input(rows) -> None:
     for curve in made:
         assert bool(np.all(np.diff(curve.samples.times) >= 0))
         assert bool(np.all(np.isfinite(curve.samples.values)))
-        assert "".join(csv_lines(columns_of([curve]), ORIGIN)).count("\r\n") >= 1
+        assert "".join(csv_chunks(columns_of([curve]), ORIGIN)).count("\r\n") >= 1
     assert points(made[4]) == points(made[0]) or any(
         isinstance(v, (int, float)) and not isinstance(v, bool) and abs(v) > 1e300 for _s, v in rows
     )
@@ -372,13 +372,13 @@ def test_csv_has_a_row_per_time_and_escapes_formulas() -> None:
     made = [case.curve(text) for text in ("/a.x", "/a.word", "/b.y")]
     case.send("/a", (0.0, {"x": 1.5, "word": "=1+1"}), (0.5, {"x": 2, "word": "=1+1"}))
     case.send("/b", (0.5, {"y": -1}), (0.75, {"y": 1e-9}))
-    rows = list(csv.reader("".join(csv_lines(columns_of(made), ORIGIN)).splitlines()))
+    rows = list(csv.reader("".join(csv_chunks(columns_of(made), ORIGIN)).splitlines()))
     assert rows[0] == ["stamp_ns", "time_utc", "/a.x", "/a.word", "/b.y"]
     assert [row[2:] for row in rows[1:]] == [["1.5", "'=1+1", ""], ["2.0", "", "-1.0"], ["", "", "1e-09"]]
     assert rows[1][0] == str(ORIGIN)
     assert rows[2][1].endswith(".500000000Z")
     assert math.isclose(int(rows[3][0]) - ORIGIN, 0.75e9)
-    assert len("".join(csv_lines(columns_of(made, 0.6, 0.8), ORIGIN)).splitlines()) == 2
+    assert len("".join(csv_chunks(columns_of(made, 0.6, 0.8), ORIGIN)).splitlines()) == 2
 
 
 @pytest.mark.parametrize("rows_at_once", [1, 3, 5000])
@@ -387,9 +387,9 @@ def test_csv_written_in_parts_is_identical(monkeypatch, rows_at_once) -> None:
     made = [case.curve(text) for text in ("/a.x", "/a.word", "/b.y")]
     case.send("/a", *((n / 10, {"x": n, "word": "up" if n % 4 < 2 else "down"}) for n in range(20)))
     case.send("/b", *((n / 7, {"y": -n}) for n in range(14)))
-    whole = "".join(csv_lines(columns_of(made), ORIGIN))
+    whole = "".join(csv_chunks(columns_of(made), ORIGIN))
     monkeypatch.setattr("app.core.series.csv_export.ROWS_PER_CHUNK", rows_at_once)
-    parts = list(csv_lines(columns_of(made), ORIGIN))
+    parts = list(csv_chunks(columns_of(made), ORIGIN))
     assert "".join(parts) == whole
     assert len(whole.splitlines()) == 1 + len({*(n / 10 for n in range(20)), *(n / 7 for n in range(14))})
     assert len(parts) == 1 + -(-(len(whole.splitlines()) - 1) // rows_at_once)

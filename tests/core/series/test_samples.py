@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.core.series.samples import MAX_LATENESS_S, RAW_PER_COLUMN, SHIFTS, RangeStats, Samples
+from app.core.series.samples import LEVEL_SHIFTS, MAX_LATENESS_S, MAX_SAMPLES_PER_PIXEL, RangeStats, Samples
 
 Row = tuple[float, float, bool]
 ODD = [math.nan, math.inf, -math.inf, float(2**64 - 1), 1.7e308, -1.7e308, 0.0, -0.0, 5e-324]
@@ -102,7 +102,7 @@ def test_slightly_late_sample_is_inserted_in_order() -> None:
     samples = filled([(1.0, 1, False), (2.0, 2, False), (3.0, 3, True)])
     samples.add(2.5, 2.5)
     assert rows_of(samples) == [(1, 1, False), (2, 2, False), (2.5, 2.5, True), (3, 3, False)]
-    assert samples.rewritten_from(0) == 2.5
+    assert samples.earliest_change_s(0) == 2.5
 
 
 def test_clock_set_back_restarts_from_that_time() -> None:
@@ -169,7 +169,7 @@ def test_drawn_line_has_every_peak_and_crosses_no_gap(made, columns, one, other)
         assert int(np.isnan(line.values).sum()) >= gaps_inside
     else:
         assert len(line.times) <= 3 * (columns + 2)
-        assert line.points > RAW_PER_COLUMN * columns
+        assert line.points > MAX_SAMPLES_PER_PIXEL * columns
 
 
 def test_long_gap_is_not_drawn_at_any_zoom_level() -> None:
@@ -294,8 +294,8 @@ def test_late_sample_updates_existing_peaks() -> None:
 
 
 def test_mean_that_overflows_is_unknown() -> None:
-    samples = filled([(float(n), 1.7e308, False) for n in range(1 << SHIFTS[-1])])
-    assert samples.stats(0, 1e9) == RangeStats(1 << SHIFTS[-1], 1.7e308, 1.7e308, None)
+    samples = filled([(float(n), 1.7e308, False) for n in range(1 << LEVEL_SHIFTS[-1])])
+    assert samples.stats(0, 1e9) == RangeStats(1 << LEVEL_SHIFTS[-1], 1.7e308, 1.7e308, None)
 
 
 def test_time_of_previous_and_next_sample_is_found() -> None:

@@ -27,7 +27,7 @@ def test_states_that_change_within_a_step_are_reduced_to_a_single_state() -> Non
     assert {run.value for run in few} == {"true"}
     assert all(run in every for run in few)
     assert few[-1].end_s == states.last_s
-    assert all(later.begin_s - sooner.begin_s < 0.51 for sooner, later in pairwise(few))
+    assert all(later.start_s - sooner.start_s < 0.51 for sooner, later in pairwise(few))
     assert states.values_in(0, 0.0005) == {"false"}
     assert states.values_in(-1, 100) == {"true", "false"}
 
@@ -50,5 +50,5 @@ def test_change_count_and_duration_match_the_runs(begin_s: float, end_s: float) 
     states = dense(100)
     runs = list(states.runs(begin_s, end_s))
     assert states.change_count(begin_s, end_s) == max(0, len(runs) - 1)
-    lasted = [min(run.end_s, end_s) - max(run.begin_s, begin_s) for run in runs if run.value == "true"]
+    lasted = [min(run.end_s, end_s) - max(run.start_s, begin_s) for run in runs if run.value == "true"]
     assert states.duration_s("true", begin_s, end_s) == pytest.approx(sum(max(0.0, each) for each in lasted))

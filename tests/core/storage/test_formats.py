@@ -10,11 +10,17 @@ import pytest
 from app.core.documents.backpack import Backpack
 from app.core.documents.file_format import BehaviourFile, read_file, write_file
 from app.core.documents.journal import newer_work_names, unsaved_work
-from app.core.storage.settings import FORMAT, Settings
+from app.core.storage.settings import FORMAT_VERSION, Settings
 from app.errors import DocumentError
 from app.ui.shell.docking.workbench import STATE_VERSION
 
-NEWER = {"format": FORMAT + 1, "theme": "dark", "language": "es", "recent": {"new": "shape"}, "later": [1]}
+NEWER = {
+    "format": FORMAT_VERSION + 1,
+    "theme": "dark",
+    "language": "es",
+    "recent": {"new": "shape"},
+    "later": [1],
+}
 JOURNAL = {
     "pid": 2**22 + 7, "born_s": 1.0, "name": "Mine", "path": None, "edited_s": 5.0, "robots": {},
     "workspace": {"blocks": 1},
@@ -33,7 +39,7 @@ def test_settings_of_a_newer_version_are_not_modified(tmp_path: Path) -> None:
     before = write(tmp_path / "settings.json", NEWER)
     settings = Settings(tmp_path)
     assert settings.get("theme", "light") == "dark", "what can be read of them is taken"
-    assert settings.recent == []
+    assert settings.recent_files == []
     assert "newer NEP Studio (format 2)" in settings.notice
     assert settings.notice.count(".") == 2 + settings.notice.count(".json")
     settings.set("theme", "light")
@@ -49,7 +55,7 @@ def test_changes_to_newer_settings_go_to_a_separate_file_with_one_notice(tmp_pat
     assert (again.get("theme", ""), again.get("language", "")) == ("light", "es")
     assert again.notice == ""
     kept = json.loads((tmp_path / "settings.format-1.json").read_text())
-    assert kept["format"] == FORMAT
+    assert kept["format"] == FORMAT_VERSION
     assert kept["later"] == [1]
 
 
@@ -72,7 +78,7 @@ def test_settings_of_an_older_version_are_read_and_migrated_in_place(tmp_path: P
     assert (settings.get("theme", ""), settings.notice) == ("dark", "")
     settings.set("language", "es")
     kept = json.loads((tmp_path / "settings.json").read_text())
-    assert kept == {**old, "language": "es", "format": FORMAT}, "what it does not know is kept"
+    assert kept == {**old, "language": "es", "format": FORMAT_VERSION}, "what it does not know is kept"
     assert [path.name for path in tmp_path.glob("settings*.json")] == ["settings.json"]
 
 
@@ -96,7 +102,9 @@ def test_damaged_own_settings_file_next_to_a_newer_one_is_backed_up(tmp_path: Pa
 
 
 def test_layout_state_version_is_tied_to_the_settings_format() -> None:
-    assert (FORMAT, STATE_VERSION) == (1, 1), "another number of layouts needs another one of settings"
+    assert (FORMAT_VERSION, STATE_VERSION) == (1, 1), (
+        "another number of layouts needs another one of settings"
+    )
 
 
 # ---- unsaved work

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.storage.settings import RECENT_LIMIT, Settings, home, saved_language
+from app.core.storage.settings import MAX_RECENT_FILES, Settings, home, saved_language
 from app.errors import SettingsError
 
 
@@ -77,17 +77,17 @@ def test_language_from_the_separate_file_overrides_newer_settings(tmp_path: Path
 
 def test_recent_files_are_newest_first_without_duplicates_or_missing_files(tmp_path: Path) -> None:
     settings = Settings(tmp_path / "home")
-    files = [tmp_path / f"{number}.nepb" for number in range(RECENT_LIMIT + 3)]
+    files = [tmp_path / f"{number}.nepb" for number in range(MAX_RECENT_FILES + 3)]
     for file in files:
         file.write_text("x")
         settings.add_recent(file)
     settings.add_recent(files[5], "Five")
     files[-1].unlink()
-    recent = Settings(tmp_path / "home").recent
+    recent = Settings(tmp_path / "home").recent_files
     assert recent[0].path == files[5].resolve()
     assert recent[0].name == "5", "the file's own name"
     assert files[-1].resolve() not in [item.path for item in recent]
-    assert len({item.path for item in recent}) == len(recent) <= RECENT_LIMIT
+    assert len({item.path for item in recent}) == len(recent) <= MAX_RECENT_FILES
 
 
 def test_unwritable_folder_raises_settings_error(tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ def test_recent_file_with_non_utf_8_name_is_saved_with_the_other_settings(
     settings.add_recent(tmp_path / name)
     settings.set("theme", "dark")
     again = Settings(tmp_path / "home")
-    assert [file.path.name for file in again.all_recent] == [name]
+    assert [file.path.name for file in again.all_recent_files] == [name]
     assert again.get("theme", "light") == "dark"
     assert again.damaged is None
 

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from app.core.storage.settings import FORMAT, Settings
+from app.core.storage.settings import FORMAT_VERSION, Settings
 
 WRITER = """
 import sys
@@ -48,7 +48,7 @@ def test_recent_files_of_both_instances_are_merged(tmp_path: Path) -> None:
     for settings, name in ((first, "one"), (second, "two"), (first, "three")):
         (tmp_path / name).write_text("x")
         settings.add_recent(tmp_path / name)
-    assert [file.path.name for file in Settings(tmp_path).recent] == ["three", "two", "one"]
+    assert [file.path.name for file in Settings(tmp_path).recent_files] == ["three", "two", "one"]
 
 
 def test_file_damaged_by_another_program_does_not_lose_values_in_memory(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_file_damaged_by_another_program_does_not_lose_values_in_memory(tmp_path
     assert json.loads(settings.path.read_text()) == {
         "theme": "dark",
         "layout": "developer",
-        "format": FORMAT,
+        "format": FORMAT_VERSION,
     }
 
 

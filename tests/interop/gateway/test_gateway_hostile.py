@@ -11,7 +11,7 @@ import zmq
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from nep.programs.gateway.framing import FrameError, Shape
+from nep.programs.gateway.framing import FrameError, FrameFormat
 from nep.programs.gateway.requests import Request, RequestError, parse_request
 
 pytestmark = [pytest.mark.ports]
@@ -56,7 +56,7 @@ def test_request_is_parsed_or_rejected_with_a_message(data, port):
 @given(FRAMES, st.sampled_from(["prefixed", "bare"]), st.sampled_from(["json", "string", "image", "bytes"]))
 @settings(max_examples=300, deadline=None)
 def test_frame_is_parsed_or_rejected_with_a_frame_error(frame, framing, codec):
-    shape = Shape("t", framing, codec)
+    shape = FrameFormat("t", framing, codec)
     try:
         understood = isinstance(shape.read(frame), bytes)
     except FrameError as error:

@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from nep.cli.values import json_of
+from nep.cli.values import encode_json
 from nep.programs.alarms.evaluator import LARGE_MESSAGE_BYTES
 from nep.programs.alarms.losses import TopicLosses
 from nep.programs.alarms.sentences import condition_text, current_value_text
@@ -88,7 +88,7 @@ def test_huge_integer_triggers_the_alarm_with_a_description(kind: str, huge: int
     scene.send("/d", 1)
     ((what, seen),) = scene.send("/d", told)
     assert what == "on"
-    assert json.loads(json_of(seen)) == (None if abs(huge) > 1e308 else seen)
+    assert json.loads(encode_json(seen)) == (None if abs(huge) > 1e308 else seen)
     (record,) = scene.alarms.history
     assert record.cause
     state = scene.alarms.evaluator.state(scene.alarms.rules[0])

@@ -25,7 +25,15 @@ from nep.masters.master import Master
 from nep.messages.message import Message
 from nep.messages.packing import pack
 from nep.protocol import encoding, wire
-from nep.protocol.requests import AddSubscriber, Done, Found, NodeRecord, Ping, Refused, SubscriberRecord
+from nep.protocol.requests import (
+    AddSubscriber,
+    DoneReply,
+    FoundReply,
+    NodeRecord,
+    Ping,
+    RejectedReply,
+    SubscriberRecord,
+)
 from tests.nep.programs import eventually
 
 FEW = settings(
@@ -184,7 +192,7 @@ def test_publisher_disconnects_a_subscriber_that_sends_an_oversized_subscription
         pub = node.new_pub("book", "bytes")
         sub = node.new_sub("book", "bytes")
         (info,) = node.graph().topics["book"].publishers
-        for size in (wire.SUBSCRIPTION_MAX_BYTES + 1, 4_000_000, 2**62):
+        for size in (wire.MAX_SUBSCRIPTION_BYTES + 1, 4_000_000, 2**62):
             with shake_hands(int(info.endpoints[0].rpartition(":")[2])) as rogue:
                 with contextlib.suppress(OSError):  # it does not even read all of it
                     rogue.sendall(b"\x02" + struct.pack(">Q", size) + b"\x01")
@@ -295,10 +303,10 @@ def test_master_replies_to_every_request_and_keeps_serving(
                 assert attacker.poll(5000), "the master does not answer any more"
                 number, answer = encoding.decode_reply(attacker.recv())
                 if number == call:
-                    assert isinstance(answer, Done)
+                    assert isinstance(answer, DoneReply)
                     break
                 answers += 1
-                if isinstance(answer, Refused):
+                if isinstance(answer, RejectedReply):
                     assert answer.reason
             assert answers == len(messages)  # every sender is told what was wrong
 
@@ -327,7 +335,7 @@ def ask_with_id(dealer: zmq.Socket[bytes], master: Master, size: int) -> None:
         body = encoding.encode_request(AddSubscriber(said, record), 3)
     dealer.send(body)
     assert dealer.poll(2000)
-    assert isinstance(encoding.decode_reply(dealer.recv())[1], Refused)
+    assert isinstance(encoding.decode_reply(dealer.recv())[1], RejectedReply)
     dealer.send(encoding.encode_request(Ping(), 4))
     assert dealer.poll(2000)
 
@@ -371,7 +379,7 @@ def test_node_survives_invalid_replies_of_a_master(
                 asked = encoding.decode_request(body)
                 name = encoding._REQUEST_NAMES[type(asked.request)]  # type: ignore[index]
                 answered.append(asked.request)
-                reply = Found(9, 1) if name in {"subscriber+", "join"} else Done(9, 1)
+                reply = FoundReply(9, 1) if name in {"subscriber+", "join"} else DoneReply(9, 1)
                 router.send_multipart([sender, encoding.encode_reply(reply, asked.call)])
                 if name == until:
                     return sender

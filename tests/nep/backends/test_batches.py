@@ -13,12 +13,17 @@ from hypothesis import strategies as st
 
 import nep
 from nep.backends.base import PublishHooks
-from nep.backends.zeromq.pending_batch import BATCH_WINDOW_NS, MAX_DELAY_NS, MAX_PENDING, PendingBatch
+from nep.backends.zeromq.pending_batch import (
+    BATCH_WINDOW_NS,
+    MAX_DELAY_NS,
+    MAX_PENDING_MESSAGES,
+    PendingBatch,
+)
 from nep.errors import ClosedError, WireError
 from nep.masters.master import Master
 from nep.messages.encoded import Encoded
 from nep.protocol import wire
-from nep.protocol.batch import BATCH, BATCH_MAX, batch_part, entries
+from nep.protocol.batch import BATCH, MAX_BATCH_MESSAGES, encode_batch, parse_entries
 from tests.nep.programs import eventually
 
 LONG_S = 30.0
@@ -70,7 +75,7 @@ def heard(socket: zmq.Socket[bytes], count: int) -> list[tuple[int, int]]:
             continue
         _topic, head, body = wire.split_single_part(parts[0])
         header = wire.read_header(head)
-        said.append((len(entries(body)) if header.flags & BATCH else 1, header.seq))
+        said.append((len(parse_entries(body)) if header.flags & BATCH else 1, header.seq))
     return said
 
 
@@ -126,7 +131,7 @@ def test_subscribers_that_support_batches_receive_batches(
         assert [seq for _many, seq in said] == [
             before + 1 + sum(each for each, _seq in said[:place]) for place in range(len(said))
         ]
-        assert max(many for many, _seq in said) <= MAX_PENDING
+        assert max(many for many, _seq in said) <= MAX_PENDING_MESSAGES
         return len(said) < 250
 
     eventually(comes_together)  # a computer with much else to do may let 20 microseconds pass each time
@@ -288,15 +293,17 @@ def test_clock_set_back_does_not_delay_a_flush() -> None:
 
 
 @given(
-    st.lists(st.tuples(st.integers(0, 2**64 - 1), st.binary(max_size=50)), min_size=1, max_size=BATCH_MAX),
+    st.lists(
+        st.tuples(st.integers(0, 2**64 - 1), st.binary(max_size=50)), min_size=1, max_size=MAX_BATCH_MESSAGES
+    ),
     st.integers(1, 2**63),
 )
 def test_batch_round_trips(messages: list[tuple[int, bytes]], seq: int) -> None:
     stamps, payloads = [each[0] for each in messages], [each[1] for each in messages]
-    part = batch_part(b"t\0", wire.form_of(3, 0), seq, 9, stamps, payloads)
+    part = encode_batch(b"t\0", wire.encode_form(3, 0), seq, 9, stamps, payloads)
     topic, head, body = wire.split_single_part(part)
     assert (topic, wire.read_header(head)) == (b"t\0", wire.Header(3, BATCH, seq, stamps[0], 9, len(body)))
-    read = entries(body)
+    read = parse_entries(body)
     assert [each.stamp_ns for each in read] == stamps
     assert [body[each.begin : each.end] for each in read] == payloads
 
@@ -304,7 +311,7 @@ def test_batch_round_trips(messages: list[tuple[int, bytes]], seq: int) -> None:
 @given(st.binary(max_size=200))
 def test_invalid_batch_is_rejected_with_a_reason(body: bytes) -> None:
     try:
-        read = entries(body)
+        read = parse_entries(body)
     except WireError as error:
         assert error.reason  # noqa: PT017 - either is right
     else:

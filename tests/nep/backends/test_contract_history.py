@@ -9,7 +9,7 @@ import pytest
 
 import nep
 from nep.backends.zenoh.early import EarlyMessages
-from nep.backends.zeromq.loss import EARLY_MESSAGES_S, PublisherTracker
+from nep.backends.zeromq.loss import EARLY_MESSAGE_WINDOW_S, PublisherTracker
 from nep.masters.master import Master
 from nep.messages.history import MAX_HISTORY_BYTES, History
 from nep.protocol.requests import PublisherRecord, RemotePublisher
@@ -245,7 +245,7 @@ def test_messages_before_the_echo_are_skipped_only_if_the_history_repeats_them(
     assert not sources.is_early(5)
     sources.add_listed(_remote(2))
     assert sources.is_early(5)
-    now[0] += EARLY_MESSAGES_S
+    now[0] += EARLY_MESSAGE_WINDOW_S
     assert not sources.is_early(5), "it greets nobody"
     now[0] -= 1.0
     assert sources.is_early(5)

@@ -14,17 +14,17 @@ from nep.backends.zenoh.keys import data_key, hello_key, pattern_data_key, patte
 from nep.errors import WireError
 from nep.masters.graph import Graph
 from nep.masters.master import Master
-from nep.masters.pattern_index import ALL_PATTERNS_MAX, PATTERNS_MAX, PatternIndex
+from nep.masters.pattern_index import MAX_PATTERNS, MAX_PATTERNS_PER_NODE, PatternIndex
 from nep.nodes.backend_checks import is_pattern_for
 from nep.protocol.requests import (
     AddPublisher,
     AddSubscriber,
     NodeRecord,
     PublisherRecord,
-    Refused,
+    RejectedReply,
     SubscriberRecord,
-    id_from,
-    node_id_from,
+    derive_id,
+    derive_node_id,
 )
 from nep.protocol.topic_pattern import is_pattern, matches
 from tests.nep.meeting import Make, place_for
@@ -404,12 +404,12 @@ def test_pattern_index_removes_unused_entries() -> None:
 
 def _node(number: int) -> NodeRecord:
     key = f"key {number}"
-    return NodeRecord(node_id_from(key), f"n{number}", "host", 1, key=key)
+    return NodeRecord(derive_node_id(key), f"n{number}", "host", 1, key=key)
 
 
 def _pattern(number: int, each: int) -> AddSubscriber:
     node = _node(number)
-    return AddSubscriber(node, SubscriberRecord(id_from(node.key, each), f"t{each}/*", "json", each, True))
+    return AddSubscriber(node, SubscriberRecord(derive_id(node.key, each), f"t{each}/*", "json", each, True))
 
 
 def test_registrations_beyond_the_limit_are_rejected() -> None:
@@ -418,19 +418,19 @@ def test_registrations_beyond_the_limit_are_rejected() -> None:
     def ask(request: AddSubscriber | AddPublisher, number: int) -> object:
         return graph.apply(request, 1, 0.0, f"route {number}", is_foreign=True)[-1].body
 
-    for each in range(1, PATTERNS_MAX + 1):
-        assert not isinstance(ask(_pattern(0, each), 0), Refused)
-    refused = ask(_pattern(0, PATTERNS_MAX + 1), 0)
-    assert isinstance(refused, Refused)
+    for each in range(1, MAX_PATTERNS_PER_NODE + 1):
+        assert not isinstance(ask(_pattern(0, each), 0), RejectedReply)
+    refused = ask(_pattern(0, MAX_PATTERNS_PER_NODE + 1), 0)
+    assert isinstance(refused, RejectedReply)
     assert "at most 100 subscribers with wildcards" in refused.reason
-    for number in range(1, ALL_PATTERNS_MAX // PATTERNS_MAX):
-        for each in range(1, PATTERNS_MAX + 1):
-            assert not isinstance(ask(_pattern(number, each), number), Refused)
-    assert isinstance(ask(_pattern(99, 1), 99), Refused)
+    for number in range(1, MAX_PATTERNS // MAX_PATTERNS_PER_NODE):
+        for each in range(1, MAX_PATTERNS_PER_NODE + 1):
+            assert not isinstance(ask(_pattern(number, each), number), RejectedReply)
+    assert isinstance(ask(_pattern(99, 1), 99), RejectedReply)
     node = _node(98)
     record = PublisherRecord(
-        id_from(node.key, 1), "t5/x", "json", "json", ("tcp://127.0.0.1:5000",), number=1
+        derive_id(node.key, 1), "t5/x", "json", "json", ("tcp://127.0.0.1:5000",), number=1
     )
     answer = ask(AddPublisher(node, record), 98)
-    assert len(answer.expected) == ALL_PATTERNS_MAX // PATTERNS_MAX  # type: ignore[attr-defined]
+    assert len(answer.expected) == MAX_PATTERNS // MAX_PATTERNS_PER_NODE  # type: ignore[attr-defined]
     assert not isinstance(answer, WireError)

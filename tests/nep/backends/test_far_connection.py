@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import zmq
 
-from nep.backends.zeromq.sockets import RemoteConnection, keep_alive
+from nep.backends.zeromq.sockets import RemoteConnection, enable_keep_alive
 from nep.backends.zeromq.subscriptions import Subscriptions
 from nep.protocol.wire import hello_part
 
@@ -84,8 +84,8 @@ def test_only_connections_to_other_computers_use_keep_alive() -> None:
     with zmq.Context() as context, context.socket(zmq.XPUB) as socket_:
         seen = []
         for host in ("127.0.0.1", "0.0.0.0", "127.0.0.1"):
-            keep_alive(socket_, f"tcp://{host}:*")
+            enable_keep_alive(socket_, f"tcp://{host}:*")
             seen.append((socket_.getsockopt(zmq.TCP_KEEPALIVE), socket_.getsockopt(zmq.TCP_MAXRT)))
-            keep_alive(socket_, "tcp://0.0.0.0:*", is_watched=True)
+            enable_keep_alive(socket_, "tcp://0.0.0.0:*", is_watched=True)
             seen.append((socket_.getsockopt(zmq.TCP_KEEPALIVE), socket_.getsockopt(zmq.TCP_MAXRT)))
     assert seen == [(-1, 0), (1, 0), (1, 15_000), (1, 0), (-1, 0), (1, 0)]

@@ -8,7 +8,7 @@ import nep
 from nep.backends.zeromq.master_session import MasterSession
 from nep.backends.zeromq.subscriber import NativeSubscriber
 from nep.masters.master import Master
-from nep.protocol.requests import Found, SubscriberRecord
+from nep.protocol.requests import FoundReply, SubscriberRecord
 from tests.nep.programs import eventually
 
 
@@ -16,14 +16,14 @@ from tests.nep.programs import eventually
 def test_publisher_that_closes_before_its_subscriber_connects_does_not_delay_subscribing(
     master: Master, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told: list[Found] = []
+    told: list[FoundReply] = []
     with nep.node("goes", master=master.address) as goes, nep.node("comes", master=master.address) as comes:
         goes.new_pub("stays")
         closing = goes.new_pub("topic")
 
         def slow(
             self: MasterSession, record: SubscriberRecord, made: NativeSubscriber, wait_s: float | None
-        ) -> Found:
+        ) -> FoundReply:
             """The thread that subscribes goes on only when the master's next words have been read."""
             told.append(known(self, record, made, wait_s))
             closing.close(0.0)

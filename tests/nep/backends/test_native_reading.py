@@ -273,6 +273,6 @@ def test_message_after_a_rejected_batch_is_read_immediately(context: zmq.Context
     message = sub.read(deque())
     assert message is not None
     assert bytes(message.data) == b"good"
-    assert sub.refusals.count == 3
+    assert sub.rejections.count == 3
     sub.close()
     there.close(0)

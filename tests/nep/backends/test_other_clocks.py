@@ -177,7 +177,7 @@ def test_invalid_clock_data_of_a_master_is_counted_and_ignored(
 ) -> None:
     monkeypatch.setattr(Clocks, "differences", lambda *_args: clocks)
     monkeypatch.setattr(Clocks, "renewal_timestamps", lambda *_args: times)
-    monkeypatch.setattr(master_session, "RENEW_S", 0.02)
+    monkeypatch.setattr(master_session, "RENEW_INTERVAL_S", 0.02)
     with Master("127.0.0.1:0", learn_s=0.0) as master, nep.node("here", master=master.address) as node:
         sub, pub = node.new_sub("t"), node.new_pub("t")
         session = node._transport._sessions[master.address]

@@ -16,9 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nep
-from nep.backends.ros.carried import codec_of, is_ros_type, ros_type_of, to_ros, unpacker_for
+from nep.backends.ros.carried import codec_of, is_ros_type, ros_type_of, to_ros_body, unpacker_for
 from nep.backends.ros.definition import parse
-from nep.backends.ros.library import message_text
+from nep.backends.ros.library import message_definition
 from nep.errors import WireError
 from nep.messages.encoded import Encoded
 from tests.nep.backends.ros_programs import skip_without_ros
@@ -199,7 +199,7 @@ def test_message_types_map_to_ros_types(msg_type: str, ros_type: str) -> None:
 
 def test_invalid_message_bodies_are_rejected() -> None:
     read = unpacker_for("json", "std_msgs/String", "").unpack
-    assert read(memoryview(to_ros("std_msgs/String", "json", Encoded(b"{}"))))[0] == b"{}"
+    assert read(memoryview(to_ros_body("std_msgs/String", "json", Encoded(b"{}"))))[0] == b"{}"
     for wrong in (b"", b"\1\0\0", b"\5\0\0\0ab", b"\1\0\0\0ab"):
         with pytest.raises((WireError, struct.error)):
             read(memoryview(wrong))
@@ -214,12 +214,12 @@ def test_invalid_message_bodies_are_rejected() -> None:
 def test_undecodable_image_is_rejected() -> None:
     for data in (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"):
         with pytest.raises(nep.EncodeError):
-            to_ros("sensor_msgs/CompressedImage", "image", Encoded(data))
+            to_ros_body("sensor_msgs/CompressedImage", "image", Encoded(data))
 
 
 def test_extension_is_rejected_for_ros_types() -> None:
     with pytest.raises(WireError, match="a 'std_msgs/String' can't carry an extension"):
-        to_ros("std_msgs/String", "json", Encoded(b"{}", {"a": 1}))
+        to_ros_body("std_msgs/String", "json", Encoded(b"{}", {"a": 1}))
 
 
 def test_only_message_packages_are_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -232,11 +232,11 @@ def test_only_message_packages_are_imported(tmp_path: Path, monkeypatch: pytest.
         "class Thing:\n    _full_text, _md5sum = 'int8 a', 'x'\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    assert message_text("of_no_ros/Thing") is None
-    assert message_text("of_no_ros_either/Thing") is None
-    assert message_text("of_my_own/Thing") == ("int8 a", "x")
-    assert message_text("of_my_own/Other") is None
-    assert message_text("not there/Thing") is None
+    assert message_definition("of_no_ros/Thing") is None
+    assert message_definition("of_no_ros_either/Thing") is None
+    assert message_definition("of_my_own/Thing") == ("int8 a", "x")
+    assert message_definition("of_my_own/Other") is None
+    assert message_definition("not there/Thing") is None
     assert {each for each in sys.modules if each.startswith("of_")} == {"of_my_own", "of_my_own.msg"}
 
 

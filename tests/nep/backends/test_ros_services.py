@@ -220,7 +220,7 @@ def test_nep_call_type_matches_its_srv_file() -> None:
     assert NEP_CALL.decode_call(NEP_CALL.encode_call(msgpack, b"\xc0", None)) == (b"\xc0", 4, None)
     assert NEP_CALL.decode_call(NEP_CALL.encode_call(json, b"", 1e-9)).timeout_s == 0.001
     assert NEP_CALL.decode_call(NEP_CALL.encode_call(json, b"", 1e300)).timeout_s == (2**32 - 1) / 1000
-    for reply in (Reply(CallKind.ANSWER, b"1"), error_reply(CallKind.ERROR, "ValueError", "no")):
+    for reply in (Reply(CallKind.REPLY, b"1"), error_reply(CallKind.ERROR, "ValueError", "no")):
         assert NEP_CALL.decode_reply(NEP_CALL.encode_reply(reply), json) == reply
     for wrong in (b"", b"\1\1\0\0\0\0\0", b"\2\1\0\0\0\0", b"\2\1\0\5\0\0\0ab", b"\2\1\0\0\0\0\0x"):
         with pytest.raises(nep.DecodeError):
@@ -240,14 +240,14 @@ def test_ros_service_type_carries_bytes_and_nan_with_msgpack() -> None:
     found = msgpack.decode(data, {})
     assert found["data"] == b"\0\xff"  # type: ignore[index]
     assert math.isnan(found["x"])  # type: ignore[index]
-    body = kind.encode_reply(Reply(CallKind.ANSWER, b'{"data":[1,2]}', 1))
+    body = kind.encode_reply(Reply(CallKind.REPLY, b'{"data":[1,2]}', 1))
     assert kind.decode_reply(body, msgpack).data == msgpack.encode({"data": b"\1\2"}).data
     with pytest.raises(nep.EncodeError):
         kind.decode_reply(body, json)
     for wrong in (
         Reply(CallKind.ERROR, b"{}"),
-        Reply(CallKind.ANSWER, b"{}", 99),
-        Reply(CallKind.ANSWER, b"{oops"),
+        Reply(CallKind.REPLY, b"{}", 99),
+        Reply(CallKind.REPLY, b"{oops"),
     ):
         with pytest.raises((nep.DecodeError, WireError)):
             kind.encode_reply(wrong)

@@ -12,12 +12,12 @@ import nep
 from nep.backends.base import SubscriberSpec
 from nep.backends.connection import Hybrid
 from nep.backends.zeromq.io_thread import IoThread
-from nep.backends.zeromq.loss import GAP_MAX, PublisherTracker
+from nep.backends.zeromq.loss import MAX_GAP, PublisherTracker
 from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
 from nep.backends.zeromq.sub_socket import SubSocket
 from nep.masters.master import Master
 from nep.protocol.requests import (
-    Added,
+    AddedReply,
     AddPublisher,
     NodeRecord,
     PublisherCount,
@@ -25,8 +25,8 @@ from nep.protocol.requests import (
     RemotePublisher,
     RemovePublisher,
     Renew,
-    id_from,
-    node_id_from,
+    derive_id,
+    derive_node_id,
 )
 from tests.nep.masters.test_attacks import Attacker, attacker_at
 from tests.nep.programs import eventually
@@ -139,7 +139,7 @@ def test_existing_publisher_is_counted_from_its_first_received_message() -> None
 
 def test_impossible_first_number_is_rejected_and_not_counted() -> None:
     sources = new_publisher()
-    assert not sources.advance_to(5, GAP_MAX + 1)
+    assert not sources.advance_to(5, MAX_GAP + 1)
     assert sources.lost == 0
 
 
@@ -156,13 +156,13 @@ class UnreachablePublisher:
 
     def __init__(self, master: Attacker, endpoint: str) -> None:
         self._master = master
-        self.node = NodeRecord(node_id_from(KEY), "publisher", "host", 1, key=KEY)
-        self.record = PublisherRecord(id_from(KEY, 1), "t", "json", "json", (endpoint,), number=1)
+        self.node = NodeRecord(derive_node_id(KEY), "publisher", "host", 1, key=KEY)
+        self.record = PublisherRecord(derive_id(KEY, 1), "t", "json", "json", (endpoint,), number=1)
         self._epoch = 0
 
     def register(self) -> None:
         answer = self._master.ask(AddPublisher(self.node, self.record))
-        assert isinstance(answer, Added)
+        assert isinstance(answer, AddedReply)
         self._epoch = answer.epoch
 
     def renew(self, last_seq: int) -> None:

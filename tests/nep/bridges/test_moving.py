@@ -30,7 +30,7 @@ def test_bridge_blocks_messages_that_move_a_robot_under_another_topic_name(direc
         names = ("/innocent", "/orders") if direction == "a->b" else ("/orders", "/innocent")
         with Bridge(configured(a, b, topic(*names, direction)), allow_moving=()) as bridge:
             assert bridge.wait_until_ready(30.0)
-            assert bridge.refusals(5.0) == ()
+            assert bridge.denial_reasons(5.0) == ()
             carried = route(bridge, direction[0], "/innocent")
             says, hears = near.node("says").new_pub("/innocent"), far.node("hears").new_sub("/orders")
             eventually(lambda: says.subscribers)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from nep.cli.alert_printer import AlertChanges
+from nep.cli.alert_printer import AlertTracker
 from nep.errors import AddressInUseError
 from nep.protocol.graph_view import Alert, GraphView
 
@@ -158,7 +158,7 @@ def test_address_in_use_error_for_any_port_names_the_host():
 
 
 def test_alerts_are_reported_when_raised_changed_and_resolved():
-    changes = AlertChanges()
+    changes = AlertTracker()
     first, other = Alert("a", "one"), Alert("a", "two")
     assert changes.update(GraphView(1, 1, alerts=(first,))) == ([first], [])
     assert changes.update(GraphView(1, 2, alerts=(first,))) == ([], [])

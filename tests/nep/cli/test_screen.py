@@ -9,10 +9,10 @@ from rich.cells import cell_len
 from nep.cli.screen import (
     UNKNOWN,
     TextColumn,
-    bandwidth,
     duration,
+    format_bandwidth,
+    format_rate,
     print_error_message,
-    rate,
     show_alerts,
     show_json,
     show_table,
@@ -26,7 +26,7 @@ from nep.protocol.graph_view import Alert, SubscriberInfo, TopicInfo
     [(None, UNKNOWN), (0.0, "0.0 /s"), (29.97, "30.0 /s"), (123.4, "123 /s"), (45_000.0, "45000 /s")],
 )
 def test_rates_are_formatted(value, text):
-    assert rate(value) == text
+    assert format_rate(value) == text
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,7 @@ def test_wide_characters_are_not_truncated_if_they_fit(capsys, monkeypatch):
 
 def test_bandwidth_of_a_topic_without_subscribers_is_not_zero():
     subscriber = SubscriberInfo(1, "n", 0, 0)
-    assert "B/s" not in bandwidth(TopicInfo("/t", "json", "json", rate_hz=50.0, bandwidth_Bps=0.0))
+    assert "B/s" not in format_bandwidth(TopicInfo("/t", "json", "json", rate_hz=50.0, bandwidth_Bps=0.0))
     heard = TopicInfo("/t", "json", "json", (), (subscriber,), rate_hz=50.0, bandwidth_Bps=0.0)
-    assert bandwidth(heard) == "0 B/s"
-    assert bandwidth(TopicInfo("/t", "json", "json", rate_hz=0.0, bandwidth_Bps=0.0)) == "0 B/s"
+    assert format_bandwidth(heard) == "0 B/s"
+    assert format_bandwidth(TopicInfo("/t", "json", "json", rate_hz=0.0, bandwidth_Bps=0.0)) == "0 B/s"

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import nep
 from nep.cli.echo import MessagePrinter, echo, show_record, topics_and_fields
-from nep.cli.values import format_payload, ids_as_text, json_of
+from nep.cli.values import convert_ids_to_text, encode_json, format_payload
 from nep.errors import WaitTimeoutError
 from nep.messages.message import Message
 from nep.messages.packing import pack
@@ -33,8 +33,8 @@ ANYTHING = st.recursive(
 
 @given(ANYTHING)
 def test_every_decoded_value_becomes_valid_json(value):
-    json.loads(json_of(value))
-    assert "\n" not in json_of(value).decode()
+    json.loads(encode_json(value))
+    assert "\n" not in encode_json(value).decode()
     assert format_payload(value, whole=True) is not None
     assert format_payload(value, whole=False, indent=True) is not None
 
@@ -63,13 +63,13 @@ def test_many_fields_are_abbreviated_and_all_shown_on_request():
 
 def test_control_characters_are_escaped_in_json():
     value = {"a\x9b": "\x7f\u202e\u2028"}
-    data = json_of(value)
+    data = encode_json(value)
     assert data.isascii()
     assert json.loads(data) == value
 
 
 def test_ids_are_converted_to_strings_at_every_level():
-    assert ids_as_text({"id": 2**60, "publishers": ({"id": 7, "count": 7},), "name": "x"}) == {
+    assert convert_ids_to_text({"id": 2**60, "publishers": ({"id": 7, "count": 7},), "name": "x"}) == {
         "id": str(2**60), "publishers": [{"id": "7", "count": 7}], "name": "x",
     }  # fmt: skip
 

@@ -12,7 +12,7 @@ import zmq
 
 from nep.errors import WireError
 from nep.protocol import service_wire, wire
-from nep.protocol.batch import batch_part
+from nep.protocol.batch import encode_batch
 from tests.nep.conformance.client import Client
 from tests.nep.conformance.client_state import Pub, Source, Sub
 
@@ -166,8 +166,8 @@ class OnePartForEverybody(Client):
 @breaks("batches-to-readers")
 class BatchesForEverybody(Client):
     def send(self, pub: Pub, header: bytes, payload: bytes) -> None:
-        form = wire.form_of(pub.codec, 0)
-        pub.socket.send(batch_part(pub.topic, form, pub.seq, pub.id, [time.time_ns()], [payload]))
+        form = wire.encode_form(pub.codec, 0)
+        pub.socket.send(encode_batch(pub.topic, form, pub.seq, pub.id, [time.time_ns()], [payload]))
 
 
 @breaks("forms")
@@ -562,7 +562,7 @@ class ServiceOfAnotherType(Client):
 @breaks("service-answer")
 class AnswersAsRefused(Client):
     def answer(self, call: service_wire.CallHeader) -> service_wire.Reply:
-        return super().answer(call)._replace(kind=service_wire.CallKind.REFUSED)
+        return super().answer(call)._replace(kind=service_wire.CallKind.REJECTED)
 
 
 @breaks("service-malformed")

@@ -126,7 +126,7 @@ class Client(Connections, Services):
     ) -> dict[str, Any]:
         socket = self._context.socket(zmq.XPUB)
         socket.setsockopt(zmq.XPUB_VERBOSE, 1)
-        socket.setsockopt(zmq.MAXMSGSIZE, wire.SUBSCRIPTION_MAX_BYTES)
+        socket.setsockopt(zmq.MAXMSGSIZE, wire.MAX_SUBSCRIPTION_BYTES)
         socket.sndhwm = 50_000
         port = socket.bind_to_random_port("tcp://127.0.0.1", 20000, 50000)
         kept = max(history, 1 if latched else 0)
@@ -392,7 +392,7 @@ class Client(Connections, Services):
         if not is_added:
             pub.hellos.pop(hello.subscriber, None)
             return
-        pub.others -= 1 if hello.one_part and pub.others else 0
+        pub.others -= 1 if hello.reads_one_part and pub.others else 0
         pub.hellos[hello.subscriber] = (what, hello)
         self.greet(pub, what)
 

@@ -53,14 +53,14 @@ class Services:
             json.loads(bytes(call.data))
             reply = self.answer(call)
         except ValueError:
-            reply = service_wire.error_reply(service_wire.CallKind.REFUSED, "", "not JSON")
+            reply = service_wire.error_reply(service_wire.CallKind.REJECTED, "", "not JSON")
         socket.send_multipart([sender, *service_wire.NATIVE.reply(call.number, reply)])
 
     def refuse_call(self, error: WireError) -> None:
         pass
 
     def answer(self, call: service_wire.CallHeader) -> service_wire.Reply:
-        return service_wire.Reply(service_wire.CallKind.ANSWER, call.data, call.codec)
+        return service_wire.Reply(service_wire.CallKind.REPLY, call.data, call.codec)
 
     def do_call(self, service: str, value: Any, timeout_s: float) -> dict[str, Any]:
         topic = service_wire.topic_of(service)
@@ -96,6 +96,6 @@ class Services:
         return timeout_s
 
     def result(self, reply: service_wire.Reply) -> dict[str, Any]:
-        if reply.kind != service_wire.CallKind.ANSWER:
+        if reply.kind != service_wire.CallKind.REPLY:
             return {"error": bytes(reply.data).decode()}
         return {"value": json.loads(bytes(reply.data))}

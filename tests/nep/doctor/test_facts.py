@@ -194,9 +194,9 @@ def test_reason_why_a_master_cannot_start_is_one_finding(foreign, master):
     one = start_blocker(f"127.0.0.1:{foreign}")
     assert one is not None
     assert one.id == "master:foreign"
-    assert f"(process {os.getpid()}) uses port {foreign} " in one.as_error
-    assert "; close that program" in one.as_error
-    assert not one.as_error.endswith(".")
+    assert f"(process {os.getpid()}) uses port {foreign} " in one.error_message
+    assert "; close that program" in one.error_message
+    assert not one.error_message.endswith(".")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = probe.getsockname()[1]

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from nep.programs.gateway.framing import (
     FrameError,
-    Shape,
+    FrameFormat,
     codec_of,
+    escape_for_csharp,
+    escape_for_javascript,
     framing_of,
     has_replaced_nan,
-    shield_csharp,
-    shield_javascript,
 )
 
 JSON_VALUES = st.recursive(
@@ -57,41 +57,41 @@ def test_message_types_of_the_originals_map_to_json_string_and_image():
 
 
 def test_prefixed_json_is_the_topic_a_space_and_the_payload():
-    shape = Shape("t", "prefixed", "json")
+    shape = FrameFormat("t", "prefixed", "json")
     assert shape.read(b't {"a":1}') == b'{"a":1}'
     assert shape.write(b'{"a":1}') == b't {"a":1}'
 
 
 def test_lists_and_strings_are_decoded_from_prefixed_json():
-    shape = Shape("t", "prefixed", "json")
+    shape = FrameFormat("t", "prefixed", "json")
     assert shape.read(b"t [1,2]") == b"[1,2]"
     assert shape.read(b't "x"') == b'"x"'
 
 
 def test_prefixed_json_without_its_prefix_is_decoded():
-    assert Shape("t", "prefixed", "json").read(b'{"a":1}') == b'{"a":1}'
+    assert FrameFormat("t", "prefixed", "json").read(b'{"a":1}') == b'{"a":1}'
 
 
 def test_frame_of_another_topic_is_rejected():
     with pytest.raises(FrameError, match="doesn't begin with the topic"):
-        Shape("t", "prefixed", "string").read(b"t2 hello")
+        FrameFormat("t", "prefixed", "string").read(b"t2 hello")
 
 
 def test_string_round_trips_with_spaces_and_unicode():
     text = "  zwei  Wörter — 日本 😀 ".encode()
     for framing in ("prefixed", "bare"):
-        shape = Shape("t", framing, "string")
+        shape = FrameFormat("t", framing, "string")
         assert shape.read(shape.write(text)) == text
 
 
 def test_bare_string_that_starts_with_its_topic_is_not_stripped():
-    assert Shape("t", "bare", "string").read(b"t is a letter") == b"t is a letter"
+    assert FrameFormat("t", "bare", "string").read(b"t is a letter") == b"t is a letter"
 
 
 def test_image_frame_is_a_base64_encoded_jpeg():
     jpeg = bytes(range(256))
     for framing, prefix in (("prefixed", b"cam "), ("bare", b"")):
-        shape = Shape("cam", framing, "image")
+        shape = FrameFormat("cam", framing, "image")
         frame = shape.write(jpeg)
         assert frame == prefix + base64.b64encode(jpeg)
         assert shape.read(frame) == jpeg
@@ -99,18 +99,18 @@ def test_image_frame_is_a_base64_encoded_jpeg():
 
 def test_image_with_invalid_base64_is_rejected():
     with pytest.raises(FrameError, match="base64"):
-        Shape("cam", "bare", "image").read(b"****")
+        FrameFormat("cam", "bare", "image").read(b"****")
 
 
 def test_nan_is_converted_to_null_for_strict_readers():
-    assert json.loads(Shape("t", "bare", "json").read(b'{"a": NaN, "b": [-Infinity, 1]}')) == {
+    assert json.loads(FrameFormat("t", "bare", "json").read(b'{"a": NaN, "b": [-Infinity, 1]}')) == {
         "a": None,
         "b": [None, 1],
     }
 
 
 def test_numbers_replaced_by_null_are_detected():
-    shape = Shape("t", "prefixed", "json")
+    shape = FrameFormat("t", "prefixed", "json")
     for said, is_lost in (
         (b'{"a": NaN}', True),
         (b'{"a": "NaN", "b": Infinity}', True),
@@ -122,11 +122,11 @@ def test_numbers_replaced_by_null_are_detected():
 
 
 def test_word_nan_in_a_string_is_unchanged():
-    assert json.loads(Shape("t", "bare", "json").read(b'{"a": "NaN"}')) == {"a": "NaN"}
+    assert json.loads(FrameFormat("t", "bare", "json").read(b'{"a": "NaN"}')) == {"a": "NaN"}
 
 
 def test_nep_0546_and_0547_are_recognised_by_their_frames():
-    shape = Shape("t", "bare", "json")
+    shape = FrameFormat("t", "bare", "json")
     for frame, version in ((b't {"a":1}', "0.5.4.6"), (json.dumps(json.dumps({"a": 1})).encode(), "0.5.4.7")):
         with pytest.raises(FrameError) as caught:
             shape.read(frame)
@@ -134,17 +134,17 @@ def test_nep_0546_and_0547_are_recognised_by_their_frames():
 
 
 def test_plain_json_string_is_not_mistaken_for_nep_0547():
-    assert Shape("t", "bare", "json").read(b'"hello"') == b'"hello"'
+    assert FrameFormat("t", "bare", "json").read(b'"hello"') == b'"hello"'
 
 
 def test_nep_0546_is_recognised_by_its_filter():
-    assert Shape("t", "bare", "json").is_from_0546(b"t")
-    assert not Shape("t", "bare", "json").is_from_0546(b"")
-    assert not Shape("t", "prefixed", "json").is_from_0546(b"t")
+    assert FrameFormat("t", "bare", "json").is_from_0546(b"t")
+    assert not FrameFormat("t", "bare", "json").is_from_0546(b"")
+    assert not FrameFormat("t", "prefixed", "json").is_from_0546(b"t")
 
 
 def test_subscription_filter_matches_only_possible_frame_prefixes():
-    prefixed, bare = Shape("test", "prefixed", "json"), Shape("test", "bare", "json")
+    prefixed, bare = FrameFormat("test", "prefixed", "json"), FrameFormat("test", "bare", "json")
     assert prefixed.matches_filter(b"test")
     assert prefixed.matches_filter(b"")
     assert not prefixed.matches_filter(b"test2")
@@ -155,8 +155,8 @@ def test_subscription_filter_matches_only_possible_frame_prefixes():
 @given(JSON_VALUES, st.text(alphabet="abe1n ü日", min_size=1, max_size=3))
 def test_shielding_never_changes_the_value(value, topic):
     data = json.dumps(value, ensure_ascii=False).encode()
-    assert json.loads(shield_javascript(data, topic)) == value
-    assert json.loads(shield_csharp(data)) == value
+    assert json.loads(escape_for_javascript(data, topic)) == value
+    assert json.loads(escape_for_csharp(data)) == value
 
 
 @given(st.text(), st.sampled_from(["camera", "日本", "robot_action", "aa"]))
@@ -164,8 +164,8 @@ def test_shielded_json_for_javascript_contains_no_topic_name(text, topic):
     data = json.dumps(
         {"message": f"{text}{topic}{text}{topic[0]}{topic}", topic: 1}, ensure_ascii=False
     ).encode()
-    assert topic.encode() not in shield_javascript(data, topic)
+    assert topic.encode() not in escape_for_javascript(data, topic)
 
 
 def test_shielded_json_for_csharp_contains_no_space():
-    assert b" " not in shield_csharp(b'{"a b": "c  d", "e": [1, 2]}')
+    assert b" " not in escape_for_csharp(b'{"a b": "c  d", "e": [1, 2]}')

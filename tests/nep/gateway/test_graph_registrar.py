@@ -7,7 +7,7 @@ import pytest
 
 from nep.masters.graph import Graph
 from nep.programs.gateway.graph_registrar import GraphRegistrar
-from nep.programs.gateway.processes import load_of
+from nep.programs.gateway.processes import cpu_load_of
 from nep.programs.gateway.programs import OriginalProgram, TopicLink
 from nep.protocol.requests import QueryGraph
 from nep.system.cpu import CpuLoad
@@ -111,8 +111,8 @@ def test_cpu_load_of_an_original_is_read_from_the_system(desk):
 
 
 def test_missing_process_has_no_load():
-    assert load_of(2**22 + 1).ratio() is None
-    assert load_of(os.getpid()).ratio() is None  # one reading tells nothing
+    assert cpu_load_of(2**22 + 1).ratio() is None
+    assert cpu_load_of(os.getpid()).ratio() is None  # one reading tells nothing
 
 
 def test_equivalent_type_names_are_not_a_conflict(desk, listing):

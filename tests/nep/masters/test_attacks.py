@@ -19,11 +19,11 @@ from nep.masters.registry import is_tcp_endpoint
 from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
-    Added,
+    AddedReply,
     AddPublisher,
     AddSubscriber,
-    Done,
-    Found,
+    DoneReply,
+    FoundReply,
     GraphReply,
     Join,
     Leave,
@@ -32,23 +32,23 @@ from nep.protocol.requests import (
     PublisherRecord,
     PublisherRemoved,
     QueryGraph,
-    Refused,
+    RejectedReply,
     RemovePublisher,
     RemoveSubscriber,
     Renew,
-    Renewed,
+    RenewedReply,
     Reply,
     ReportMissing,
     Request,
     SubscriberCount,
     SubscriberRecord,
-    id_from,
-    node_id_from,
+    derive_id,
+    derive_node_id,
 )
 from tests.nep.programs import eventually
 
 OWN_KEY = "an attacker has a key of its own"
-OWN_ID = node_id_from(OWN_KEY)
+OWN_ID = derive_node_id(OWN_KEY)
 
 
 class Attacker:
@@ -144,7 +144,7 @@ def test_connection_with_the_routing_id_of_a_node_cannot_remove_that_node(
     before = master.view().nodes
     for victim in (victims.arm, victims.eye):
         with attacker_at(master, victim.id.encode()) as attacker:
-            assert isinstance(attacker.ask(Leave(victim.id)), Refused)
+            assert isinstance(attacker.ask(Leave(victim.id)), RejectedReply)
             assert victims.are_listed(master.view())
         victims.go_on()
     assert master.view().nodes.keys() == before.keys()
@@ -154,14 +154,14 @@ def test_connection_with_the_routing_id_of_a_node_cannot_remove_that_node(
 def test_second_connection_with_a_used_routing_id_does_not_replace_the_first(master: Master) -> None:
     mine = node()
     with attacker_at(master, b"first") as first:
-        assert isinstance(first.ask(Join(mine)), Found)
+        assert isinstance(first.ask(Join(mine)), FoundReply)
         with attacker_at(master, b"first") as second:
             for _ in range(3):
                 second.send(Leave(mine.id))
-                assert isinstance(first.ask(Renew(mine.id, master.epoch, 0)), Renewed)
+                assert isinstance(first.ask(Renew(mine.id, master.epoch, 0)), RenewedReply)
             with attacker_at(master) as third:
-                assert isinstance(third.ask(Leave(mine.id)), Refused)
-        assert isinstance(first.ask(Renew(mine.id, master.epoch, 0)), Renewed)
+                assert isinstance(third.ask(Leave(mine.id)), RejectedReply)
+        assert isinstance(first.ask(Renew(mine.id, master.epoch, 0)), RenewedReply)
         assert mine.id in master.view().nodes
 
 
@@ -184,9 +184,9 @@ def requests_for(victims: Victims) -> list[Request]:
 def test_requests_for_another_node_are_rejected(master: Master, victims: Victims, number: int) -> None:
     request = requests_for(victims)[number]
     with attacker_at(master) as attacker:
-        assert isinstance(attacker.ask(request), Refused)
-        assert attacker.ask(Join(node())) != Refused  # also as a registered node
-        assert isinstance(attacker.ask(request), Refused)
+        assert isinstance(attacker.ask(request), RejectedReply)
+        assert attacker.ask(Join(node())) != RejectedReply  # also as a registered node
+        assert isinstance(attacker.ask(request), RejectedReply)
         assert victims.are_listed(master.view())
         assert not any(each.id.startswith("missing:") for each in master.view().alerts)
     victims.go_on()
@@ -203,7 +203,7 @@ def test_forged_renewal_changes_neither_lease_nor_counts(master: Master, victims
     )
     with attacker_at(master) as attacker:
         answer = attacker.ask(lie)
-        assert isinstance(answer, Renewed)
+        assert isinstance(answer, RenewedReply)
         assert answer.again
         (told,) = master.view().topics["/arm/state"].publishers
         assert told.count < 10
@@ -217,11 +217,11 @@ def test_id_of_a_publisher_or_subscriber_cannot_be_taken_over(
     number = 1 if is_proven else 0  # a number that does not prove it
     with attacker_at(master) as attacker:
         taken = publisher(id=victims.pub.id, number=number)
-        assert isinstance(attacker.ask(AddPublisher(node(), taken)), Refused)
-        assert isinstance(attacker.ask(AddPublisher(node(), replace(taken, topic="/other"))), Refused)
-        assert isinstance(attacker.ask(Join(node(), 0, (taken,))), Refused)
+        assert isinstance(attacker.ask(AddPublisher(node(), taken)), RejectedReply)
+        assert isinstance(attacker.ask(AddPublisher(node(), replace(taken, topic="/other"))), RejectedReply)
+        assert isinstance(attacker.ask(Join(node(), 0, (taken,))), RejectedReply)
         ears = SubscriberRecord(victims.sub.id, "/arm/state", "json", number)
-        assert isinstance(attacker.ask(AddSubscriber(node(), ears)), Refused)
+        assert isinstance(attacker.ask(AddSubscriber(node(), ears)), RejectedReply)
         assert victims.are_listed(master.view())
         assert OWN_ID not in master.view().nodes
     victims.go_on()
@@ -248,29 +248,29 @@ def test_squatters_are_evicted_when_the_owner_joins_with_its_key() -> None:
 
 def test_one_connection_can_speak_for_only_one_node(master: Master) -> None:
     with attacker_at(master) as attacker:
-        assert isinstance(attacker.ask(Join(node())), Found)
-        second = Join(NodeRecord(node_id_from("b"), "Second", "host", 1, key="b"))
+        assert isinstance(attacker.ask(Join(node())), FoundReply)
+        second = Join(NodeRecord(derive_node_id("b"), "Second", "host", 1, key="b"))
         answer = attacker.ask(second)
-        assert isinstance(answer, Refused)
+        assert isinstance(answer, RejectedReply)
         assert answer.reason == f"this connection already belongs to the node '{OWN_ID}'"
-        assert isinstance(attacker.ask(Leave(OWN_ID)), Done)
+        assert isinstance(attacker.ask(Leave(OWN_ID)), DoneReply)
         assert isinstance(
-            attacker.ask(Join(NodeRecord(node_id_from("b"), "Second", "host", 1, key="b"))), Found
+            attacker.ask(Join(NodeRecord(derive_node_id("b"), "Second", "host", 1, key="b"))), FoundReply
         )
 
 
 def test_node_with_a_hung_old_connection_can_rejoin(master: Master) -> None:
     """Its computer lost the network and has it again; for the master the old connection is still there."""
     with attacker_at(master) as old, attacker_at(master) as new:
-        arm = PublisherRecord(id_from(OWN_KEY, 1), "/arm", "json", "json", ("tcp://127.0.0.1:9",), number=1)
-        assert isinstance(old.ask(AddPublisher(node(), arm)), Added)
+        arm = PublisherRecord(derive_id(OWN_KEY, 1), "/arm", "json", "json", ("tcp://127.0.0.1:9",), number=1)
+        assert isinstance(old.ask(AddPublisher(node(), arm)), AddedReply)
         answer = new.ask(Renew(OWN_ID, master.epoch, 0, (PublisherCount(arm.id, 1, 1, 1),)))
-        assert isinstance(answer, Renewed)
+        assert isinstance(answer, RenewedReply)
         assert answer.again
-        assert isinstance(new.ask(Join(node(), master.epoch, (arm,))), Found)
+        assert isinstance(new.ask(Join(node(), master.epoch, (arm,))), FoundReply)
         answer = new.ask(Renew(OWN_ID, master.epoch, 0, (PublisherCount(arm.id, 1, 1, 1),)))
         assert answer == replace(answer, again=False)
-        assert isinstance(old.ask(Leave(OWN_ID)), Refused)
+        assert isinstance(old.ask(Leave(OWN_ID)), RejectedReply)
         assert [each.node_id for each in master.view().topics["/arm"].publishers] == [OWN_ID]
 
 
@@ -281,8 +281,8 @@ def test_false_report_of_a_missing_subscriber_does_not_affect_other_publishers(
     with attacker_at(master) as attacker:
         for n in range(3):
             own = publisher(id=100 + n)
-            assert isinstance(attacker.ask(AddPublisher(node(), own)), Added)
-            assert isinstance(attacker.ask(ReportMissing(OWN_ID, own.id, (victims.sub.id,))), Done)
+            assert isinstance(attacker.ask(AddPublisher(node(), own)), AddedReply)
+            assert isinstance(attacker.ask(ReportMissing(OWN_ID, own.id, (victims.sub.id,))), DoneReply)
             with nep.node(f"Other {n}", master=master.address) as other:
                 pub = other.new_pub("/arm/state")
                 pub.publish("first")
@@ -327,9 +327,9 @@ def test_invalid_endpoint_is_rejected_also_without_a_key(master: Master, endpoin
         return PublisherRecord(77, "/arm/state", "json", "json", (where,))
 
     with attacker_at(master, own.id.encode()) as attacker:
-        assert isinstance(attacker.ask(AddPublisher(own, record(endpoint))), Refused)
+        assert isinstance(attacker.ask(AddPublisher(own, record(endpoint))), RejectedReply)
         assert "/arm/state" not in master.view().topics
-        assert isinstance(attacker.ask(AddPublisher(own, record("tcp://127.0.0.1:9"))), Added)
+        assert isinstance(attacker.ask(AddPublisher(own, record("tcp://127.0.0.1:9"))), AddedReply)
 
 
 @pytest.mark.parametrize(
@@ -339,7 +339,7 @@ def test_invalid_endpoint_is_rejected_also_without_a_key(master: Master, endpoin
 def test_rejected_message_type_is_reported_with_the_reason(master: Master, word: str, said: str) -> None:
     with attacker_at(master) as attacker:
         refused = attacker.ask(AddPublisher(node(), publisher(msg_type=word)))
-        assert isinstance(refused, Refused)
+        assert isinstance(refused, RejectedReply)
         assert said in refused.reason
 
 
@@ -371,7 +371,7 @@ def test_invalid_registrations_are_rejected_counted_and_named(master: Master, vi
         ]
         for request in nonsense:
             answer = attacker.ask(request)
-            assert isinstance(answer, Refused), request
+            assert isinstance(answer, RejectedReply), request
             assert answer.reason
             assert answer.reason.isprintable()
         assert victims.are_listed(master.view())
@@ -384,12 +384,12 @@ def test_invalid_registrations_are_rejected_counted_and_named(master: Master, vi
 def test_number_of_publishers_and_subscribers_per_node_is_limited(master: Master) -> None:
     with attacker_at(master) as attacker:
         many = tuple(publisher(id=n, topic=f"/t{n}") for n in range(1, 5_001))
-        assert isinstance(attacker.ask(Join(node(), 0, many)), Found)
+        assert isinstance(attacker.ask(Join(node(), 0, many)), FoundReply)
         more = attacker.ask(AddPublisher(node(), publisher(id=20_000)))
-        assert isinstance(more, Refused)
+        assert isinstance(more, RejectedReply)
         assert more.reason == "a node can have at most 5000 publishers and subscribers"
-        assert isinstance(attacker.ask(RemovePublisher(OWN_ID, 1, 0)), Done)
-        assert isinstance(attacker.ask(AddPublisher(node(), publisher(id=20_000))), Added)
+        assert isinstance(attacker.ask(RemovePublisher(OWN_ID, 1, 0)), DoneReply)
+        assert isinstance(attacker.ask(AddPublisher(node(), publisher(id=20_000))), AddedReply)
 
 
 def test_key_of_a_node_is_never_disclosed(master: Master, victims: Victims) -> None:
@@ -406,13 +406,13 @@ def test_key_of_a_node_is_never_disclosed(master: Master, victims: Victims) -> N
 
 def test_eviction_of_a_squatter_is_announced_to_subscribers_before_the_owner(master: Master) -> None:
     """Subscribers hear that the unproven publisher is gone before they hear of the proven one."""
-    real = PublisherRecord(id_from("k", 1), "/t", "json", "json", ("tcp://127.0.0.1:9",), number=1)
+    real = PublisherRecord(derive_id("k", 1), "/t", "json", "json", ("tcp://127.0.0.1:9",), number=1)
     with attacker_at(master) as ear, attacker_at(master) as squatter, attacker_at(master) as owner:
-        listener = NodeRecord(node_id_from("ear"), "Ear", "host", 1, key="ear")
+        listener = NodeRecord(derive_node_id("ear"), "Ear", "host", 1, key="ear")
         ear.ask(AddSubscriber(listener, SubscriberRecord(5, "/t", "json")))
-        assert isinstance(squatter.ask(AddPublisher(node(), replace(real, number=0))), Added)
-        owned = NodeRecord(node_id_from("k"), "Owner", "host", 1, key="k")
-        assert isinstance(owner.ask(AddPublisher(owned, real)), Added)
+        assert isinstance(squatter.ask(AddPublisher(node(), replace(real, number=0))), AddedReply)
+        owned = NodeRecord(derive_node_id("k"), "Owner", "host", 1, key="k")
+        assert isinstance(owner.ask(AddPublisher(owned, real)), AddedReply)
         came, gone, again = (encoding.decode_reply(ear.socket.recv())[1] for _ in range(3))
         assert isinstance(gone, PublisherRemoved)
         assert not gone.is_closed
@@ -422,9 +422,9 @@ def test_eviction_of_a_squatter_is_announced_to_subscribers_before_the_owner(mas
 def test_invalid_subscriber_counts_are_handled_safely(master: Master) -> None:
     with attacker_at(master) as attacker, nep.node("honest", master=master.address) as honest:
         record = SubscriberRecord(5, "/t", "json")
-        assert isinstance(attacker.ask(AddSubscriber(node(), record)), Found)
+        assert isinstance(attacker.ask(AddSubscriber(node(), record)), FoundReply)
         for lost in (2**64 - 1, -1, 2**63):
             count = SubscriberCount(5, lost, lost, "a\x1b[2J" * 1000)
-            assert isinstance(attacker.ask(Renew(OWN_ID, master.epoch, 0, (), (count,))), Renewed)
+            assert isinstance(attacker.ask(Renew(OWN_ID, master.epoch, 0, (), (count,))), RenewedReply)
             topic = honest.graph().topics["/t"]
             assert topic.lost in {0, 2**63 - 1}

@@ -8,16 +8,16 @@ import pytest
 import zmq
 
 import nep
-from nep.masters.bad_requests import BadRequests, describe_sender
+from nep.masters.bad_requests import BadRequestCounter, describe_sender
 from nep.masters.master import Master
 from nep.messages.packing import pack
 from nep.protocol import encoding
-from nep.protocol.requests import Refused
+from nep.protocol.requests import RejectedReply
 from tests.nep.programs import eventually
 
 
 def test_each_sender_is_counted_and_reported_for_some_seconds() -> None:
-    bad = BadRequests()
+    bad = BadRequestCounter()
     assert bad.alerts(0.0) == ()
     for _ in range(3):
         bad.add("a", "“A”", "the body isn't a map", 10.0)
@@ -34,7 +34,7 @@ def test_each_sender_is_counted_and_reported_for_some_seconds() -> None:
 
 
 def test_alert_text_is_not_updated_on_every_bad_request() -> None:
-    bad = BadRequests()
+    bad = BadRequestCounter()
     bad.add("a", "“A”", "reason", 10.0)
     before = bad.alerts(10.0)
     bad.add("a", "“A”", "reason", 10.1)
@@ -43,7 +43,7 @@ def test_alert_text_is_not_updated_on_every_bad_request() -> None:
 
 
 def test_memory_for_senders_of_bad_requests_is_bounded() -> None:
-    bad = BadRequests()
+    bad = BadRequestCounter()
     for n in range(10_000):
         bad.add(f"s{n}", f"S{n}", "reason " * 1000, 10.0)
     assert len(bad._senders) == 100
@@ -54,7 +54,7 @@ def test_memory_for_senders_of_bad_requests_is_bounded() -> None:
 
 
 def test_control_characters_in_bad_requests_are_escaped() -> None:
-    bad = BadRequests()
+    bad = BadRequestCounter()
     bad.add("a", "“A”", "unknown request 'x\nERROR all is lost\x1b[31m'", 10.0)
     assert bad.alerts(10.0)[0].sentence.isprintable()
 
@@ -77,7 +77,7 @@ def test_master_logs_the_first_bad_request_then_rarely_and_raises_an_alert(
                 socket.connect(f"tcp://{master.address}")
                 socket.send(b"\xc1" if n % 2 else pack({"do": "fly", "call": 3}))
                 assert socket.poll(2000)
-                assert isinstance(encoding.decode_reply(socket.recv())[1], Refused)
+                assert isinstance(encoding.decode_reply(socket.recv())[1], RejectedReply)
         eventually(lambda: any(" 25 requests " in each.sentence for each in node.graph().alerts))
         (alert,) = node.graph().alerts
     context.term()
@@ -97,6 +97,6 @@ def test_malformed_renewal_counts_as_a_bad_request(master: Master) -> None:
         socket.connect(f"tcp://{master.address}")
         socket.send(pack({"do": "renew", "call": 3, "what": [1]}))
         assert socket.poll(2000)
-        assert isinstance(encoding.decode_reply(socket.recv())[1], Refused)
+        assert isinstance(encoding.decode_reply(socket.recv())[1], RejectedReply)
     context.term()
     eventually(lambda: bool(master.view().alerts))

@@ -9,19 +9,19 @@ import pytest
 
 from nep.errors import WireError
 from nep.masters.graph import Graph
-from nep.masters.leases import RawRenewal, encode_renewed, read_renewal
-from nep.messages.clocks import OFFSET_MAX_NS, UNCERTAINTY_MAX_NS
+from nep.masters.leases import RawRenewal, encode_renewed, parse_renewal
+from nep.messages.clocks import MAX_OFFSET_NS, MAX_UNCERTAINTY_NS
 from nep.messages.packing import pack
 from nep.protocol import encoding
 from nep.protocol.requests import (
-    Found,
+    FoundReply,
     Join,
     NodeRecord,
     PublisherCount,
     PublisherRecord,
-    Refused,
+    RejectedReply,
     Renew,
-    Renewed,
+    RenewedReply,
     SubscriberCount,
     SubscriberRecord,
 )
@@ -62,9 +62,9 @@ def renewal(graph: Graph, number: int, clock: tuple[int, ...] | None) -> Renew:
     )
 
 
-def renewed(graph: Graph, number: int, clock: tuple[int, ...] | None, now: float = 1.0) -> Renewed:
+def renewed(graph: Graph, number: int, clock: tuple[int, ...] | None, now: float = 1.0) -> RenewedReply:
     (answer,) = graph.apply(renewal(graph, number, clock), 7, now, f"n{number}")
-    assert isinstance(answer.body, Renewed)
+    assert isinstance(answer.body, RenewedReply)
     return answer.body
 
 
@@ -114,11 +114,11 @@ def test_node_with_unknown_clock_has_no_clock_difference_to_other_nodes(
 @pytest.mark.parametrize(
     "clock",
     [
-        (OFFSET_MAX_NS + 1, 5),
-        (-OFFSET_MAX_NS - 1, 5),
+        (MAX_OFFSET_NS + 1, 5),
+        (-MAX_OFFSET_NS - 1, 5),
         (2**64 - 1, 5),
         (5, -1),
-        (5, UNCERTAINTY_MAX_NS + 1),
+        (5, MAX_UNCERTAINTY_NS + 1),
         (5,),
         (5, 5, 5),
     ],
@@ -139,7 +139,7 @@ def test_malformed_clock_is_rejected_and_named(clock: object) -> None:
     what = encoding.write(renewal(graph, 0, None))
     assert isinstance(what, dict)
     body = pack({"do": "renew", "call": 7, "what": what | {"clock": clock}})
-    assert read_renewal(body) is None, "it goes the long way,"
+    assert parse_renewal(body) is None, "it goes the long way,"
     asked = encoding.decode_request(body)
     assert isinstance(asked.request, WireError)
     assert "clock" in asked.request.reason, "which names what is wrong"
@@ -150,7 +150,7 @@ def test_fast_path_returns_the_same_clock_reply(clock: tuple[int, ...] | None) -
     quick, long = graph_of("c1", "c2"), graph_of("c1", "c2")
     for graph in (quick, long):
         renewed(graph, 1, (3 * S, 400))
-    said = read_renewal(encoding.encode_request(renewal(quick, 0, clock), 7))
+    said = parse_renewal(encoding.encode_request(renewal(quick, 0, clock), 7))
     assert said is not None
     assert said.clock == clock
     body = quick_answer(quick, said, times=(1, 2))
@@ -166,7 +166,7 @@ def quick_answer(graph: Graph, said: RawRenewal, **more: Any) -> bytes:
 
 def test_messages_of_older_nodes_and_masters_are_unchanged() -> None:
     graph = graph_of("", "")
-    said = read_renewal(encoding.encode_request(renewal(graph, 0, None), 7))
+    said = parse_renewal(encoding.encode_request(renewal(graph, 0, None), 7))
     assert said is not None
     assert said.clock is None
     body = quick_answer(graph, said)
@@ -178,7 +178,7 @@ def test_messages_of_older_nodes_and_masters_are_unchanged() -> None:
 def test_subscriber_receives_the_computer_id_of_a_publisher() -> None:
     graph = graph_of("c1", "c2")
     (answer,) = graph.apply(replace(joining(0, "c1", 2), epoch=EPOCH), 1, 0.0, "n0")
-    assert isinstance(answer.body, Found)
+    assert isinstance(answer.body, FoundReply)
     assert [each.computer for each in answer.body.publishers] == ["c2"]
 
 
@@ -187,5 +187,5 @@ def test_invalid_computer_id_is_rejected(computer: str) -> None:
     graph = Graph(EPOCH, 0.0, 0.0)
     join = Join(NodeRecord("0123456789abcdef", "n", "h", 1, computer=computer))
     (answer,) = graph.apply(join, 1, 0.0, "0123456789abcdef", is_foreign=True)
-    assert isinstance(answer.body, Refused)
+    assert isinstance(answer.body, RejectedReply)
     assert "computer" in answer.body.reason

@@ -12,7 +12,7 @@ from nep.protocol.requests import (
     PublisherCount,
     PublisherRecord,
     Renew,
-    Renewed,
+    RenewedReply,
     SubscriberCount,
     SubscriberRecord,
 )
@@ -53,7 +53,7 @@ def renewed(graph: Graph, who: NodeRecord, now: float, *counts: PublisherCount) 
     heard = () if counts else (SubscriberCount(2, 0, 0), SubscriberCount(3, 0, 0))
     out = graph.apply(Renew(who.id, graph.epoch, 0, counts, heard), 1, now, who.id)
     (answer,) = (each.body for each in out if each.call == 1)
-    assert isinstance(answer, Renewed)
+    assert isinstance(answer, RenewedReply)
     assert not answer.again
     return dict(answer.last_seqs)
 

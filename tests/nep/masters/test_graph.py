@@ -7,18 +7,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nep.errors import WireError
-from nep.masters.graph import Graph, Outgoing, without_nodes
-from nep.masters.rates import Meter
+from nep.masters.graph import Graph, OutgoingMessage, without_nodes
+from nep.masters.rates import TrafficMeter
 from nep.messages.packing import pack
 from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
-    Added,
+    AddedReply,
     AddPublisher,
     AddSubscriber,
-    Done,
+    DoneReply,
     ExpectedSubscriber,
-    Found,
+    FoundReply,
     GraphReply,
     Join,
     Leave,
@@ -30,11 +30,11 @@ from nep.protocol.requests import (
     PublisherRecord,
     PublisherRemoved,
     QueryGraph,
-    Refused,
+    RejectedReply,
     RemovePublisher,
     RemoveSubscriber,
     Renew,
-    Renewed,
+    RenewedReply,
     ReportMissing,
     Request,
     SubscriberCount,
@@ -61,7 +61,7 @@ def graph() -> Graph:
     return Graph(epoch=7, now=0.0, learn_s=0.0)
 
 
-def ask(graph: Graph, request: Request, now: float = 0.0) -> tuple[Outgoing, ...]:
+def ask(graph: Graph, request: Request, now: float = 0.0) -> tuple[OutgoingMessage, ...]:
     return graph.apply(request, 1, now, "asker")
 
 
@@ -72,7 +72,7 @@ def test_publisher_receives_its_subscribers_after_the_subscribers_are_notified(g
     assert isinstance(push.body, PublisherAdded)
     assert (push.body.publisher.publisher, push.body.publisher.node_name) == (publisher(2), "P")
     assert (reply.to, reply.call) == ("asker", 1)
-    assert isinstance(reply.body, Added)
+    assert isinstance(reply.body, AddedReply)
     assert (reply.body.epoch, reply.body.expected) == (7, (ExpectedSubscriber(1, "s", "S"),))
 
 
@@ -106,25 +106,25 @@ def test_new_subscriber_receives_the_publishers_and_each_publisher_is_probed(gra
     ask(graph, AddPublisher(node("original", "A"), publisher(2, at="")))
     probe, reply = ask(graph, AddSubscriber(node("s"), subscriber(3)))
     assert (probe.to, type(probe.body)) == ("p", Probe)
-    assert isinstance(reply.body, Found)
+    assert isinstance(reply.body, FoundReply)
     assert [each.publisher.id for each in reply.body.publishers] == [1]
-    assert without_nodes(reply.body, frozenset({"p"})) == Found(7, graph.revision)
+    assert without_nodes(reply.body, frozenset({"p"})) == FoundReply(7, graph.revision)
 
 
 def test_subscribers_of_removed_nodes_are_not_expected() -> None:
-    answer = Added(
+    answer = AddedReply(
         1,
         1,
         (ExpectedSubscriber(1, "a", "A"), ExpectedSubscriber(2, "b", "B")),
         (ExpectedSubscriber(3, "a", "A"),),
     )
-    assert without_nodes(answer, frozenset({"a"})) == Added(1, 1, (ExpectedSubscriber(2, "b", "B"),), ())
+    assert without_nodes(answer, frozenset({"a"})) == AddedReply(1, 1, (ExpectedSubscriber(2, "b", "B"),), ())
     assert without_nodes(answer, frozenset()) is answer
 
 
 def test_invalid_topic_is_rejected(graph: Graph) -> None:
     (reply,) = ask(graph, AddPublisher(node("p"), publisher(1, "two words")))
-    assert isinstance(reply.body, Refused)
+    assert isinstance(reply.body, RejectedReply)
     assert reply.body.code == "topic"
     assert "'two words'" in reply.body.reason
     assert graph.nodes == ()
@@ -135,7 +135,7 @@ def test_orderly_leave_carries_the_last_message_number(graph: Graph) -> None:
     ask(graph, AddPublisher(node("p"), publisher(2)))
     push, reply = ask(graph, RemovePublisher("p", 2, last_seq=5))
     assert push.body == PublisherRemoved(7, graph.revision, 2, "t", is_closed=True, last_seq=5)
-    assert isinstance(reply.body, Done)
+    assert isinstance(reply.body, DoneReply)
     ask(graph, AddPublisher(node("p"), publisher(3)))
     push, _reply = ask(graph, Leave("p"))
     assert isinstance(push.body, PublisherRemoved)
@@ -155,7 +155,7 @@ def test_expired_lease_unlists_a_publisher_without_closing_it(graph: Graph) -> N
     assert isinstance(push.body, PublisherRemoved)
     assert (push.to, push.body.is_closed) == ("s", False)
     (reply,) = ask(graph, Renew("p", 7, 0, (PublisherCount(2, 1, 1, 1),)), 4.0)
-    assert isinstance(reply.body, Renewed)
+    assert isinstance(reply.body, RenewedReply)
     assert reply.body.again
 
 
@@ -165,7 +165,7 @@ def test_managed_nodes_have_no_lease_and_receive_no_pushes(graph: Graph) -> None
     assert graph.tick(100.0) == ()
     outgoing = ask(graph, AddPublisher(node("p"), publisher(3)))
     assert [each.to for each in outgoing] == ["asker"]
-    assert isinstance(outgoing[0].body, Added)
+    assert isinstance(outgoing[0].body, AddedReply)
     assert outgoing[0].body.expected == ()
     assert graph.view().nodes["o"].generation == "A"
 
@@ -178,11 +178,11 @@ def test_renewals_update_statistics_and_return_changes(graph: Graph) -> None:
         count = PublisherCount(2, 20 * second, 2000 * second, 20 * second, second)
         ask(graph, Renew("p", 7, 0, (count,)), float(second))
     (reply,) = ask(graph, Renew("s", 7, before, (), (SubscriberCount(1, 30, 10),)), 2.0)
-    assert isinstance(reply.body, Renewed)
+    assert isinstance(reply.body, RenewedReply)
     assert [each.topic for each in reply.body.topics] == ["t"]
     assert reply.body.last_seqs == {2: 40}
     (reply,) = ask(graph, Renew("s", 7, graph.revision, (), (SubscriberCount(1, 30, 10),)), 2.0)
-    assert isinstance(reply.body, Renewed)
+    assert isinstance(reply.body, RenewedReply)
     assert reply.body.topics == ()
     topic = graph.view().topics["t"]
     assert (topic.rate_hz, topic.bandwidth_Bps, topic.last_stamp_ns) == (20.0, 2000.0, 2)
@@ -203,7 +203,7 @@ def test_mismatching_renewal_requests_a_full_join(graph: Graph, epoch: int) -> N
     ask(graph, AddPublisher(node("p"), publisher(2)))
     counts = () if epoch == 7 else (PublisherCount(2, 0, 0, 0),)
     (reply,) = ask(graph, Renew("p", epoch, 0, counts))
-    assert isinstance(reply.body, Renewed)
+    assert isinstance(reply.body, RenewedReply)
     assert reply.body.again
 
 
@@ -211,7 +211,7 @@ def test_join_replaces_the_previous_registration(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("p"), publisher(2)))
     outgoing = ask(graph, Join(node("p"), 3, (publisher(4),), (subscriber(5),)))
-    assert [type(each.body) for each in outgoing] == [PublisherAdded, PublisherAdded, Found]
+    assert [type(each.body) for each in outgoing] == [PublisherAdded, PublisherAdded, FoundReply]
     topic = graph.view().topics["t"]
     assert [each.id for each in topic.publishers] == [4]
     assert sorted(each.id for each in topic.subscribers) == [1, 5]
@@ -225,7 +225,7 @@ def test_restarted_master_accepts_known_nodes_before_new_nodes() -> None:
     assert graph.tick(0.9) == ()
     push, reply = graph.tick(1.0)
     assert (push.to, reply.to, reply.call) == ("old", "asker", 1)
-    assert isinstance(reply.body, Added)
+    assert isinstance(reply.body, AddedReply)
     assert [each.id for each in reply.body.expected] == [2]
     assert graph.learning_end is None
 
@@ -237,7 +237,7 @@ def test_unresponsive_node_is_an_alert_until_it_renews(graph: Graph) -> None:
     (alert,) = graph.view().alerts
     assert (alert.id, alert.sentence) == ("missing:s", "“S” doesn't respond to “P”")
     _push, reply = ask(graph, AddPublisher(node("p"), publisher(3)))
-    assert isinstance(reply.body, Added)
+    assert isinstance(reply.body, AddedReply)
     assert (reply.body.expected, reply.body.hung) == ((), (ExpectedSubscriber(1, "s", "S"),))
     ask(graph, Renew("s", 7, 0, (), (SubscriberCount(1, 0, 0),)))
     assert graph.view().alerts == ()
@@ -358,7 +358,7 @@ def test_unknown_fields_of_newer_peers_are_ignored() -> None:
 
 
 def test_rate_meter_needs_two_readings_and_resets_on_restart() -> None:
-    meter = Meter()
+    meter = TrafficMeter()
     assert meter.rates() is None
     meter.add(0.0, 0, 0)
     assert meter.rates() is None

@@ -14,11 +14,11 @@ import nep
 from nep.backends.zeromq.master_session import RenewalTimer
 from nep.masters import leases
 from nep.masters.graph import Graph
-from nep.masters.leases import LEASE_S, Leases
+from nep.masters.leases import LEASE_DURATION_S, Leases
 from nep.masters.master import Master
 from nep.masters.registry import Registry
 from nep.masters.router import MasterRouter
-from nep.protocol.requests import Join, NodeRecord, Renew, Renewed
+from nep.protocol.requests import Join, NodeRecord, Renew, RenewedReply
 from tests.nep.programs import eventually, running
 
 
@@ -32,16 +32,16 @@ def census_of(nodes: int, managed: int = 0) -> Registry:
 def told(nodes: int, managed: int = 0, rounds: int = 4, within_s: float = 1.0) -> list[list[float]]:
     """When each node renewed, round by round, when all of them started `within_s`."""
     registry = census_of(nodes, managed)
-    found = Leases(registry, LEASE_S)
+    found = Leases(registry, LEASE_DURATION_S)
     due = [within_s * n / nodes for n in range(nodes)]
     times = []
     for _ in range(rounds):
         times.append(due)
-        found.set_renew_interval(min(due))
+        found.update_renew_interval(min(due))
         order = sorted(range(nodes), key=lambda n: due[n])
         next_due = list(due)
         for n in order:
-            found.set_renew_interval(due[n])
+            found.update_renew_interval(due[n])
             next_due[n] = due[n] + found.renew(registry.members[f"n{n}"], due[n])
         due = next_due
     return times
@@ -70,8 +70,8 @@ def test_nodes_of_large_graphs_renew_less_often_and_are_spread_evenly(
 
 def test_slightly_late_renewal_keeps_its_slot() -> None:
     registry = census_of(500)
-    found = Leases(registry, LEASE_S)
-    found.set_renew_interval(0.0)
+    found = Leases(registry, LEASE_DURATION_S)
+    found.update_renew_interval(0.0)
     member = registry.members["n0"]
     at = 10.03
     for late_s in (0.04, 0.0, 0.03, 0.01):
@@ -81,14 +81,14 @@ def test_slightly_late_renewal_keeps_its_slot() -> None:
 
 def test_longer_renewal_interval_extends_the_lease() -> None:
     registry = census_of(500)
-    found = Leases(registry, LEASE_S)
-    found.set_renew_interval(0.0)
+    found = Leases(registry, LEASE_DURATION_S)
+    found.update_renew_interval(0.0)
     assert found.renew(registry.members["n0"], 0.0) == pytest.approx(4.0)
-    assert "n0" not in found.overdue(4.39)
-    assert "n0" in found.overdue(4.41)
-    assert "n0" not in found.expired(5.9)
-    assert "n0" in found.expired(6.1)
-    assert "n1" in found.expired(3.0)  # it was told nothing yet
+    assert "n0" not in found.overdue_node_ids(4.39)
+    assert "n0" in found.overdue_node_ids(4.41)
+    assert "n0" not in found.expired_node_ids(5.9)
+    assert "n0" in found.expired_node_ids(6.1)
+    assert "n1" in found.expired_node_ids(3.0)  # it was told nothing yet
 
 
 def test_master_sends_the_renewal_interval() -> None:
@@ -97,10 +97,10 @@ def test_master_sends_the_renewal_interval() -> None:
         graph.apply(Join(NodeRecord(f"n{n}", f"N{n}", "host", 1)), 1, 0.0, f"n{n}")
     graph.tick(0.0)
     (reply,) = graph.apply(Renew("n0", 7, graph.revision), 1, 1.0, "n0")
-    assert isinstance(reply.body, Renewed)
+    assert isinstance(reply.body, RenewedReply)
     assert reply.body.next_s == pytest.approx(4.0)
     (reply,) = graph.apply(Renew("unknown", 7, graph.revision), 1, 1.0, "unknown")
-    assert reply.body == Renewed(7, graph.revision, again=True)
+    assert reply.body == RenewedReply(7, graph.revision, again=True)
 
 
 def test_node_follows_the_renewal_interval_and_continues_without_replies() -> None:
@@ -138,7 +138,7 @@ def test_killed_program_is_removed_within_3_s_despite_a_longer_renewal_interval(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(leases, "_MAX_RENEWALS_PER_S", 0.01)
-    monkeypatch.setattr(leases, "_MAX_RENEW_S", 20.0)
+    monkeypatch.setattr(leases, "_MAX_RENEW_INTERVAL_S", 20.0)
     with Master("127.0.0.1:0", learn_s=0.0) as master:
         monkeypatch.setenv("NEP_MASTER", master.address)
         with running(PUBLISH) as program, nep.node("tester") as node:
@@ -155,7 +155,7 @@ def test_node_with_a_long_renewal_interval_registers_at_once_at_a_new_master(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(leases, "_MAX_RENEWALS_PER_S", 0.01)
-    monkeypatch.setattr(leases, "_MAX_RENEW_S", 20.0)
+    monkeypatch.setattr(leases, "_MAX_RENEW_INTERVAL_S", 20.0)
     master = Master("127.0.0.1:0", learn_s=0.0).start()
     with nep.node("n", master=master.address) as node:
         pub = node.new_pub("topic")
@@ -183,7 +183,7 @@ def test_router_reports_each_closed_connection_once_after_a_delay() -> None:
     while heard != set(sockets):
         assert port.socket.poll(2000)
         heard.add(port.receive()[0])
-        assert port.peer() == "127.0.0.1"
+        assert port.peer_address() == "127.0.0.1"
     sockets.pop(b"b").close()
     now = 100.0
     eventually(lambda: port.take_ended_senders(now) == [] and b"b" in port._ended)

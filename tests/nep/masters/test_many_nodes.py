@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nep.masters.graph import Graph
-from nep.masters.leases import encode_renewed, read_renewal
+from nep.masters.leases import encode_renewed, parse_renewal
 from nep.masters.master import Master
-from nep.masters.snapshot import GraphViewer
+from nep.masters.snapshot import GraphSnapshotBuilder
 from nep.messages.packing import pack
 from nep.protocol import encoding
 from nep.protocol.encoding import ReplyEncoder, write
@@ -28,7 +28,7 @@ from nep.protocol.requests import (
     QueryGraph,
     RemovePublisher,
     Renew,
-    Renewed,
+    RenewedReply,
     ReportAlerts,
     SubscriberCount,
     SubscriberRecord,
@@ -69,7 +69,7 @@ def renewal(n: int, graph: Graph, count: int = 10, problem: str = "", **more: An
 
 def renew(graph: Graph, request: Renew, now: float) -> bytes | None:
     """The quick way, as the master's loop goes it."""
-    said = read_renewal(encoding.encode_request(request, 7))
+    said = parse_renewal(encoding.encode_request(request, 7))
     if said is None:
         return None
     last_seqs = graph.renew_fast(said, now, said.node_id)
@@ -78,7 +78,7 @@ def renew(graph: Graph, request: Renew, now: float) -> bytes | None:
 
 def view(graph: Graph) -> GraphView:
     """What somebody sees who looks for the first time."""
-    return GraphViewer(graph._registry).view(EPOCH)
+    return GraphSnapshotBuilder(graph._registry).view(EPOCH)
 
 
 def test_fast_renewal_matches_the_normal_path() -> None:
@@ -90,7 +90,7 @@ def test_fast_renewal_matches_the_normal_path() -> None:
             assert body is not None
             (answer,) = long.apply(request, 7, now, f"n{n}")
             assert encoding.decode_reply(body) == (7, answer.body)
-            assert isinstance(answer.body, Renewed)
+            assert isinstance(answer.body, RenewedReply)
             assert set(answer.body.last_seqs) == {100 + (n + 1) % 5}
     assert view(quick) == view(long)
     assert view(quick).topics["t0"].rate_hz is not None
@@ -129,7 +129,7 @@ def test_unusual_renewal_falls_back_to_the_normal_path(change: dict[str, object]
     graph = graph_of(2)
     what = write(renewal(0, graph))
     assert isinstance(what, dict)
-    said = read_renewal(pack({"do": "renew", "call": 7, "what": what | change}))
+    said = parse_renewal(pack({"do": "renew", "call": 7, "what": what | change}))
     assert said is None or graph.renew_fast(said, 1.0, said.node_id) is None
 
 
@@ -140,9 +140,9 @@ def test_invalid_renewal_is_not_parsed_by_the_fast_path(junk: object) -> None:
     begins = encoding.encode_request(Renew("n0", 1, 1), 7)
     bodies_of_junk += [begins[:14] + (junk if isinstance(junk, bytes) else b""), begins[:-1], begins + b"x"]
     for body in bodies_of_junk:
-        assert read_renewal(body) is None
-    assert read_renewal(encoding.encode_request(Ping(), 7)) is None
-    assert read_renewal(begins) is not None
+        assert parse_renewal(body) is None
+    assert parse_renewal(encoding.encode_request(Ping(), 7)) is None
+    assert parse_renewal(begins) is not None
 
 
 KINDS = st.sampled_from(["join", "leave", "renew", "remove", "alert", "retype"])

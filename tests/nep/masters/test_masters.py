@@ -15,16 +15,16 @@ from nep.messages.packing import pack
 from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
-    Done,
+    DoneReply,
     Join,
     Leave,
     NodeRecord,
     Ping,
     PublisherCount,
     PublisherRecord,
-    Refused,
+    RejectedReply,
     Renew,
-    Renewed,
+    RenewedReply,
 )
 from tests.nep.programs import eventually, running
 
@@ -41,7 +41,7 @@ class Attached:
 
     def start(self, master: Master) -> None:
         self.events.append("start")
-        assert isinstance(master.submit(Ping()), Done)
+        assert isinstance(master.submit(Ping()), DoneReply)
         if self.fails:
             raise nep.AddressInUseError("127.0.0.1:7000")
 
@@ -76,7 +76,7 @@ def test_malformed_requests_receive_an_error_and_the_master_survives(master: Mas
             socket.send_multipart(parts)
             assert socket.poll(2000)
             _call, answer = encoding.decode_reply(socket.recv())
-            assert isinstance(answer, Refused)
+            assert isinstance(answer, RejectedReply)
             assert answer.reason
     finally:
         socket.close()
@@ -148,9 +148,9 @@ def test_attachment_that_raises_does_not_stop_the_master(caplog: pytest.LogCaptu
 
 def test_foreign_nodes_can_be_registered_in_process(master: Master) -> None:
     record = PublisherRecord(5, "old/topic", "json", "json")
-    assert not isinstance(master.submit(Join(ORIGINAL, 0, (record,), managed=True)), Refused)
+    assert not isinstance(master.submit(Join(ORIGINAL, 0, (record,), managed=True)), RejectedReply)
     renew = Renew(ORIGINAL.id, master.epoch, 0, (PublisherCount(5, 3, 30, 0),))
-    assert isinstance(master.submit(renew), Renewed)
+    assert isinstance(master.submit(renew), RenewedReply)
     with nep.node("n") as node:
         view = node.graph()
         assert (view.nodes[ORIGINAL.id].generation, view.nodes[ORIGINAL.id].language) == ("A", "JavaScript")
@@ -178,7 +178,7 @@ def test_concurrent_submits_from_many_threads_receive_replies(master: Master) ->
         thread.start()
     for thread in threads:
         thread.join()
-    assert [type(each) for each in replies] == [Done] * 200
+    assert [type(each) for each in replies] == [DoneReply] * 200
 
 
 SLEEPER = "import sys; print('up'); sys.stdin.read()"

@@ -17,7 +17,7 @@ from nep.masters.listen_addresses import check_hosts
 from nep.masters.master import Master
 from nep.masters.process import listen
 from nep.protocol.encoding import decode_reply, encode_request
-from nep.protocol.requests import Listen, Refused
+from nep.protocol.requests import Listen, RejectedReply
 from nep.system.addresses import ANY_HOST, OwnAddress, has_address, own_addresses, reachable_endpoint
 from tests.nep.programs import eventually
 
@@ -108,7 +108,7 @@ def test_listen_request_from_another_computer_is_rejected(far, master):
             _call, answer = decode_reply(asking.recv())
     finally:
         context.destroy(linger=0)
-    assert isinstance(answer, Refused)
+    assert isinstance(answer, RejectedReply)
     assert "master's own computer" in answer.reason
     assert master.view().listens == (OTHER,)
 

@@ -27,7 +27,7 @@ from nep.protocol.requests import (
     Request,
     SubscriberCount,
     SubscriberRecord,
-    node_id_from,
+    derive_node_id,
 )
 from tests.nep.programs import MASTER, eventually, running
 
@@ -95,7 +95,7 @@ def _attackers_end(siege: Siege) -> Iterator[None]:
 
 
 def mallory(n: int) -> NodeRecord:
-    return NodeRecord(node_id_from(f"k{n}"), f"Mallory {n}", "host", 1, key=f"k{n}")
+    return NodeRecord(derive_node_id(f"k{n}"), f"Mallory {n}", "host", 1, key=f"k{n}")
 
 
 def say(socket: zmq.Socket[bytes], *requests: Request) -> None:

@@ -199,7 +199,7 @@ def picture() -> np.ndarray:
 def test_image_array_is_published_as_jpeg(picture: np.ndarray) -> None:
     data, extension = codec("image").encode(picture)
     assert extension == {"shape": [48, 64, 3], "encoding": "jpeg"}
-    assert image_codec.picture_info(data) == extension
+    assert image_codec.image_info(data) == extension
     read = back("image", picture)
     assert isinstance(read, np.ndarray)
     assert (read.shape, read.dtype) == ((48, 64, 3), np.uint8)

@@ -30,7 +30,7 @@ def test_decompression_bomb_is_rejected_before_decoding(name: str) -> None:
     with pytest.raises(DecodeError) as caught:
         parse_header(data)
     assert caught.value.size_bytes == len(data)
-    assert image_codec.picture_info(data) is None
+    assert image_codec.image_info(data) is None
     with pytest.raises(EncodeError):
         codec("image").encode(data)
 
@@ -138,7 +138,7 @@ def test_exif_orientation_is_applied_on_decode(kind: str, orientation: int, orde
     read = codec("image").decode(memoryview(made), {})
     assert isinstance(read, np.ndarray)
     assert np.array_equal(read, cv2.imdecode(np.frombuffer(made, np.uint8), cv2.IMREAD_COLOR))
-    assert image_codec.picture_info(made) == {"shape": list(read.shape), "encoding": kind}
+    assert image_codec.image_info(made) == {"shape": list(read.shape), "encoding": kind}
 
 
 def test_progressive_jpeg_and_jpeg_with_restart_markers_are_decoded() -> None:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import nep
 from nep.errors import DecodeError, EncodeError
 from nep.messages.codecs import codec
-from nep.messages.nesting import MAX_LEVELS, json_is_too_deep, packed_is_too_deep
+from nep.messages.nesting import MAX_LEVELS, is_json_too_deep, is_packed_too_deep
 from nep.messages.packing import pack
 
 SENTENCE = "the value has more than 64 levels of lists and maps"
@@ -95,7 +95,7 @@ def levels_of(value: object) -> int:
 def test_depth_check_of_json_bytes_matches_depth_of_the_value(value: object, around: int) -> None:
     for _level in range(around):
         value = [value, "]"]
-    assert json_is_too_deep(orjson.dumps(value)) == (levels_of(value) > MAX_LEVELS)
+    assert is_json_too_deep(orjson.dumps(value)) == (levels_of(value) > MAX_LEVELS)
 
 
 PACKED_VALUES = st.recursive(
@@ -125,7 +125,7 @@ def test_depth_check_of_decoded_msgpack_matches_depth_of_the_value(
         value = {"a": value} if kind == "map" else (value,) if kind == "tuple" else [value]
     value = [value, padding]
     data = pack(value)
-    assert packed_is_too_deep(data, value) == (levels_of(value) > MAX_LEVELS)
+    assert is_packed_too_deep(data, value) == (levels_of(value) > MAX_LEVELS)
 
 
 @pytest.mark.parametrize("inner", [[], {}, [1], {"a": 1}, 1, "text"])
@@ -135,7 +135,7 @@ def test_empty_lists_and_maps_count_as_levels(levels: int, inner: object) -> Non
     for _level in range(levels - levels_of(inner)):
         value = [value, *range(8)]
     assert levels_of(value) == levels
-    assert packed_is_too_deep(pack(value) + bytes(4096), value) == (levels > MAX_LEVELS)
+    assert is_packed_too_deep(pack(value) + bytes(4096), value) == (levels > MAX_LEVELS)
 
 
 def test_utf16_json_does_not_bypass_the_depth_limit() -> None:

@@ -26,7 +26,7 @@ def through(payload: Any, codec: Codec = JSON) -> Any:
 
 def read(declared: type, data: bytes | memoryview, codec: Codec = JSON) -> Any:
     kind = MessageKind("t", codec.name, "t", False, codec.decode)
-    return TypedReader(message_type(declared)).typed(received_message(kind, data, None, 1, 1)).payload
+    return TypedReader(message_type(declared)).convert(received_message(kind, data, None, 1, 1)).payload
 
 
 _ROS = {
@@ -60,7 +60,7 @@ def test_robot_types_round_trip_as_ros2_types(name: str) -> None:
     encoded = typed_codec(message_type(type(payload)), mapping.codec).encode(payload)
     kind = mapping.kind("t", name, is_latched=False)
     reader = TypedReader(message_type(type(payload)))
-    came = reader.typed(received_message(kind, mapping.unpack(mapping.pack(encoded)), None, 1, 1)).payload
+    came = reader.convert(received_message(kind, mapping.unpack(mapping.pack(encoded)), None, 1, 1)).payload
     assert came == payload
 
 

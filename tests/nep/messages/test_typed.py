@@ -129,7 +129,7 @@ def read(declared: type, plain: object, codec: str = "json") -> Any:
 
 
 def read_bytes(declared: type, data: bytes | memoryview, codec: str = "json") -> Any:
-    return TypedReader(message_type(declared)).typed(Message("t", data, codec, codec)).payload
+    return TypedReader(message_type(declared)).convert(Message("t", data, codec, codec)).payload
 
 
 def refused(declared: type, plain: object) -> str:
@@ -226,7 +226,7 @@ def test_numpy_numbers_and_arrays_in_typed_messages_are_encoded() -> None:
 def test_decoded_lists_are_not_shared_between_readers() -> None:
     message = Message("t", b'{"position":[1.0]}', "json", "json")
     reader = TypedReader(message_type(nep.sensor.JointState))
-    first, second = reader.typed(message).payload, reader.typed(message).payload
+    first, second = reader.convert(message).payload, reader.convert(message).payload
     first.position.append(2.0)
     assert second.position == [1.0]
     assert message.payload == {"position": [1.0]}

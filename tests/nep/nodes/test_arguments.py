@@ -237,7 +237,7 @@ def test_invalid_endpoint_does_not_block_other_publishers(
             assert "\x1b" not in transport.counts().problem + caplog.text
             for each in bad:
                 transport.publisher_removed(each.publisher.id, 0, is_closed=False)
-            socket.refusals = type(socket.refusals)()
+            socket.rejections = type(socket.rejections)()
             assert transport.counts().problem == ""
 
 

@@ -12,11 +12,11 @@ import pytest
 import zmq
 
 from nep.backends.zeromq.rpc import RpcClient
-from nep.masters.bad_requests import BadRequests
+from nep.masters.bad_requests import BadRequestCounter
 from nep.masters.graph import Graph
 from nep.masters.registry import Registry
 from nep.masters.router import MasterRouter
-from nep.masters.snapshot import GraphViewer
+from nep.masters.snapshot import GraphSnapshotBuilder
 from nep.programs.gateway.attachment import NativeNetwork
 from nep.programs.gateway.framing import PORT_A
 from nep.programs.gateway.graph_registrar import GraphRegistrar
@@ -27,7 +27,7 @@ from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.protocol.requests import (
     AddPublisher,
-    Done,
+    DoneReply,
     GraphReply,
     Join,
     NodeRecord,
@@ -35,7 +35,7 @@ from nep.protocol.requests import (
     PublisherRecord,
     QueryGraph,
     Renew,
-    Renewed,
+    RenewedReply,
     SubscriberCount,
     SubscriberRecord,
     TopicPublishers,
@@ -52,7 +52,7 @@ def census_with_node() -> Registry:
 
 def test_removed_topics_leave_no_entries_in_master_tables() -> None:
     registry = census_with_node()
-    member, viewer = registry.members["n"], GraphViewer(registry)
+    member, viewer = registry.members["n"], GraphSnapshotBuilder(registry)
     for n in range(20_000):
         registry.add_publisher(member, PublisherRecord(1, f"/p{n}", "json", "json", ("tcp://h:1",)))
         registry.add_subscriber(member, SubscriberRecord(2, f"/s{n}", "json"))
@@ -69,7 +69,7 @@ def test_removed_topics_leave_no_entries_in_master_tables() -> None:
 
 def test_topic_with_a_changed_type_is_updated_in_the_next_graph_view() -> None:
     registry = census_with_node()
-    member, viewer = registry.members["n"], GraphViewer(registry)
+    member, viewer = registry.members["n"], GraphSnapshotBuilder(registry)
     registry.add_publisher(member, PublisherRecord(1, "/t", "json", "json"))
     assert viewer.view(7).topics["/t"].msg_type == "json"
     registry.remove_publisher("n", 1)
@@ -85,7 +85,7 @@ def test_renewal_reports_a_topic_whose_last_publisher_was_removed() -> None:
     graph.apply(AddPublisher(NodeRecord("p", "P", "h", 1), publisher), 1, 0.0, "p")
     graph.unregister_nodes(["p"])
     (reply,) = graph.apply(Renew("s", 7, revision, (), (SubscriberCount(2, 0, 0),)), 1, 0.5, "s")
-    assert isinstance(reply.body, Renewed)
+    assert isinstance(reply.body, RenewedReply)
     assert reply.body.topics == (TopicPublishers("/t", ()),)
 
 
@@ -93,7 +93,7 @@ def test_malformed_requests_of_many_senders_are_logged_at_a_bounded_rate(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level(logging.WARNING, "nep.master")
-    bad = BadRequests()
+    bad = BadRequestCounter()
     for n in range(10_000):
         bad.add(f"{n}", f"S{n}", "reason", 100.0 + n / 1000)
     assert len(caplog.records) <= 13
@@ -130,10 +130,10 @@ def test_graph_reply_without_a_pending_call_is_not_decoded(pair: SimpleNamespace
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, _body = pair.router.recv_multipart()
     pair.router.send_multipart([sender, encoding.encode_reply(GraphReply(7, 1, GraphView(7, 1)), 12345)])
-    pair.router.send_multipart([sender, encoding.encode_reply(Done(7, 1), 1)])
+    pair.router.send_multipart([sender, encoding.encode_reply(DoneReply(7, 1), 1)])
     answers: list[object] = []
     eventually(lambda: bool(answers.extend(pair.calls.read()) or answers))
-    assert [type(each.content) for each in answers] == [Done]  # type: ignore[attr-defined]
+    assert [type(each.content) for each in answers] == [DoneReply]  # type: ignore[attr-defined]
 
 
 def test_many_pushes_are_read_in_batches(pair: SimpleNamespace) -> None:
@@ -141,7 +141,7 @@ def test_many_pushes_are_read_in_batches(pair: SimpleNamespace) -> None:
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, _body = pair.router.recv_multipart()
     for _ in range(120):
-        pair.router.send_multipart([sender, encoding.encode_reply(Renewed(7, 1))])
+        pair.router.send_multipart([sender, encoding.encode_reply(RenewedReply(7, 1))])
     sizes: list[int] = []
 
     def read() -> bool:

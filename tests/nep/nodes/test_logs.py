@@ -19,8 +19,8 @@ from nep.nodes.log_handler import (
     MAX_TEXT_LENGTH,
     LogHandler,
     LogRecord,
-    ShownErrors,
-    level_of,
+    NewErrorFilter,
+    parse_level,
 )
 from tests.nep.programs import eventually, running
 
@@ -83,7 +83,7 @@ def test_error_publisher_is_not_opened_without_errors(kept):
 
 
 def test_error_received_on_both_topics_is_shown_once():
-    shown = ShownErrors()
+    shown = NewErrorFilter()
     one, two = ({"level": "error", "text": text, "node": "robot", "stamp_ns": 7} for text in ("one", "two"))
     assert shown.is_new(LogRecord.from_plain(one))
     assert [record.text for record in shown.new_records([two, one])] == ["two"]
@@ -97,11 +97,11 @@ def test_error_received_on_both_topics_is_shown_once():
     "payload", [None, 7, "text", {}, [None], [[]], [{}], [{"stamp_ns": 2**70, "level": "error"}]]
 )
 def test_malformed_error_list_is_ignored(payload):
-    assert ShownErrors().new_records(payload) == []
+    assert NewErrorFilter().new_records(payload) == []
 
 
 def test_memory_of_shown_errors_is_bounded():
-    shown = ShownErrors()
+    shown = NewErrorFilter()
     for number in range(5000):
         assert shown.is_new(LogRecord("error", "x", "n", "robot", number + 1))
     assert len(shown._shown) <= 2000
@@ -219,8 +219,8 @@ def test_any_payload_is_converted_to_a_log_record(payload, level, text):
 
 
 def test_log_level_names_are_mapped():
-    assert [level_of(name.upper()) for name in LEVELS] == list(LEVELS)
-    assert level_of(None) == "info"
+    assert [parse_level(name.upper()) for name in LEVELS] == list(LEVELS)
+    assert parse_level(None) == "info"
 
 
 def test_subscriber_receives_log_records_that_closing_the_node_flushes(master):

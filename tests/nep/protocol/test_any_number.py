@@ -18,13 +18,13 @@ from hypothesis import strategies as st
 import nep
 from nep.errors import WireError
 from nep.masters.graph import Graph, with_hosts
-from nep.masters.leases import encode_renewed, read_renewal
+from nep.masters.leases import encode_renewed, parse_renewal
 from nep.masters.master import Master
 from nep.messages.packing import pack_saturated
 from nep.protocol import encoding, requests, wire
 from nep.protocol.encoding import ReplyEncoder
 from nep.protocol.requests import (
-    COUNT_MAX,
+    MAX_COUNT,
     AddPublisher,
     AddSubscriber,
     GraphReply,
@@ -109,14 +109,14 @@ def test_every_fast_renewal_reply_can_be_decoded(
     last_seqs: dict[int, int], epoch: int, next_s: float
 ) -> None:
     call, read = encoding.decode_reply(encode_renewed(7, epoch, epoch, last_seqs, ("h",), next_s))
-    assert (call, type(read)) == (7, requests.Renewed)
+    assert (call, type(read)) == (7, requests.RenewedReply)
 
 
 @MANY
 @given(st.sampled_from(sorted(encoding._REQUESTS)), PLAIN, PLAIN)
 def test_arbitrary_requests_and_replies_raise_only_wire_errors(name: str, what: object, call: object) -> None:
     encoding.decode_request(pack_saturated({"do": name, "call": call, "what": what}))
-    read_renewal(pack_saturated({"do": "renew", "call": call, "what": what}))
+    parse_renewal(pack_saturated({"do": "renew", "call": call, "what": what}))
     for answer in encoding._REPLIES:
         with contextlib.suppress(WireError):
             encoding.decode_reply(pack_saturated({"is": answer, "re": call, "what": what}))
@@ -142,10 +142,10 @@ def test_arbitrary_requests_do_not_raise_in_the_graph_or_break_its_view(
     call, seen = encoding.decode_reply(packer.encode(answer.body, 5))
     assert (call, type(seen)) == (5, GraphReply)
     for topic in answer.body.view.topics.values():
-        assert topic.lost is None or 0 <= topic.lost <= COUNT_MAX
+        assert topic.lost is None or 0 <= topic.lost <= MAX_COUNT
         for told in topic.publishers:
-            assert 0 <= told.count <= COUNT_MAX
-            assert 0 <= told.bytes <= COUNT_MAX
+            assert 0 <= told.count <= MAX_COUNT
+            assert 0 <= told.bytes <= MAX_COUNT
             assert told.rate_hz is None or math.isfinite(told.rate_hz)
 
 
@@ -231,7 +231,7 @@ def test_invalid_cpu_share_is_ignored(value: float) -> None:
     for request in (Renew("n", 7, 99, (), (), value),):
         graph.apply(request, 1, 0.1, "n")
         assert graph.view().nodes["n"].cpu_ratio is None
-        said = read_renewal(encoding.encode_request(request, 1))
+        said = parse_renewal(encoding.encode_request(request, 1))
         assert said is not None
         assert graph.renew_fast(said, 0.2, "n") is not None
         assert graph.view().nodes["n"].cpu_ratio is None
@@ -251,10 +251,10 @@ def test_summed_counts_saturate_at_64_bits() -> None:
         request = Renew("n", 7, 99, (PublisherCount(9, most, most, most, most),), counts)
         graph.apply(request, 1, now, "n")
         topic = graph.view().topics["/t"]
-        assert topic.lost == COUNT_MAX
+        assert topic.lost == MAX_COUNT
         assert topic.loss_ratio is not None
         assert 0.0 <= topic.loss_ratio <= 1.0
-        assert topic.publishers[0].count == (0 if most < 0 else COUNT_MAX)
+        assert topic.publishers[0].count == (0 if most < 0 else MAX_COUNT)
     (alert,) = graph.view().alerts
     assert alert.sentence.isprintable()
     assert len(alert.sentence) < 4000

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nep.messages.clocks import OFFSET_MAX_NS, SAME_CLOCK, ClockDifference, PublisherClock, drift_ns
+from nep.messages.clocks import MAX_OFFSET_NS, SAME_CLOCK, ClockDifference, PublisherClock, drift_ns
 from nep.protocol.clock_samples import ClockSamples, Moment
 
 MS = 1_000_000
@@ -185,4 +185,4 @@ def test_clock_uncertainty_grows_only_between_different_clocks() -> None:
     assert SAME_CLOCK.uncertainty_at(10**18) == 0
     assert PublisherClock().seconds() is None
     assert PublisherClock(SAME_CLOCK).seconds() == (0.0, 0.0)
-    assert OFFSET_MAX_NS > 10 * 365 * 86_400 * S
+    assert MAX_OFFSET_NS > 10 * 365 * 86_400 * S

@@ -80,7 +80,7 @@ def test_filter_is_decoded_and_encoded(vector: dict[str, Any]) -> None:
         assert wire.topic_part(said["topic"]) == part
     elif kind == "hello":
         assert hello is not None
-        level = hello.one_part + hello.acknowledges + hello.batches
+        level = hello.reads_one_part + hello.acknowledges + hello.reads_batches
         assert (str(hello.subscriber), hello.topic, level) == (
             said["subscriber"],
             said["topic"],

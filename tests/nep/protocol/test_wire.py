@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from nep.errors import BadTopicError, WireError
 from nep.protocol import wire
-from nep.protocol.requests import id_from, node_id_from
+from nep.protocol.requests import derive_id, derive_node_id
 
 VECTORS = json.loads((Path(__file__).parents[2] / "data" / "wire" / "messages.json").read_text("utf-8"))
 
@@ -53,10 +53,10 @@ def test_payload_of_another_size_than_declared_is_rejected(payload: bytes, told:
 
 
 def test_fast_header_packing_matches_the_header_class() -> None:
-    head = wire.pack_header(wire.form_of(3, wire.LATCHED), 17, 5, 6, 7)
+    head = wire.pack_header(wire.encode_form(3, wire.LATCHED), 17, 5, 6, 7)
     assert head == wire.Header(3, wire.LATCHED, 5, 6, 7, 17).pack()
     assert wire.read_header(head) == wire.Header(3, wire.LATCHED, 5, 6, 7, 17)
-    assert wire.unpack_header(head) == (wire.form_of(3, wire.LATCHED), 17, 5, 6, 7)
+    assert wire.unpack_header(head) == (wire.encode_form(3, wire.LATCHED), 17, 5, 6, 7)
 
 
 @given(st.lists(st.binary(max_size=60), max_size=5))
@@ -177,5 +177,5 @@ def test_ids_derived_from_the_key_match_the_vectors() -> None:
     vectors = json.loads((Path(__file__).parents[2] / "data" / "wire" / "ids.json").read_text("utf-8"))
     assert len(vectors["nodes"]) == 3
     for each in vectors["nodes"]:
-        assert node_id_from(each["key"]) == each["node_id"]
-        assert {number: str(id_from(each["key"], int(number))) for number in each["ids"]} == each["ids"]
+        assert derive_node_id(each["key"]) == each["node_id"]
+        assert {number: str(derive_id(each["key"], int(number))) for number in each["ids"]} == each["ids"]

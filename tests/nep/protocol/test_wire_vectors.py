@@ -22,7 +22,7 @@ from nep.messages.codecs import codec_by_number
 from nep.messages.encoded import Encoded
 from nep.messages.packing import unpack
 from nep.protocol import wire
-from nep.protocol.batch import batch_part
+from nep.protocol.batch import encode_batch
 from tests.nep.programs import eventually
 
 DATA = Path(__file__).parents[2] / "data" / "wire"
@@ -169,8 +169,8 @@ def test_subscriber_decodes_a_batch(
     payloads = [bytes.fromhex(means["payload"]) for means in said]
     first = said[0]
     stamps = [means["stamp_ns"] for means in said]
-    form = wire.form_of(first["codec"], 0)
-    assert batch_part(b"example\0", form, first["seq"], first["publisher"], stamps, payloads) == part
+    form = wire.encode_form(first["codec"], 0)
+    assert encode_batch(b"example\0", form, first["seq"], first["publisher"], stamps, payloads) == part
 
 
 @pytest.mark.parametrize("vector", BAD, ids=name_of)

@@ -80,8 +80,8 @@ def test_every_mcap_variant_of_other_programs_is_read(tmp_path: Path, kind: str)
         assert (recording.start_ns, recording.end_ns) == (SECOND, 2 * SECOND)
         assert recording.newest(SECOND + 105 * 10**6)["/wheel"].message.payload == {"rpm": 10}
         assert sum(recording.densities(SECOND, 2 * SECOND, 7)["/wheel"]) == COUNT
-        assert ("robot", {"serial": "12"}) in recording.facts.metadata
-        assert [each.name for each in recording.facts.attachments] == ["map.png"]
+        assert ("robot", {"serial": "12"}) in recording.info.metadata
+        assert [each.name for each in recording.info.attachments] == ["map.png"]
         assert not recording.corruption
     assert [each.name for each in tmp_path.iterdir()] == ["theirs.mcap"]
 
@@ -158,8 +158,8 @@ def test_exported_range_keeps_encodings_schemas_and_metadata_without_loss_counts
         }
         assert recording.topics["/lamp"].encoding == "cdr"
         assert recording.topics["/wheel"].schema_encoding == "jsonschema"
-        assert recording.facts.profile == "ros2"
-        assert ("robot", {"serial": "12"}) in recording.facts.metadata
+        assert recording.info.profile == "ros2"
+        assert ("robot", {"serial": "12"}) in recording.info.metadata
         assert [bytes(raw.data) for raw in recording.read_raw()] == [b'{"rpm": %d}' % n for n in range(20)]
 
 

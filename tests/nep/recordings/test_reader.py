@@ -235,7 +235,7 @@ def test_messages_of_overlapping_chunks_are_read_in_order(tmp_path, everything):
     path = tmp_path / "a.mcap"
     record(path, [ALL[:1]])
     with Recording(path) as opened:
-        table_of = opened.facts.channels
+        table_of = opened.info.channels
     writer = FileWriter(tmp_path / "b.mcap")
     for number, definition in table_of.items():
         writer.table.add_numbered(number, definition)

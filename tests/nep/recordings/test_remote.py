@@ -39,7 +39,7 @@ def reader(path: Path) -> Iterator[ReaderProcess]:
 
 def test_remote_reader_returns_the_same_as_a_local_reader(path: Path, reader: ReaderProcess) -> None:
     with Recording(path) as here, reader.open(path) as there:
-        assert there.facts == here.facts
+        assert there.info == here.info
         assert there.topics == here.topics
         assert [(at, kept(each)) for at, each in there.read()] == [
             (at, kept(each)) for at, each in here.read()

@@ -89,7 +89,7 @@ def test_repair_drops_only_the_damaged_chunk_and_counts_its_messages(path, tmp_p
     report = repair(tmp_path / "a.mcap")
     gone = {kept(each) for each in PARTS[4]}
     assert read(report.path) == [kept(each) for each in ALL if kept(each) not in gone]
-    assert (report.discarded, report.damaged_range_count) == (len(PARTS[4]), 1)
+    assert (report.discarded, report.corrupt_range_count) == (len(PARTS[4]), 1)
     assert report.discarded_bytes >= chunks[4].length
 
 

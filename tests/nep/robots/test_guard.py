@@ -33,19 +33,19 @@ def describe(robot: nep.Node, name: str, command: str) -> None:
 def test_later_robot_is_protected_on_every_topic_of_its_description(network: str, node: nep.Node) -> None:
     guard = MotionGuard(node)
     assert guard.wait_for_descriptions(1.0)
-    assert guard.refusal("/orders") == ""
+    assert guard.denial_reason("/orders") == ""
     with nep.node("robot", "memory", master=network) as robot:
         describe(robot, "Rover", "/orders")
         guard.wait_for_descriptions(5.0)
-        said = guard.refusal("/orders")
+        said = guard.denial_reason("/orders")
         assert "Rover" in said
         assert "--allow-moving Rover" in said  # its claim to be virtual is not believed
-        assert "--allow-moving Rover" in guard.refusal("robot_action")
-        assert guard.refusal("/weather") == ""
+        assert "--allow-moving Rover" in guard.denial_reason("robot_action")
+        assert guard.denial_reason("/weather") == ""
         describe(robot, "Rover", "/others")
-        eventually(lambda: (guard.poll(), guard.refusal("/others"))[1])
+        eventually(lambda: (guard.poll(), guard.denial_reason("/others"))[1])
     guard.poll()
-    assert guard.refusal("/orders")  # it may only have lost its connection
+    assert guard.denial_reason("/orders")  # it may only have lost its connection
     guard.close()
 
 
@@ -55,9 +55,9 @@ def test_allowed_robots_and_topics_are_not_rejected(network: str, node: nep.Node
         describe(robot, "Fido", "/orders")
         guard = MotionGuard(node, ["Rover"])
         assert guard.wait_for_descriptions(5.0)
-        assert guard.refusal("/orders").count("--allow-moving") == 1
-        assert "--allow-moving Fido" in guard.refusal("/orders")
-        assert MotionGuard(node, ["/new"]).refusal("/new", "robot/command") == ""
+        assert guard.denial_reason("/orders").count("--allow-moving") == 1
+        assert "--allow-moving Fido" in guard.denial_reason("/orders")
+        assert MotionGuard(node, ["/new"]).denial_reason("/new", "robot/command") == ""
         guard.close()
 
 
@@ -69,8 +69,8 @@ def test_unreadable_description_protects_all_topics_its_program_subscribes_to(
         robot.new_sub("/orders")
         guard = MotionGuard(node)
         assert not guard.wait_for_descriptions(0.2)
-        assert "--allow-moving Rover" in guard.refusal("/orders")
-        assert guard.refusal("/weather") == ""
+        assert "--allow-moving Rover" in guard.denial_reason("/orders")
+        assert guard.denial_reason("/weather") == ""
         guard.close()
 
 
@@ -94,10 +94,10 @@ def test_hostile_descriptions_do_not_stop_the_guard_or_reduce_protection(
         for payload in HOSTILE:
             strange.publish(payload)
             guard.poll()
-            assert "Rover" in guard.refusal("/orders")
-            guard.refusal("/a/b").encode()
+            assert "Rover" in guard.denial_reason("/orders")
+            guard.denial_reason("/a/b").encode()
         for data in (b"[" * 100_000, b" " * 1_000_001, b'{"title":"\\ud800"}', b"\xff"):
             strange.publish_bytes(data)
             guard.poll()
-            assert "Rover" in guard.refusal("/orders")
+            assert "Rover" in guard.denial_reason("/orders")
         guard.close()

@@ -12,7 +12,7 @@ import zmq
 import nep
 from nep.backends.connection import Hybrid
 from nep.masters.master import Master
-from nep.protocol.requests import AddPublisher, NodeRecord, PublisherRecord, id_from, node_id_from
+from nep.protocol.requests import AddPublisher, NodeRecord, PublisherRecord, derive_id, derive_node_id
 from nep.protocol.service_wire import topic_of
 from tests.nep.programs import eventually, running
 
@@ -129,11 +129,11 @@ def test_calls_continue_while_the_master_is_unreachable() -> None:
 def test_call_reaches_a_server_despite_an_unreachable_server_of_the_same_name(master: Master, client) -> None:
     """Something is listed first whose port is closed."""
     key = "k" * 20
-    node = NodeRecord(node_id_from(key), "ghost", "", None, key=key)
+    node = NodeRecord(derive_node_id(key), "ghost", "", None, key=key)
     with zmq.Context() as context, context.socket(zmq.ROUTER) as hole:
         port = hole.bind_to_random_port("tcp://127.0.0.1")
     record = PublisherRecord(
-        id_from(key, 1), topic_of("/x"), "service", "service", (f"tcp://127.0.0.1:{port}",), number=1
+        derive_id(key, 1), topic_of("/x"), "service", "service", (f"tcp://127.0.0.1:{port}",), number=1
     )
     master.submit(AddPublisher(node, record))
     with nep.node("server") as real:
@@ -240,8 +240,10 @@ class _fake_server:  # noqa: N801 - it reads as a function
         self._socket.linger = 0
         endpoint = f"tcp://127.0.0.1:{self._socket.bind_to_random_port('tcp://127.0.0.1')}"
         key = "f" * 20
-        node = NodeRecord(node_id_from(key), "fake", "", None, key=key)
-        record = PublisherRecord(id_from(key, 1), topic_of("/x"), "service", "service", (endpoint,), number=1)
+        node = NodeRecord(derive_node_id(key), "fake", "", None, key=key)
+        record = PublisherRecord(
+            derive_id(key, 1), topic_of("/x"), "service", "service", (endpoint,), number=1
+        )
         master.submit(AddPublisher(node, record))
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="fake-server")

@@ -70,9 +70,9 @@ def test_malformed_parts_are_rejected_with_their_error_code(
     ours, theirs = stream
     theirs.sendall(bytes.fromhex(vector["tcp"]))
     theirs.shutdown(socket.SHUT_WR)
-    while not ours.is_over:
+    while not ours.has_ended:
         ours.read()
-        if ours.is_over:
+        if ours.has_ended:
             break
     with pytest.raises(WireError) as refused:
         ours.next()

@@ -224,7 +224,7 @@ def test_reply_sent_just_before_connection_close_is_received(node: nep.Node, por
 def test_connections_beyond_the_limit_are_closed(
     node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("nep.backends.zeromq.services.tcp_server._PEERS_MAX", 2)
+    monkeypatch.setattr("nep.backends.zeromq.services.tcp_server._MAX_PEERS", 2)
     serve(node, port)
     with Program(port) as one, Program(port) as two:
         for each in (one, two):
@@ -251,7 +251,7 @@ def _is_answered(port: int) -> bool:
 def test_unread_replies_are_bounded(
     node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("nep.backends.zeromq.services.tcp_server._UNREAD_MAX_BYTES", 10_000_000)
+    monkeypatch.setattr("nep.backends.zeromq.services.tcp_server._MAX_UNREAD_BYTES", 10_000_000)
     caplog.set_level(logging.WARNING)
     answer = {"x": "y" * 4_000_000}
     server = node.new_server(

@@ -14,7 +14,7 @@ from nep.backends.zeromq.io_thread import SharedContext, shared_context
 from nep.backends.zeromq.master_session import MasterSession
 from nep.masters.master import Master
 from nep.protocol.requests import NodeRecord
-from nep.system.addresses import MasterName
+from nep.system.addresses import MasterNameResolver
 from tests.nep.programs import eventually
 
 
@@ -48,7 +48,7 @@ class Book:
 )
 def test_numeric_addresses_are_not_resolved(address: str, known: str) -> None:
     book = Book()
-    name = MasterName(address, lambda _known: None, book.look_up)
+    name = MasterNameResolver(address, lambda _known: None, book.look_up)
     name.resolve(1.0)
     assert name.known == known
     assert name.wait(0.0)
@@ -58,7 +58,7 @@ def test_numeric_addresses_are_not_resolved(address: str, known: str) -> None:
 def test_host_name_is_resolved_again_only_after_an_interval(caplog: pytest.LogCaptureFixture) -> None:
     book, told = Book("", "", "10.0.0.5", "10.0.0.5", "10.0.0.6"), []
     book.may_answer.set()
-    name = MasterName("robot:7780", told.append, book.look_up)
+    name = MasterNameResolver("robot:7780", told.append, book.look_up)
 
     def look(now: float) -> None:
         name.resolve(now)
@@ -108,7 +108,7 @@ def test_unanswered_name_lookup_does_not_block_other_nodes(shared: SharedContext
             assert link.endpoint == f"tcp://127.0.0.1:{port}"
         finally:
             book.may_answer.set()
-            link.begin_leave()
+            link.start_leave()
             link.close()
 
 

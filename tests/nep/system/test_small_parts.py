@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 import nep
 from nep.backends.base import Backend
 from nep.backends.zeromq.io_thread import IoThread, PollState
-from nep.backends.zeromq.loss import UNLISTED_MAX, PublisherTracker
+from nep.backends.zeromq.loss import MAX_UNLISTED_PUBLISHERS, PublisherTracker
 from nep.backends.zeromq.subscriptions import MAX_SUBSCRIBERS, Subscriptions
 from nep.errors import PluginsMissingError, did_you_mean
 from nep.messages.message import Message
@@ -422,14 +422,14 @@ def test_number_of_unlisted_publishers_is_bounded() -> None:
         sources.add_listed(remote(number))
     for number in range(100, 5000):
         assert sources.count_message(number, 2**64 - 1, is_alone=False)
-    assert len(sources.by_id) == UNLISTED_MAX + 10
+    assert len(sources.by_id) == MAX_UNLISTED_PUBLISHERS + 10
     assert all(sources.find(number) is not None for number in (*range(1, 11), 4999))
     assert (sources.received, sources.lost) == (4900, 0)
     sources.add_listed(remote(4999))
     sources.pop(4998)
     for number in range(10_000, 20_000):
         sources.get(number)
-    assert len(sources.by_id) == UNLISTED_MAX + 11
+    assert len(sources.by_id) == MAX_UNLISTED_PUBLISHERS + 11
 
 
 def test_number_of_subscribers_that_get_an_echo_is_bounded() -> None:
@@ -440,7 +440,7 @@ def test_number_of_subscribers_that_get_an_echo_is_bounded() -> None:
     assert (
         len(subscriptions.seen) == len(subscriptions.hellos) == len(subscriptions.windows) == MAX_SUBSCRIBERS
     )
-    assert subscriptions.refusals.count == 1000
+    assert subscriptions.rejections.count == 1000
     assert subscriptions.handle_event(b"\1" + hello_part(5, "t", tells=True), 0) is not None  # it came again
     assert subscriptions.handle_event(b"\0" + hello_part(5, "t", tells=True), 0) is None
     assert subscriptions.handle_event(b"\1" + hello_part(77_777, "t"), 0) is not None
@@ -463,7 +463,7 @@ def test_sink_batch_size_is_bounded() -> None:
 
 def test_silent_publishers_beyond_a_limit_expire() -> None:
     sources = PublisherTracker()
-    for number in range(1, UNLISTED_MAX + 11):
+    for number in range(1, MAX_UNLISTED_PUBLISHERS + 11):
         sources.add_listed(remote(number, name=f"N{number}")).is_silent = number != 5
     assert sources.expired_publishers(0.0) == [1, 2, 3, 4, 6, 7, 8, 9, 10]
 

@@ -7,7 +7,7 @@ import hashlib
 import pytest
 
 from nep.errors import NepError
-from nep.programs.web.access import Access, AuthCheck, checked_origin
+from nep.programs.web.access import Access, AuthVerifier, checked_origin
 from nep.programs.web.messages.operations import Auth
 from nep.programs.web.server import WebServer, WebSettings, node_name
 
@@ -37,23 +37,23 @@ from nep.programs.web.server import WebServer, WebSettings, node_name
     ],
 )
 def test_page_connects_only_from_an_allowed_origin(origin: str | None, is_allowed: bool) -> None:
-    refusal = Access(frozenset({"http://192.168.1.5:8000"})).origin_refusal(origin)
+    refusal = Access(frozenset({"http://192.168.1.5:8000"})).origin_rejection_reason(origin)
     assert (refusal == "") is is_allowed
     assert refusal.isprintable()
 
 
 def test_pages_served_by_the_web_server_are_allowed_at_its_address_only() -> None:
     own = "http://192.168.1.5:9090"
-    assert Access().origin_refusal(own, own) == ""
+    assert Access().origin_rejection_reason(own, own) == ""
     for other in ("http://192.168.1.5:8000", "https://192.168.1.5:9090", "http://192.168.1.6:9090"):
-        assert Access().origin_refusal(other, own)
-    assert Access().origin_refusal("", "")
+        assert Access().origin_rejection_reason(other, own)
+    assert Access().origin_rejection_reason("", "")
 
 
 def test_origin_is_normalized_as_by_browsers() -> None:
     assert checked_origin("HTTP://Example.ORG:80/") == "http://example.org"
     for origin in ("null", "file://"):
-        assert Access({checked_origin(origin)}).origin_refusal(origin) == ""
+        assert Access({checked_origin(origin)}).origin_rejection_reason(origin) == ""
     for wrong in ("example.org", "ws://example.org", "http://", "*", "http://a/b", "http://a?b"):
         with pytest.raises(NepError):
             checked_origin(wrong)
@@ -77,7 +77,7 @@ def signed(token: str, time_s: int, end_s: int, rand: str = "r") -> Auth:
 
 
 def test_auth_is_accepted_once_and_for_a_limited_time() -> None:
-    check = AuthCheck("s3cret", clock=lambda: 1_000.0)
+    check = AuthVerifier("s3cret", clock=lambda: 1_000.0)
     assert check.verify(signed("s3cret", 1_001, 2_000))
     assert not check.verify(signed("s3cret", 1_001, 2_000))
     assert check.verify(signed("s3cret", 1_001, 2_000, "other"))

@@ -154,7 +154,7 @@ def test_client_moves_a_robot_only_while_allowed(foxglove: WebServer, node: nep.
         assert "--allow-moving Rover" in str(received(client, "status")["message"])
         publish(client, 1, {"op": "invoke"})
         assert "Rover" in str(received(client, "status")["message"])
-        assert [(each.kind, each.robot) for each in foxglove.refusals] == [("robot", "Rover")]
+        assert [(each.kind, each.robot) for each in foxglove.rejections] == [("robot", "Rover")]
         foxglove.set_allow_moving(["Rover"])
         publish(client, 1, {"op": "stop"})
         assert orders.listen(timeout_s=30) == (True, {"op": "stop"})

@@ -69,7 +69,7 @@ def test_new_token_disconnects_all_clients_with_the_old_token(server: WebServer,
     with connect(f"{server.url}/?token=second-token-of-all") as page:
         assert server.set_access(Access()) == 0
         assert is_open(page)
-    assert [each.kind for each in server.refusals] == ["token", "token"]
+    assert [each.kind for each in server.rejections] == ["token", "token"]
 
 
 def test_server_for_other_computers_keeps_its_token(master: Master) -> None:
@@ -87,7 +87,7 @@ def test_robots_are_allowed_and_denied_while_a_page_is_connected(
     node.new_pub("/Rover/description", "robot/description", latched=True).publish(description)
     assert "Rover" in page.refusal("publish", topic="/orders", msg=1)
     page.refusal("publish", topic="/orders", msg=2)
-    (refused,) = server.refusals  # once in ten seconds
+    (refused,) = server.rejections  # once in ten seconds
     assert (refused.kind, refused.robot, refused.client) == ("robot", "Rover", "127.0.0.1")
     server.set_allow_moving(["Rover"])
     page.send("publish", topic="/orders", msg=3)
@@ -174,7 +174,7 @@ def test_blocked_page_is_rejected_until_unblocked(server: WebServer, open_page: 
     assert is_open(twin.connection)
     assert is_open(other.connection)
     assert refused_to_connect(server, origin=own)
-    assert server.refusals[-1].kind == "kept out"
+    assert server.rejections[-1].kind == "kept out"
     server.unblock_page(page_id)
     assert is_open(open_page(origin=own).connection)
 

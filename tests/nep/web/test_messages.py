@@ -25,7 +25,7 @@ from nep.programs.web.messages.payloads import (
     ros_type_of,
     to_ros,
 )
-from nep.programs.web.messages.png import text_as_png, text_in_png
+from nep.programs.web.messages.png import decode_png, encode_png
 from nep.programs.web.messages.ros_definitions import definition_of, type_definitions
 from nep.programs.web.outgoing import EncodingOptions, operation_frames, publish_frames
 from tests import hostile
@@ -121,12 +121,12 @@ def test_cbor_raw_is_the_ros_message() -> None:
 
 def test_png_holds_the_text_and_large_texts_are_rejected() -> None:
     for text in (b"{}", json.dumps({"x": "é" * 999}).encode()):
-        assert text_in_png(text_as_png(text)) == text
+        assert decode_png(encode_png(text)) == text
     packed = json.loads(publish_frames("/t", message("json", {"a": 1}), EncodingOptions("png"))[0].data)
-    assert json.loads(text_in_png(packed["data"]))["msg"] == {"a": 1}
-    for data in ("", "é", "AAAA", text_as_png(b"\n" * 9_000_000)):
+    assert json.loads(decode_png(packed["data"]))["msg"] == {"a": 1}
+    for data in ("", "é", "AAAA", encode_png(b"\n" * 9_000_000)):
         with pytest.raises(OperationError):
-            text_in_png(data)
+            decode_png(data)
 
 
 def test_large_message_is_split_into_fragments() -> None:

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from nep.programs.web.limits import MAX_FRAGMENTED, MAX_MESSAGE_BYTES, MIN_FRAGMENT_SIZE
+from nep.programs.web.limits import MAX_FRAGMENTED_OPERATIONS, MAX_MESSAGE_BYTES, MIN_FRAGMENT_SIZE
 from nep.programs.web.messages import operations as op
 from nep.programs.web.messages.fragments import FragmentBuffer, cut
 from tests import hostile
@@ -115,9 +115,9 @@ def test_fragments_are_joined_in_any_order() -> None:
 
 def test_incomplete_operations_are_bounded() -> None:
     buffer = FragmentBuffer()
-    for number in range(3 * MAX_FRAGMENTED):
+    for number in range(3 * MAX_FRAGMENTED_OPERATIONS):
         buffer.add(part(f"f{number}", "x", 0, 2))
-    assert len(buffer) == MAX_FRAGMENTED
+    assert len(buffer) == MAX_FRAGMENTED_OPERATIONS
     half = "x" * (MAX_MESSAGE_BYTES // 2)
     buffer.add(part("big", half, 0, 3))
     buffer.add(part("big", half, 1, 3))

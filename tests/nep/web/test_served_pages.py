@@ -126,7 +126,7 @@ def test_page_opened_without_the_token_is_listed_as_rejected(master: Master) -> 
     settings = WebSettings(port=0, master=master.address, access=Access(token=TOKEN))
     with WebServer(settings) as server:
         assert response(server, "/")[0] == HTTPStatus.UNAUTHORIZED
-        assert [(each.kind, each.client) for each in server.refusals] == [("token", "127.0.0.1")]
+        assert [(each.kind, each.client) for each in server.rejections] == [("token", "127.0.0.1")]
         path = server.test_page_url.partition(str(server.port))[2]
         assert response(server, path)[0] == HTTPStatus.OK
 

@@ -149,14 +149,14 @@ def test_page_cannot_move_a_robot_without_permission(server: WebServer, node: ne
     eventually(lambda: "/orders" in node.graph().topics)
     orders = node.new_sub("/orders")
     node.new_pub("/Rover/description", "robot/description", latched=True).publish(description)
-    eventually(lambda: server._guard.refusal("/orders") != "")
+    eventually(lambda: server._guard.denial_reason("/orders") != "")
     assert "--allow-moving Rover" in page.refusal("publish", topic="/orders", msg={"op": "invoke"}, id="p")
     assert "--allow-moving" in page.refusal("advertise", topic="robot_action", type="nep/Json")
     node.parameters.declare("speed", 1.5)
     refused = page.call("/rosapi/set_param", name="python:speed", value="9.0")
     assert "--allow-moving Rover" in str(refused["values"])
     assert orders.received == 0
-    assert server.counts.motions_refused == 2
+    assert server.counts.motions_rejected == 2
 
 
 def test_page_moves_an_allowed_robot(master: Master, node: nep.Node) -> None:
@@ -321,4 +321,4 @@ def test_rejected_connection_is_listed_with_the_origin_to_allow(server: WebServe
     for _attempt in range(3):  # listed once
         with pytest.raises(InvalidStatus):
             open_page(origin="http://192.168.1.77:5173")
-    assert [each.origin for each in server.refusals] == ["http://192.168.1.77:5173"]
+    assert [each.origin for each in server.rejections] == ["http://192.168.1.77:5173"]

@@ -239,7 +239,7 @@ def test_description_is_valid_and_declares_every_action(bench, request) -> None:
         if not ours:
             continue
         assert f"\n{action.icon}\t" in resources.path("icons", "lucide.txt").read_text("utf-8")
-    assert bench.robot.beat_s is not None
+    assert bench.robot.heartbeat_interval_s is not None
     assert bench.robot.safe_stop.confirmed
     assert bench.robot.safe_stop.watchdog_s is not None
 
@@ -384,7 +384,7 @@ def test_robot_sends_heartbeats_while_active(bench) -> None:
 
     bench.begun()
     told = beats()
-    bench.clock.advance((bench.robot.beat_s or 0) + 0.01)
+    bench.clock.advance((bench.robot.heartbeat_interval_s or 0) + 0.01)
     eventually(lambda: beats() > told)
 
 

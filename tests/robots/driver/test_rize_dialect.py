@@ -28,7 +28,7 @@ def test_rize_robot_has_the_rize_dialect_and_capabilities(robot):
     assert (robot.name, robot.dialect, robot.virtual) == ("Pepper", "rize", False)
     assert not robot.safe_stop.confirmed
     assert robot.safe_stop.watchdog_s is None
-    assert (robot.topics.command, robot.topics.answer) == ("robot_action", "action_state")
+    assert (robot.topics.command, robot.topics.reply) == ("robot_action", "action_state")
     assert all(action.topic == "robot_action" for action in robot.actions)
     assert not any(action.cancellable for action in robot.actions)
 

@@ -233,6 +233,6 @@ def test_held_joint_keeps_its_angle():
     joint = Joint(100, -10, 10)
     joint.set_target(5)
     joint.step(0.01)
-    joint.hold()
+    joint.stop()
     joint.step(1)
     assert joint.angle == 1.0

@@ -9,7 +9,7 @@ import random
 import pytest
 
 from app.robots.virtual.room import Room
-from app.robots.virtual.room_map import KINDS, MAX_COUNT, MAX_PER_KIND, RoomMap
+from app.robots.virtual.room_map import KINDS, MAX_OBJECTS, MAX_PER_KIND, RoomMap
 
 
 def clock(start: int = 1000):
@@ -45,7 +45,7 @@ def test_maps_converge_for_any_order_of_messages() -> None:
             case 1:
                 one.remove(chance.choice(["ball", "ball 2", "Aiko", "table"]))
             case 2:
-                one.restore_start()
+                one.reset()
             case _:
                 one.move(chance.choice(["ball", "Aiko", "shelf"]), chance.uniform(-2, 2), 0.0)
         told.append(one.message())
@@ -73,7 +73,7 @@ def test_objects_stay_inside_and_their_number_per_kind_is_limited() -> None:
     assert names[-3:] == [None, None, None]
     assert made.add("piano", 0.0, 0.0) is None
     assert not made.move("piano", 1.0, 1.0)
-    made.restore_start()
+    made.reset()
     assert made.room() == Room()
 
 
@@ -105,4 +105,4 @@ def test_number_of_merged_objects_is_limited() -> None:
             for n in range(start, start + 9)
         ]
         made.merge({"things": flood})
-    assert len(made.message()["things"]) == MAX_COUNT
+    assert len(made.message()["things"]) == MAX_OBJECTS

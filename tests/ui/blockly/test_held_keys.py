@@ -8,18 +8,18 @@ from PySide6.QtGui import QFocusEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 
-from app.ui.blockly.held_keys import HeldKeys
+from app.ui.blockly.held_keys import KeyBuffer
 
 
 class Watch(QObject):
     """Gives the keys of a field to whoever keeps them, as the host of the page does."""
 
-    def __init__(self, keys: HeldKeys) -> None:
+    def __init__(self, keys: KeyBuffer) -> None:
         super().__init__()
         self._keys = keys
 
     def eventFilter(self, _watched, event) -> bool:
-        return self._keys.hold_event(event)
+        return self._keys.buffer_event(event)
 
 
 @pytest.fixture
@@ -30,8 +30,8 @@ def field(qtbot) -> QLineEdit:
 
 
 @pytest.fixture
-def keys(field) -> HeldKeys:
-    keys = HeldKeys(lambda: field)
+def keys(field) -> KeyBuffer:
+    keys = KeyBuffer(lambda: field)
     field.watch = Watch(keys)
     field.installEventFilter(field.watch)
     return keys
@@ -39,7 +39,7 @@ def keys(field) -> HeldKeys:
 
 def test_queued_keys_are_delivered_in_order(field, keys):
     QTest.keyClicks(field, "a")
-    keys.hold()
+    keys.start()
     QTest.keyClicks(field, "bc")
     assert field.text() == "a"
     keys.release()
@@ -49,18 +49,18 @@ def test_queued_keys_are_delivered_in_order(field, keys):
 
 @pytest.mark.parametrize("how", ["mouse", "focus"])
 def test_click_or_focus_change_delivers_queued_keys(field, keys, how):
-    keys.hold()
+    keys.start()
     QTest.keyClicks(field, "ab")
     if how == "mouse":
         QTest.mouseClick(field, Qt.LeftButton)
     else:
-        keys.hold_event(QFocusEvent(QFocusEvent.Type.FocusOut))
+        keys.buffer_event(QFocusEvent(QFocusEvent.Type.FocusOut))
     QTest.keyClicks(field, "c")
     assert field.text() == "abc"
 
 
 def test_keys_queued_for_a_crashed_page_are_discarded(field, keys):
-    keys.hold()
+    keys.start()
     QTest.keyClicks(field, "ab")
     keys.discard_all()
     keys.release()

@@ -10,8 +10,8 @@ from app.blocks.compiler.stack import Stack
 from app.core.documents.file_format import parse_file
 from app.errors import DocumentError
 from app.ui.blockly.page_json import decode_data_url, parse_string_pairs, parse_strings
-from app.ui.shell.commands.behaviours import read_stack
-from app.ui.widgets.field_drag import MIME, dropped_field
+from app.ui.shell.commands.behaviours import parse_stack
+from app.ui.widgets.field_drag import MIME_TYPE, dropped_field
 from tests import hostile
 
 STACK: hostile.Message = {
@@ -48,7 +48,7 @@ def test_stacks_and_behaviours_are_parsed_or_rejected() -> None:
     read = set()
     for payload in hostile.payloads(STACK):
         try:
-            read.add(type(read_stack(text_of(payload))))
+            read.add(type(parse_stack(text_of(payload))))
         except (ValueError, RecursionError):
             read.add(ValueError)
     for payload in hostile.payloads(BEHAVIOUR):
@@ -63,6 +63,6 @@ def test_stacks_and_behaviours_are_parsed_or_rejected() -> None:
 def test_dragged_field_is_parsed_or_none() -> None:
     for payload in LISTS:
         data = QMimeData()
-        data.setData(MIME, payload)
+        data.setData(MIME_TYPE, payload)
         found = dropped_field(data)
         assert found is None or len(found) == 2

@@ -6,7 +6,7 @@ from PySide6.QtWebEngineCore import QWebEngineUrlScheme
 
 from app import resources
 from app.ui.blockly import scheme as blockly_scheme
-from app.ui.blockly.scheme import content, register_scheme
+from app.ui.blockly.scheme import read_content, register_scheme
 
 register_scheme()
 
@@ -20,12 +20,12 @@ def test_scheme_is_secure_and_registered_once():
 
 
 def test_scheme_serves_the_editor_bundle():
-    kind, data = content("/index.html")
+    kind, data = read_content("/index.html")
     assert kind == "text/html"
     assert b"Content-Security-Policy" in data
-    assert content("/editor.js")[0] == "text/javascript"
-    assert content("/msg/en.json")[0] == "application/json"
-    assert b"QWebChannel" in content("/qwebchannel.js")[1]
+    assert read_content("/editor.js")[0] == "text/javascript"
+    assert read_content("/msg/en.json")[0] == "application/json"
+    assert b"QWebChannel" in read_content("/qwebchannel.js")[1]
 
 
 @pytest.mark.parametrize(
@@ -41,31 +41,31 @@ def test_scheme_serves_the_editor_bundle():
     ],
 )
 def test_scheme_rejects_paths_outside_the_bundle(path):
-    assert content(path) is None
+    assert read_content(path) is None
 
 
 def test_scheme_serves_the_shipped_fonts():
-    kind, css = content("/fonts.css")
+    kind, css = read_content("/fonts.css")
     assert kind == "text/css"
     for name, weight, kind in (("Inter-SemiBold.otf", 600, "otf"), ("MPLUS1p-Bold.ttf", 700, "ttf")):
         file = resources.path("fonts", name)
         assert f'font-weight:{weight};src:url("fonts/{name}")'.encode() in css
-        assert content(f"/fonts/{name}") == (f"font/{kind}", file.read_bytes())
+        assert read_content(f"/fonts/{name}") == (f"font/{kind}", file.read_bytes())
 
 
 def test_missing_fonts_yield_an_empty_stylesheet(tmp_path):
-    assert content("/fonts.css", tmp_path) == ("text/css", b"")
+    assert read_content("/fonts.css", tmp_path) == ("text/css", b"")
 
 
 def test_symlink_out_of_the_folder_is_not_followed(tmp_path):
     (tmp_path / "blockly").mkdir()
     (tmp_path / "secret.txt").write_text("secret")
     (tmp_path / "blockly" / "link.txt").symlink_to(tmp_path / "secret.txt")
-    assert content("/link.txt", tmp_path) is None
+    assert read_content("/link.txt", tmp_path) is None
 
 
 def test_page_references_no_external_origin():
-    page = content("/index.html")[1].decode()
+    page = read_content("/index.html")[1].decode()
     assert "http:" not in page
     assert "https:" not in page
     assert blockly_scheme.PAGE_URL == "app://blocks/index.html"

@@ -336,9 +336,9 @@ def test_keys_typed_right_after_opening_the_search_are_all_entered(opened, wante
 def test_keys_typed_before_the_page_is_loaded_reach_the_search_field(qtbot):
     view = editor(qtbot, editor_definitions([robot("Pepper")]), 1320, 700)
     view.show()
-    qtbot.waitUntil(lambda: view.web is not None and view.web.keyboard() is not None, timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: view.web is not None and view.web.keyboard_target() is not None, timeout=WAIT_MS)
     view.open_search()
-    QTest.keyClicks(view.web.keyboard(), "wait")
+    QTest.keyClicks(view.web.keyboard_target(), "wait")
     assert not view.is_ready
     qtbot.waitUntil(lambda: view.is_ready, timeout=WAIT_MS)
     them = Person(qtbot, view)

@@ -9,7 +9,7 @@ import signal
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from app.core.documents.workspace_json import EMPTY, WorkspaceJson
+from app.core.documents.workspace_json import EMPTY_WORKSPACE, WorkspaceJson
 from app.ui.blockly.tabs import Tabs
 from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, outlined, workspace
 
@@ -24,7 +24,7 @@ TABS = "document.querySelectorAll('.nepTab').length"
 
 def test_placeholder_tab_is_replaced_by_the_first_document() -> None:
     tabs = Tabs()
-    assert tabs.shown.program.blocks == EMPTY
+    assert tabs.shown.program.blocks == EMPTY_WORKSPACE
     assert tabs.show("a", WorkspaceJson.from_blocks(A)) == ""
     assert tabs[""] is None
     assert tabs.show("b", WorkspaceJson.from_blocks(B)) is None
@@ -43,7 +43,7 @@ def test_edits_of_a_closed_or_replaced_program_are_ignored() -> None:
     assert tabs.close("a")
     assert tabs.tab_for_edit("a", generation) is None
     assert not tabs.close("a")
-    assert tabs.shown.program.blocks == EMPTY
+    assert tabs.shown.program.blocks == EMPTY_WORKSPACE
 
 
 @pytest.fixture

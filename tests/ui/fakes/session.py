@@ -72,7 +72,7 @@ class Doctor(doctor_module.Doctor):
 
     def start(self) -> None:
         self.looked += 1
-        self._run()
+        self._run_checks()
 
     def _find_at_once(self, _topic: str, tell: ProgressCallback) -> tuple[Finding, ...]:
         if self.found is not None:  # else it breaks off
@@ -136,7 +136,7 @@ class Session(session_module.Session):
     @property
     def watched(self) -> list[str]:
         """The topics that panels look at, in the order in which they began."""
-        answers = {link.robot.topics.answer for link in self.fleet.links}
+        answers = {link.robot.topics.reply for link in self.fleet.links}
         watched = self.source.wanted - answers
         return [topic for topic in dict.fromkeys(self.source.asked) if topic in watched]
 

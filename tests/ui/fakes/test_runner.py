@@ -449,7 +449,7 @@ def test_late_events_of_an_earlier_run_are_ignored(run: Run) -> None:
     run.works("c")
     assert runs._runner is not None
     assert runs._runner.run != earlier.run
-    runs.on_runner(RunnerEvent("running", earlier.run, ("other",)))
+    runs.on_runner_event(RunnerEvent("running", earlier.run, ("other",)))
     assert runs.running_blocks != ("other",)
     runs.stop()
     tick_until(run.session, lambda: runs.view().state == "ready")

@@ -12,7 +12,7 @@ from app.blocks import Problem, Program
 from app.core.documents.document import Document
 from app.core.documents.journal import Journal
 from app.core.network.doctor import Doctor
-from app.core.storage.settings import RECENT_LIMIT, Settings
+from app.core.storage.settings import MAX_RECENT_FILES, Settings
 from nep.programs.doctor import Finding
 from tests.blocks.samples import block, started, text, workspace, write
 from tests.ui.fakes import session, storage
@@ -51,16 +51,16 @@ def test_value_that_json_cannot_encode_is_rejected_and_not_saved(settings: Setti
 
 
 def test_recent_files_are_newest_first(settings: Settings, tmp_path: Path) -> None:
-    files = [tmp_path / f"{number}.nepb" for number in range(RECENT_LIMIT + 2)]
+    files = [tmp_path / f"{number}.nepb" for number in range(MAX_RECENT_FILES + 2)]
     for file in files:
         file.write_text("x", "utf-8")
         settings.add_recent(file)
     settings.add_recent(files[5], "Five")  # it is called as its file
     files[-1].unlink()
-    assert [each.name for each in settings.recent][:2] == ["5", files[-2].stem]
-    assert len(settings.all_recent) == RECENT_LIMIT
+    assert [each.name for each in settings.recent_files][:2] == ["5", files[-2].stem]
+    assert len(settings.all_recent_files) == MAX_RECENT_FILES
     settings.set_recent([])
-    assert settings.recent == []
+    assert settings.recent_files == []
 
 
 # -- a behaviour and its journal --------------------------------------------------------------------------

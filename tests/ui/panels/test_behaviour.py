@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QGuiApplication, QPixmap
 from PySide6.QtWidgets import QLabel, QWidget
 
 from app.core.documents.workspace_json import WorkspaceJson
-from app.core.reports.not_installed import ALERT
+from app.core.reports.not_installed import ALERT_ID
 from app.ui.panels.base import Panel
 from app.ui.panels.behaviour.carried_blocks import POINTER_OFFSET, DragImage, transfer_text
 from app.ui.panels.behaviour.panel import BehaviourPanel
@@ -466,7 +466,7 @@ def test_missing_system_libraries_show_a_message_and_the_python_view_still_works
     (told,) = panel.findChildren(EmptyState)
     words = " ".join(label.text() for label in told.findChildren(QLabel))
     assert "sudo apt install libnss3" in words
-    alert = window.session.alerts.get(ALERT)
+    alert = window.session.alerts.get(ALERT_ID)
     assert alert is not None
     assert alert.severity == "error"
     panel.set_mode("python")

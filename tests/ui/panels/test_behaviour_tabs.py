@@ -8,12 +8,12 @@ from PySide6.QtGui import QContextMenuEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolTip
 
-from app.ui.panels.behaviour.tab import TabFacts
+from app.ui.panels.behaviour.tab import TabState
 from app.ui.panels.behaviour.tabs import NEW_TAB, BehaviourTabs
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
 
-A, B, C = (TabFacts(key, name) for key, name in (("a", "Greeting"), ("b", "Tour guide"), ("c", "Quiz")))
+A, B, C = (TabState(key, name) for key, name in (("a", "Greeting"), ("b", "Tour guide"), ("c", "Quiz")))
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def press(tab, place=None, button=Qt.MouseButton.LeftButton) -> None:
 
 
 def test_tab_shows_name_unsaved_state_and_running_state(tabs) -> None:
-    tabs.show_tabs([A, TabFacts("b", "Tour guide", is_dirty=True, is_running=True)], "a")
+    tabs.show_tabs([A, TabState("b", "Tour guide", is_dirty=True, is_running=True)], "a")
     assert [tab.accessibleName() for tab in tabs.tabs.values()] == [
         "Greeting",
         "Tour guide, not saved, running",
@@ -105,7 +105,7 @@ def test_closed_tab_is_removed_and_the_other_tabs_move_left(tabs) -> None:
 
 
 def test_narrow_tab_bar_shortens_all_tabs_and_keeps_the_current_tab_visible(tabs) -> None:
-    many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
+    many = [TabState(str(number), f"A rather long name {number}") for number in range(12)]
     tabs.show_tabs(many, "11")
     room = tabs.add.x()
     assert tabs.tabs["11"].geometry().right() <= room
@@ -117,9 +117,9 @@ def test_narrow_tab_bar_shortens_all_tabs_and_keeps_the_current_tab_visible(tabs
 
 @pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
 def test_hidden_tabs_are_listed_in_a_menu(tabs) -> None:
-    tabs.show_tabs([TabFacts("0", "One"), TabFacts("1", "Two")], "1")
+    tabs.show_tabs([TabState("0", "One"), TabState("1", "Two")], "1")
     assert tabs.list.isHidden(), "all are in sight"
-    many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
+    many = [TabState(str(number), f"A rather long name {number}") for number in range(12)]
     tabs.show_tabs(many, "11")
     assert not tabs.list.isHidden()
     assert tabs.add.geometry().right() < tabs.list.geometry().left() <= tabs.width()
@@ -135,7 +135,7 @@ def test_hidden_tabs_are_listed_in_a_menu(tabs) -> None:
 
 
 def test_current_tab_is_never_wider_than_the_tab_bar(tabs) -> None:
-    facts = [TabFacts("0", "One"), TabFacts("1", "The rather long name of a behaviour")]
+    facts = [TabState("0", "One"), TabState("1", "The rather long name of a behaviour")]
     tabs.resize(180, 32)
     tabs.show_tabs(facts, "1")
     tab = tabs.tabs["1"]
@@ -144,7 +144,7 @@ def test_current_tab_is_never_wider_than_the_tab_bar(tabs) -> None:
 
 
 def test_wheel_scrolls_the_tab_bar(tabs) -> None:
-    many = [TabFacts(str(number), f"A rather long name {number}") for number in range(12)]
+    many = [TabState(str(number), f"A rather long name {number}") for number in range(12)]
     tabs.show_tabs(many, "0")
     wheel = QWheelEvent(
         QPointF(5, 5), QPointF(5, 5), QPoint(), QPoint(0, -120), Qt.MouseButton.NoButton,
@@ -243,7 +243,7 @@ def test_closing_a_tab_closes_its_rename_field(tabs) -> None:
 
 
 def test_folder_suffix_of_a_tab_is_not_editable(tabs) -> None:
-    tabs.show_tabs([TabFacts("a", "Quiz — class 3", plain_name="Quiz", has_file=True), B], "a")
+    tabs.show_tabs([TabState("a", "Quiz — class 3", plain_name="Quiz", has_file=True), B], "a")
     QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)
     assert tabs.field.text() == "Quiz"
 

@@ -8,7 +8,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QSignalSpy
 
 from app.core.console import Console
-from app.ui.panels.console.list import MIN_TEXT_CHARS, LineDelegate, first_line, tip_of
+from app.ui.panels.console.list import MIN_TEXT_CHARS, LineDelegate, first_line, tooltip_text
 from app.ui.panels.console.panel import PANEL, ConsolePanel
 from app.ui.widgets import paint
 from nep.messages.message import Message
@@ -126,7 +126,7 @@ def test_log_records_of_programs_are_listed_among_the_lines(panel, window) -> No
     panel.refresh()
     assert lines(panel)[0] == "warn Pepper [app.robots.driver.tasks] the stop command failed"
     record = panel.model.index(0, 0).data(Qt.ItemDataRole.UserRole)
-    said, level, place = tip_of(record).split("\n")
+    said, level, place = tooltip_text(record).split("\n")
     assert (said, place) == ("the stop command failed", "app.robots.driver.tasks  tasks.py:272")
     assert level.endswith(" warn  Pepper")
     panel.set_level("debug")

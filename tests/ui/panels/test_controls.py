@@ -25,7 +25,7 @@ from app.ui.panels.robots.controls.picture_file import MAX_FILE_BYTES, encode_im
 from app.ui.panels.robots.form import ActionForm
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SliderWithUnit
-from app.ui.widgets.inputs.fields import MIN_HEIGHT, LongText
+from app.ui.widgets.inputs.fields import MIN_HEIGHT, LongTextField
 from app.ui.widgets.menus import Menu
 from tests.nep.bad_pictures import BOMBS, chunk, exif, segment
 from tests.ui import fakes
@@ -153,7 +153,7 @@ def test_zero_is_a_valid_choice_and_an_invalid_advanced_value_shows_its_row(qtbo
 
 def test_text_field_grows_to_at_most_five_lines(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("t", "text", "text", max_length=500, required=True))
-    field = child(form, LongText)
+    field = child(form, LongTextField)
     one = field.height()
     assert one >= MIN_HEIGHT
     field.set_text("a\nb\nc")

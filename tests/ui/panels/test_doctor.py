@@ -64,7 +64,7 @@ def test_findings_are_shown_incrementally_during_a_check(qtbot, window) -> None:
             doctor._report(found, done + 1, 4)
             panel.refresh()
             told.append(([each.id for each in panel.shown], panel.looked.text(), panel.chip.accessibleName()))
-        doctor._run()
+        doctor._run_checks()
         doctor.is_running = False
 
     panel = PANEL.make(window.context())
@@ -208,7 +208,7 @@ def test_suggested_topic_name_is_applied_to_the_panel_that_opened_the_doctor(
     window.session.doctor.found = (NEAR,)
     window.session.doctor.expect_topic("/robot/deph")
     asker.paused = False
-    panel.check_panel(asker)
+    panel.set_stalled_panel(asker)
     assert panel.missed.value == "/robot/deph"
     assert panel.terminal.text() == "In a terminal: nep doctor /robot/deph"
     assert names(panel) == ["Use /robot/depth"]
@@ -231,7 +231,7 @@ def test_without_an_originating_panel_the_topic_opens_in_a_matching_panel(qtbot,
 def test_paused_panel_is_the_first_finding_and_can_be_resumed(qtbot, panel, window, asker) -> None:
     window.session.doctor.found = (NEAR,)
     window.session.doctor.expect_topic("/robot/deph")
-    panel.check_panel(asker)
+    panel.set_stalled_panel(asker)
     assert panel.rows[0].accessibleName().startswith("error: Depth is paused")
     assert names(panel) == ["Resume", "Use /robot/depth"]
     qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
@@ -243,7 +243,7 @@ def test_paused_panel_is_the_first_finding_and_can_be_resumed(qtbot, panel, wind
 
 def test_doctor_does_not_query_a_closed_panel(qtbot, panel, window) -> None:
     asker = Asker(window.context())
-    panel.check_panel(asker)
+    panel.set_stalled_panel(asker)
     assert "paused" in panel.rows[0].accessibleName()
     shiboken6.delete(asker)
     panel.refresh()
@@ -295,7 +295,7 @@ def test_each_finding_has_one_button(qtbot, panel, window, finding, button, comm
 
 
 def test_missing_topic_is_entered_by_the_user(panel, window, asker) -> None:
-    panel.check_panel(asker)
+    panel.set_stalled_panel(asker)
     panel.missed.set_value("/odom")
     panel.missed.activated.emit(panel.missed.currentIndex())
     assert window.session.doctor.expected_topic == "/odom"

@@ -10,7 +10,7 @@ import pytest
 from app import resources
 from app.core.documents.file_format import read_file
 from app.ui.panels.base import Panel
-from app.ui.panels.first_steps.panel import HINT_AFTER_S, PROGRESS_SETTING, FirstStepsPanel
+from app.ui.panels.first_steps.panel import HINT_DELAY_S, PROGRESS_SETTING, FirstStepsPanel
 from app.ui.panels.first_steps.steps import (
     SAY,
     STEPS,
@@ -200,14 +200,14 @@ def test_completed_steps_are_restored_after_restart(panel, window, qtbot) -> Non
 def test_next_step_is_highlighted_once_after_twenty_idle_seconds(panel, window, clock) -> None:
     window.session.join(pepper())
     panel.refresh()
-    clock.now = HINT_AFTER_S - 1
+    clock.now = HINT_DELAY_S - 1
     panel.refresh()
     assert window.commands == []
     build(panel, block("control_wait"))  # somebody who builds is not idle
     clock.now += 2
     panel.refresh()
     assert window.commands == []
-    clock.now += HINT_AFTER_S
+    clock.now += HINT_DELAY_S
     panel.refresh()
     panel.refresh()
     assert window.commands == ["point.block:events_started"]

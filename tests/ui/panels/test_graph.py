@@ -13,12 +13,12 @@ from PySide6.QtGui import QContextMenuEvent, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
-from app.core.graph.activity import QUIET_S
+from app.core.graph.activity import QUIET_TIMEOUT_S
 from app.core.graph.layout import GraphLayout, LayoutSizes
 from app.core.graph.node_graph import NodeGraph
 from app.core.graph.walk import GraphSelection
 from app.core.network.master import MasterState
-from app.ui.panels.graph.panel import DOT, PANEL, SVG, GraphPanel
+from app.ui.panels.graph.panel import DOT_KIND, PANEL, SVG_KIND, GraphPanel
 from app.ui.panels.graph.scene import GraphScene
 from app.ui.panels.graph.words import line_width, short_rate
 from nep.protocol.graph_view import (
@@ -413,7 +413,7 @@ def test_idle_nodes_are_hidden_after_a_minute_and_shown_by_a_button(
     now = [time.monotonic()]
     monkeypatch.setattr("app.ui.panels.graph.panel.time.monotonic", lambda: now[0])
     panel._update_quiet_nodes()
-    now[0] += QUIET_S + 1
+    now[0] += QUIET_TIMEOUT_S + 1
     more = graph(count=200)
     show(window, replace(more, topics={**more.topics, "robot_action": graph().topics["robot_action"]}))
     panel._update_quiet_nodes()
@@ -551,7 +551,7 @@ def test_click_in_the_overview_moves_the_viewport(panel: GraphPanel) -> None:
     panel.canvas.zoom_to(3.0)
     scene = panel.canvas.scene
     assert scene is not None
-    scale, offset = panel.overview._fit(scene)
+    scale, offset = panel.overview._fit_transform(scene)
     wanted = scene.nodes[key_of(panel, "pepper_driver")].rect.center()
     click(panel.overview, (wanted * scale + offset).toPoint())
     assert panel.canvas.visible_rect().contains(wanted)
@@ -566,8 +566,8 @@ def test_card_is_placed_below_when_space_is_narrow(panel: GraphPanel, qtbot) -> 
 
 
 def test_svg_and_dot_are_exported(panel: GraphPanel, window: Window, tmp_path: Path) -> None:
-    panel.save(tmp_path / "graph.svg", SVG)
-    panel.save(tmp_path / "graph.dot", DOT)
+    panel.save(tmp_path / "graph.svg", SVG_KIND)
+    panel.save(tmp_path / "graph.dot", DOT_KIND)
     assert window.toasts == ["Saved graph.svg", "Saved graph.dot"]
     root = ET.parse(tmp_path / "graph.svg").getroot()
     said = {"".join(each.itertext()).strip() for each in root.iter("{http://www.w3.org/2000/svg}text")}
@@ -575,7 +575,7 @@ def test_svg_and_dot_are_exported(panel: GraphPanel, window: Window, tmp_path: P
     dot = (tmp_path / "graph.dot").read_text("utf-8")
     assert 'label="/blackboard 10/s"' in dot
     assert dot.count("subgraph cluster_") == 2
-    panel.save(tmp_path / "graph.svg" / "graph.svg", SVG)
+    panel.save(tmp_path / "graph.svg" / "graph.svg", SVG_KIND)
     assert window.toasts[-1].startswith("Can't save the graph: ")
 
 
@@ -599,7 +599,7 @@ def test_empty_graph_suggests_next_steps(qtbot, qapp) -> None:
     assert made.picture() == b""
     made.canvas.show_scene(GraphScene(made.theme, NodeGraph(), GraphLayout(), LayoutSizes(), "here"))
     assert made.picture() == b"", "also once nothing was laid out"
-    made.save(Path("nowhere.svg"), SVG)
+    made.save(Path("nowhere.svg"), SVG_KIND)
     assert window.toasts == []
     window.session.master = MasterState("none", "127.0.0.1:7780")
     made.refresh()

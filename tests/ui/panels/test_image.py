@@ -16,7 +16,7 @@ from PySide6.QtTest import QTest
 from app.core.messages.picture import Picture
 from app.ui.panels.camera import PANEL as CAMERA
 from app.ui.panels.camera import CameraPanel
-from app.ui.panels.image.actions import ROWS
+from app.ui.panels.image.actions import ACTION_SPECS
 from app.ui.panels.image.panel import PANEL, ImagePanel
 from app.ui.panels.image.snapshot import SnapshotJob
 from app.ui.pictures.boxes import boxes_of
@@ -435,7 +435,7 @@ def test_every_action_has_a_shortcut_while_the_image_has_focus(qtbot, qapp) -> N
     assert panel.freeze.isChecked()
     assert window.session.images.streams[0].is_frozen
     words = [action.text().partition("\t")[0] for action in panel.more_actions() if action.text()]
-    assert words == [*(row.text for row in ROWS), "Record a sequence", "Open in the Inspector"]
+    assert words == [*(row.text for row in ACTION_SPECS), "Record a sequence", "Open in the Inspector"]
 
 
 def test_window_shortcuts_are_disabled_while_the_image_has_focus(qtbot, qapp) -> None:
@@ -459,7 +459,7 @@ def test_image_is_saved_as_received_and_the_toast_opens_its_folder(qtbot, qapp, 
     window = Window(Session.full())
     panel = made(qtbot, window)
     panel.job = SnapshotJob(panel, lambda: tmp_path / "kept")
-    panel.job.saved.connect(panel._saved)
+    panel.job.saved.connect(panel._on_saved)
     panel.view.place.rotate(90)
     QTest.keyClicks(panel.view, "s")
     qtbot.waitUntil(lambda: bool(window.toasts))
@@ -476,7 +476,7 @@ def test_image_that_cannot_be_saved_raises_an_alert_with_the_reason(qtbot, qapp,
     panel = made(qtbot, window)
     (tmp_path / "file").write_text("in the way")
     panel.job = SnapshotJob(panel, lambda: tmp_path / "file")
-    panel.job.failed.connect(panel._failed)
+    panel.job.failed.connect(panel._on_failed)
     panel.save_picture()
     qtbot.waitUntil(lambda: window.session.alerts.has("snapshot"))
     assert window.toasts == []
@@ -585,6 +585,6 @@ def test_narrow_title_hides_buttons_and_the_menu_has_all_actions(qtbot, qapp) ->
     assert not panel.fit.isHidden()
     panel.resize(220, 220)
     assert (panel.fit.isHidden(), panel.keep.isHidden(), panel.freeze.isHidden()) == (True, True, False)
-    assert len([action for action in panel.more_actions() if action.text()]) == len(ROWS) + 2
+    assert len([action for action in panel.more_actions() if action.text()]) == len(ACTION_SPECS) + 2
     empty = made(qtbot, Window(Session()))
     assert (empty.fit.isHidden(), empty.freeze.isHidden()) == (True, True)

@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QImage, QPainter, QTransform
 
-from app.core.messages.annotations import MAX_PIXELS, shapes_in
+from app.core.messages.annotations import MAX_COORDINATE_PX, parse_shapes
 from app.core.messages.picture_look import ColourScale
 from app.ui.panels.image.overlays import MAX_OVERLAYS
 from app.ui.panels.image.panel import PANEL, ImagePanel
@@ -151,7 +151,7 @@ def painted(payload: object, turned: int = 0) -> QImage:
     shares = QTransform.fromScale(320, 240)
     if turned:
         shares = QTransform().translate(0.5, 0.5).rotate(turned).translate(-0.5, -0.5) * shares
-    paint_annotations(painter, Theme("light"), shares, 1.0, shapes_in(payload, 320, 240))
+    paint_annotations(painter, Theme("light"), shares, 1.0, parse_shapes(payload, 320, 240))
     painter.end()
     return image
 
@@ -173,9 +173,14 @@ def test_lines_polygons_points_and_texts_are_drawn_at_their_positions(qapp) -> N
 
 
 def test_extreme_annotation_coordinates_are_painted_safely(qapp) -> None:
-    far = {"x": MAX_PIXELS, "y": -MAX_PIXELS}
-    huge = {"position": far, "diameter": MAX_PIXELS, "thickness": MAX_PIXELS, "outline_color": RED}
-    text = {"position": {"x": 5, "y": 5}, "text": "x" * 10_000, "font_size": MAX_PIXELS}
+    far = {"x": MAX_COORDINATE_PX, "y": -MAX_COORDINATE_PX}
+    huge = {
+        "position": far,
+        "diameter": MAX_COORDINATE_PX,
+        "thickness": MAX_COORDINATE_PX,
+        "outline_color": RED,
+    }
+    text = {"position": {"x": 5, "y": 5}, "text": "x" * 10_000, "font_size": MAX_COORDINATE_PX}
     image = painted({"circles": [huge], "points": [{"type": 3, "points": [far, far], "outline_color": RED}],
                      "texts": [text]})  # fmt: skip
     assert image.width() == 320

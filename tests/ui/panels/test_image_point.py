@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from app.core.run.acting.arming import Target
-from app.core.run.acting.picture_point import TYPES, PicturePoint
+from app.core.run.acting.picture_point import MESSAGE_TYPES, PicturePoint
 from app.ui.panels.image.panel import PANEL, ImagePanel
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
@@ -238,7 +238,9 @@ def test_arming_elsewhere_does_not_arm_the_image_panel_and_closing_disarms(qtbot
     acting.arm()
     acting.allow(Target("topic", POINTS))
     acting.allow(Target("topic", "/other"))
-    panel.restore_state({**panel.save_state(), "point": {"on": True, "topic": POINTS, "type": TYPES[1]}})
+    panel.restore_state(
+        {**panel.save_state(), "point": {"on": True, "topic": POINTS, "type": MESSAGE_TYPES[1]}}
+    )
     ticks(window, panel)
     assert points.isVisible()
     assert not points.is_armed
@@ -246,11 +248,11 @@ def test_arming_elsewhere_does_not_arm_the_image_panel_and_closing_disarms(qtbot
     press(button(panel, f"Send the points to {POINTS}"))
     ticks(window, panel)
     assert points.is_armed
-    heard = window.session.source.listen(POINTS, TYPES[1])
+    heard = window.session.source.listen(POINTS, MESSAGE_TYPES[1])
     click(qtbot, window, panel, 16.5, 8.5)
     assert heard.listen(timeout_s=20.0) == (True, {"x": 16.0, "y": 8.0, "z": 0.0})
     kept = panel.save_state()
-    assert kept["point"] == {"on": True, "topic": POINTS, "type": TYPES[1]}
+    assert kept["point"] == {"on": True, "topic": POINTS, "type": MESSAGE_TYPES[1]}
     panel.dispose()
     assert acting.arming.targets == (Target("topic", "/other"),)
     assert acting.arming.is_on
@@ -262,7 +264,7 @@ def test_arming_elsewhere_does_not_arm_the_image_panel_and_closing_disarms(qtbot
         ticks(window, panel)
     assert points.problem.text()
     assert points.arm() == points.problem.text()
-    assert points.kind.value == TYPES[1]
+    assert points.kind.value == MESSAGE_TYPES[1]
 
 
 def test_robot_command_topic_requires_confirmation_and_another_source_disarms(qtbot, window, panel) -> None:

@@ -16,11 +16,11 @@ from app.core.messages import lazy_json
 from app.core.messages.reader import LARGE_BYTES
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE
 from app.ui.panels.inspector.diff import NO_BASE, changes_text, count_changes
-from app.ui.panels.inspector.footer import message_facts
+from app.ui.panels.inspector.footer import message_info
 from app.ui.panels.inspector.panel import PANEL, InspectorPanel
 from app.ui.panels.inspector.tree_model import TreeNode
 from app.ui.panels.inspector.values import clipboard_text, image_summary
-from app.ui.shell.commands.view import read_value
+from app.ui.shell.commands.view import parse_topic_field
 from nep.messages.clocks import SAME_CLOCK, ClockDifference, PublisherClock
 from nep.messages.fields import parse_path
 from nep.messages.message import Message, message_kind
@@ -83,9 +83,9 @@ def test_latched_message_shows_the_time_since_publication(panel, window) -> None
     half_an_hour_ago = Message("/a", b"1", "json", "json")
     half_an_hour_ago.kind = message_kind("/a", "json", "json", is_latched=True)
     half_an_hour_ago.stamp_ns = now - 1800 * 10**9
-    assert message_facts(half_an_hour_ago, now).endswith("latched, sent 30 min ago")
+    assert message_info(half_an_hour_ago, now).endswith("latched, sent 30 min ago")
     half_an_hour_ago.stamp_ns = now - 10**6
-    assert "latency" in message_facts(half_an_hour_ago, now - 10**9), "it came while somebody looked"
+    assert "latency" in message_info(half_an_hour_ago, now - 10**9), "it came while somebody looked"
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_latency_of_another_computer_is_shown_with_its_uncertainty(took_ns, know
     message = Message("/a", bytes(412), "bytes", "bytes", stamp_ns=10**18)
     message.kind = message_kind("/a", "bytes", "bytes", clock=PublisherClock(known))
     message.seen_ns = 10**18 + took_ns + (0 if known is None else known.offset_ns)
-    assert message_facts(message).split("   ")[-1] == words
+    assert message_info(message).split("   ")[-1] == words
 
 
 def test_latched_message_shows_no_latency(panel, window) -> None:
@@ -124,11 +124,11 @@ def test_latency_of_a_shown_message_does_not_grow(panel, window) -> None:
     window.session.send("/blackboard", blackboard())
     panel.refresh()
     panel.freeze.setChecked(True)
-    said = panel._facts(panel._shown)
+    said = panel._message_info(panel._shown)
     panel._shown.stamp_ns -= 600 * 10**9  # as ten minutes later
     panel._set_mode("raw")
     assert panel.foot.facts.text() == said
-    assert panel._facts(panel._shown) == said
+    assert panel._message_info(panel._shown) == said
 
 
 class Layouts(QObject):
@@ -177,7 +177,7 @@ def test_fast_messages_are_shown_at_ten_hertz_and_the_last_message_always(panel,
     now[0] += 0.1
     ticks(window, panel)
     assert panel.model.value()["n"] == 60
-    assert panel.foot.facts.text().split("   ")[:2] == message_facts(panel._shown).split("   ")[:2]
+    assert panel.foot.facts.text().split("   ")[:2] == message_info(panel._shown).split("   ")[:2]
 
 
 def test_new_topic_and_resumed_panel_show_the_current_message_immediately(panel, window) -> None:
@@ -305,7 +305,7 @@ def test_large_json_message_is_decoded_in_another_thread_and_shown_when_ready(qt
 
 def test_large_message_is_never_decoded_in_the_gui_thread(qtbot, panel, window, monkeypatch) -> None:
     threads: dict[str, set[int]] = {"looked into": set(), "decoded": set()}
-    scan, decode = lazy_json._find_structure, Message.payload.fget
+    scan, decode = lazy_json._find_separators, Message.payload.fget
     assert decode is not None
 
     def scanned(data: memoryview) -> object:
@@ -317,7 +317,7 @@ def test_large_message_is_never_decoded_in_the_gui_thread(qtbot, panel, window, 
             threads["decoded"].add(threading.get_ident())
         return decode(self)
 
-    monkeypatch.setattr(lazy_json, "_find_structure", scanned)
+    monkeypatch.setattr(lazy_json, "_find_separators", scanned)
     monkeypatch.setattr(Message, "payload", property(decoded))
     panel.show_topic("/blackboard")
     panel.compare.setChecked(True)
@@ -588,7 +588,7 @@ def test_alarm_is_created_from_a_value_with_any_key_names(panel, window) -> None
         menu.close()
         next(each for each in menu.actions() if each.text() == "New alarm").trigger()
         command, _colon, about = window.commands[-1].partition(":")
-        topic, path = read_value(about)
+        topic, path = parse_topic_field(about)
         assert (command, topic, parse_path(path)) == ("alarm.value", "/blackboard", steps)
 
 

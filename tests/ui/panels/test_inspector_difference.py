@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import QModelIndex
 
 from app.core.messages.lazy_json import JsonIndex
-from app.ui.panels.inspector.diff import MISSING, NO_BASE, differs, mark_of, parts_of
+from app.ui.panels.inspector.diff import MISSING, NO_BASE, child_diffs, differs, mark_of
 from app.ui.panels.inspector.tree_model import TreeModel, TreeNode
 
 
@@ -43,20 +43,20 @@ def test_missing_value_differs_from_null() -> None:
 
 def test_changed_children_are_marked_and_removed_children_are_listed_last() -> None:
     before, after = {"x": 1, "gone": 2, "same": 3}, {"x": 5, "same": 3, "new": {"deep": 1}}
-    parts, total = parts_of(after, before, "changed", 9, changes_only=False)
+    parts, total = child_diffs(after, before, "changed", 9, changes_only=False)
     assert total == 4
     assert [(key, value, mark) for key, value, _base, mark in parts] == [
         ("x", 5, "changed"), ("same", 3, ""), ("new", {"deep": 1}, "added"), ("gone", 2, "removed"),
     ]  # fmt: skip
-    only, total = parts_of(after, before, "changed", 2, changes_only=True)
+    only, total = child_diffs(after, before, "changed", 2, changes_only=True)
     assert total == 3
     assert [part[0] for part in only] == ["x", "new"]
-    below, _total = parts_of({"deep": 1}, MISSING, "added", 9, changes_only=True)
+    below, _total = child_diffs({"deep": 1}, MISSING, "added", 9, changes_only=True)
     assert [(part[0], part[3]) for part in below] == [("deep", "added")]
 
 
 def test_lists_are_compared_by_index() -> None:
-    parts, total = parts_of([1, 9], [1, 2, 3], "changed", 9, changes_only=False)
+    parts, total = child_diffs([1, 9], [1, 2, 3], "changed", 9, changes_only=False)
     assert total == 3
     assert [(key, value, mark) for key, value, _base, mark in parts] == [
         (0, 1, ""), (1, 9, "changed"), (2, 3, "removed"),

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QLabel
 
 from app.ui.panels import camera, health, robot, robots, sensors
 from app.ui.shell.bars.app_bar import robots_chip
-from app.ui.shell.bars.status_bar import StatusFacts
+from app.ui.shell.bars.status_bar import StatusFormatter
 from app.ui.shell.bars.toast import Toast
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
@@ -60,7 +60,7 @@ def test_camera_does_not_offer_a_robot_that_is_already_starting(qtbot) -> None:
 
 def test_bars_show_that_the_virtual_robot_is_starting() -> None:
     session = fakes.Session()
-    facts = StatusFacts(session)
+    facts = StatusFormatter(session)
     said = (robots_chip(session)[0], facts.health()[1], session.runs.view().detail)
     assert said == ("No robot", "No robot", "No robot is connected")
     session.launcher.start_virtual_robot()

@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 import nep
-from app.core.networks.parameters import ShownParameter
+from app.core.networks.parameters import ReportedParameter
 from app.ui.panels.nodes.panel import PANEL, NodesPanel
 from app.ui.panels.nodes.parameters import CHOICE, LINE, allowed_values_text
 from nep.messages.message import Message
@@ -214,14 +214,14 @@ def test_hidden_panel_does_not_watch_the_parameters(world: World) -> None:
 @pytest.mark.parametrize(
     ("parameter", "words"),
     [
-        (ShownParameter("a", 1, "int"), ""),
-        (ShownParameter("a", 1, "int", minimum=0), "0 or more"),
-        (ShownParameter("a", 1, "float", maximum=0.5), "0.5 or less"),
-        (ShownParameter("a", 1, "int", choices=tuple(range(9))), "0, 1, 2, 3, 4, 5 …"),
-        (ShownParameter("a", 1, "int", minimum=0, read_only=True), "read only"),
+        (ReportedParameter("a", 1, "int"), ""),
+        (ReportedParameter("a", 1, "int", minimum=0), "0 or more"),
+        (ReportedParameter("a", 1, "float", maximum=0.5), "0.5 or less"),
+        (ReportedParameter("a", 1, "int", choices=tuple(range(9))), "0, 1, 2, 3, 4, 5 …"),
+        (ReportedParameter("a", 1, "int", minimum=0, is_read_only=True), "read only"),
     ],
 )
-def test_allowed_values_of_a_parameter_are_described(parameter: ShownParameter, words: str) -> None:
+def test_allowed_values_of_a_parameter_are_described(parameter: ReportedParameter, words: str) -> None:
     assert allowed_values_text(parameter) == words
 
 

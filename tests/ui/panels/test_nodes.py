@@ -14,9 +14,9 @@ from app.ui.panels.nodes.rows import (
     NodeRow,
     _name_tip,
     cpu_text,
-    facts_of,
+    details_text,
     generation_cell,
-    limits_of,
+    limits_text,
     name_cell,
 )
 from app.ui.widgets.table.model import CELL_ROLE
@@ -178,20 +178,20 @@ def test_limitations_of_a_selected_original_nep_node_are_shown(panel, window) ->
 def test_nep_generations_have_labels(generation, words, version) -> None:
     node = NodeEntry("1", "old", generation=generation)
     assert generation_cell(NodeRow(node)).text == words
-    assert version in limits_of(node)
+    assert version in limits_text(node)
     assert generation_cell(NodeRow(node)).icon == "plug"
-    assert limits_of(NodeEntry("1", "new")) == ""
+    assert limits_text(NodeEntry("1", "new")) == ""
 
 
 def test_unsupported_version_is_flagged_with_the_fix() -> None:
     node = NodeEntry("1", "old", generation="0.5.4.6")
     cell = generation_cell(NodeRow(node))
     assert (cell.text, cell.icon, cell.role) == ("NEP 0.5.4.6", "triangle-alert", "warn")
-    assert limits_of(node).endswith("Install 0.5.4.8 or 0.5.4.5.")
+    assert limits_text(node).endswith("Install 0.5.4.8 or 0.5.4.5.")
 
 
 def test_unknown_node_details_are_omitted() -> None:
-    assert facts_of(NodeEntry("1", "bare")) == "bare"
+    assert details_text(NodeEntry("1", "bare")) == "bare"
     assert cpu_text(None) == ""
     assert (cpu_text(0.0), cpu_text(0.099), cpu_text(0.0999)) == ("0.0 %", "9.9 %", "10 %")
 

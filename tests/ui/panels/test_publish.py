@@ -56,11 +56,11 @@ def test_syntax_error_is_located_and_fixed_by_a_button(window, panel) -> None:
     form = panel.form
     assert form.message == LOOK
     assert form.sentence.text().startswith("Line 3, column ")
-    assert form.edit.wrong_line == 3
+    assert form.edit.invalid_line == 3
     assert not form.send.isEnabled()
     assert states(panel) == ["line 3", "not armed"]
     press(form.fix)
-    assert form.edit.wrong_line == 0
+    assert form.edit.invalid_line == 0
     assert form.sentence.text() == "Fill in “yaw” first. The message can't be sent yet."
     QTest.keyClicks(form.values.fields["yaw"], "-12.5")
     ticks(window, panel)
@@ -70,7 +70,7 @@ def test_syntax_error_is_located_and_fixed_by_a_button(window, panel) -> None:
     assert kept is not None
     assert kept.payload() == {"yaw": -12.5, "pitch": 4.0, "speed": 0.3}
     form.edit.edit.undo()
-    assert form.edit.wrong_line == 3
+    assert form.edit.invalid_line == 3
 
 
 def test_auto_indent_keeps_the_indentation_of_the_line(panel) -> None:
@@ -83,7 +83,7 @@ def test_auto_indent_keeps_the_indentation_of_the_line(panel) -> None:
     QTest.keyClick(edit, Qt.Key.Key_Return)
     QTest.keyClicks(edit, '"y": 2}')
     assert edit.toPlainText() == '{\n  "x": 1,\n  "y": 2}'
-    assert panel.form.edit.wrong_line == 0
+    assert panel.form.edit.invalid_line == 0
     press(panel.form.tidy)
     assert edit.toPlainText() == '{\n  "x": 1,\n  "y": 2\n}'
 
@@ -109,7 +109,7 @@ def test_sending_arms_only_the_topic_of_the_message_and_the_switch_disarms(windo
     assert panel.form.count.text()
     press(panel.strip.switch)
     assert not acting.arming.is_on
-    assert acting.outbox.all_repeated == ()
+    assert acting.outbox.repeated_messages == ()
     ticks(window, panel, 7)
     assert states(panel)[1] == "not armed"
     assert panel.strip.words.text() == "Sending is off"

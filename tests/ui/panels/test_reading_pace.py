@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.ui.panels.inspector.pace import BURST, MAX_UPDATE_HZ, UpdateLimiter
+from app.ui.panels.inspector.pace import MAX_BURST, MAX_UPDATE_HZ, UpdateLimiter
 
 
 def let_through(pace: UpdateLimiter, begin_s: float, seconds: float, hz: float = 30.0) -> int:
@@ -12,9 +12,9 @@ def let_through(pace: UpdateLimiter, begin_s: float, seconds: float, hz: float =
 
 def test_first_updates_pass_in_a_burst_and_later_updates_are_throttled() -> None:
     pace = UpdateLimiter()
-    assert [pace.try_acquire(100.0) for _turn in range(BURST + 1)] == [True] * BURST + [False]
+    assert [pace.try_acquire(100.0) for _turn in range(MAX_BURST + 1)] == [True] * MAX_BURST + [False]
     assert MAX_UPDATE_HZ * 10 - 2 <= let_through(pace, 100.0, 10.0) <= MAX_UPDATE_HZ * 10 + 2
-    assert [pace.try_acquire(200.0) for _turn in range(BURST + 1)] == [True] * BURST + [
+    assert [pace.try_acquire(200.0) for _turn in range(MAX_BURST + 1)] == [True] * MAX_BURST + [
         False
     ]  # after a pause
 

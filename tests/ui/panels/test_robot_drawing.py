@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter
 from app.ui.robot_drawing.bubble import paint_bubble, scroll_to_spoken, wrap_text
 from app.ui.robot_drawing.pepper import EMOTIONS
 from app.ui.robot_drawing.room import Spot, Stage
-from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
+from app.ui.robot_drawing.scene import PREVIEW_STATE, RobotDrawing
 from app.ui.robot_drawing.state import RobotState, RoomBounds, Thing
 from tests.ui.sample_data import drawing
 
@@ -62,18 +62,18 @@ def test_each_emotion_has_a_different_face(qapp) -> None:
 
 
 def test_equal_states_give_equal_drawings(qapp) -> None:
-    assert painted(PREVIEW) == painted(PREVIEW)
+    assert painted(PREVIEW_STATE) == painted(PREVIEW_STATE)
 
 
 @pytest.mark.parametrize("size", [(382, 286), (900, 200), (200, 700), (40, 30)])
 def test_drawing_fills_any_area(qapp, size) -> None:
-    image = painted(PREVIEW, QRectF(0, 0, *size))
+    image = painted(PREVIEW_STATE, QRectF(0, 0, *size))
     corners = [(0, 0), (size[0] - 1, 0), (0, size[1] - 1), (size[0] - 1, size[1] - 1)]
     assert all(image.pixelColor(x, y) != QColor("magenta") for x, y in corners)
 
 
 def test_drawing_is_dimmed_in_the_dark_theme(qapp) -> None:
-    light, dark = painted(PREVIEW), painted(PREVIEW, dark=True)
+    light, dark = painted(PREVIEW_STATE), painted(PREVIEW_STATE, dark=True)
     assert dark.pixelColor(5, 5).lightness() < light.pixelColor(5, 5).lightness()
 
 
@@ -98,7 +98,7 @@ def test_left_turn_of_the_robot_is_drawn_to_the_right_of_the_viewer(qapp) -> Non
 @pytest.mark.parametrize("size", [(382, 286), (700, 300)])
 def test_hit_test_finds_parts_at_their_drawn_position(qapp, part, size) -> None:
     area, pen = QRectF(0, 0, *size), RobotDrawing()
-    state = replace(PREVIEW, arm_left_deg=100.0)
+    state = replace(PREVIEW_STATE, arm_left_deg=100.0)
     place = pen.point_of(part, area, state)
     assert place is not None
     assert pen.part_at(place, area, state) == part

@@ -43,7 +43,7 @@ def test_robot_is_drawn_from_its_state_with_name_and_chip(panel, window) -> None
     before = panel.view.grab().toImage()
     link = window.session.fleet.links[0]
     link.drawing = drawing(theta_deg=90.0)
-    link.silent = "silent for 4 s"
+    link.silence_reason = "silent for 4 s"
     panel.refresh()
     assert panel.view.grab().toImage() != before
     assert panel.chip.status == "warn"

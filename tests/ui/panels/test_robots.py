@@ -8,12 +8,12 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.core.robots.known import KEY
+from app.core.robots.known import SETTING_KEY
 from app.robots.description.model import DataField
 from app.ui.panels.robots.list import seen_text
 from app.ui.panels.robots.panel import PANEL, RobotsPanel
 from app.ui.panels.robots.tries import feedback_text, progress_of
-from app.ui.widgets.inputs.fields import LongText
+from app.ui.widgets.inputs.fields import LongTextField
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press
 from tests.ui.sample_data import ACTIONS, Invocation, pepper
@@ -50,7 +50,7 @@ def test_try_button_sends_the_input_of_the_form(panel, window) -> None:
 
 def test_rejected_input_is_reported_below_its_row(panel, window) -> None:
     card = panel.cards["say"]
-    field = card.findChild(LongText)
+    field = card.findChild(LongTextField)
     assert field is not None
     field.set_text("")
     press(card.try_button)
@@ -172,7 +172,7 @@ def test_panel_without_a_robot_offers_the_virtual_robot(qtbot, qapp) -> None:
 def remember(window, name: str, seen_s: float) -> None:
     known = window.session.fleet.known.robots
     told = [{"name": one.name, "seen_s": one.seen_s} for one in known]
-    window.session.fleet.known._settings.set(KEY, [*told, {"name": name, "seen_s": seen_s}])
+    window.session.fleet.known._settings.set(SETTING_KEY, [*told, {"name": name, "seen_s": seen_s}])
 
 
 def test_robot_of_an_earlier_session_is_listed_as_disconnected_and_can_be_removed(qtbot, window) -> None:

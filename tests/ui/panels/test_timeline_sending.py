@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from app.core.run.acting.arming import Target
 from app.ui.panels.timeline import PANEL
 from app.ui.panels.timeline.panel import TimelinePanel
-from app.ui.shell.bars.status_bar import StatusFacts
+from app.ui.shell.bars.status_bar import StatusFormatter
 from tests.nep.recordings.messages import json_message, record
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, has_keys
@@ -102,13 +102,13 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     until(qtbot, window, panel, lambda: all(each.is_ready for each in going))
     until(qtbot, window, panel, lambda: going[0].subscriber_count)
     replay.play()
-    until(qtbot, window, panel, lambda: sum(each.count + each.skipped for each in going) == COUNT)
+    until(qtbot, window, panel, lambda: sum(each.count + each.dropped_count for each in going) == COUNT)
     assert heard.listen(timeout_s=20.0)[0]
     session.tick(), panel.refresh()
     sent = sum(each.count for each in going)
     assert panel.strip.counts.text().startswith(f"{sent} sent")
     assert panel.strip.counts.text().endswith("received by 1")
-    assert "Sending 2 topics of the recording" in StatusFacts(session).arming()[1]
+    assert "Sending 2 topics of the recording" in StatusFormatter(session).arming()[1]
     assert unsaid(panel) == []
 
     QTest.mouseClick(panel.strip.tokens[1], Qt.MouseButton.LeftButton)

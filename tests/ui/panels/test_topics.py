@@ -105,7 +105,7 @@ def test_type_is_shortened_to_its_last_part_and_has_an_icon_without_a_publisher(
 
 def test_removed_topics_are_struck_through_and_show_the_time_since_removal() -> None:
     gone = Topic("/x", gone_s=4.7, is_new=True)
-    assert name_cell(gone).struck
+    assert name_cell(gone).is_struck_out
     assert name_cell(gone).chip is None
     assert age_cell(gone).text == "gone for 4 s"
     assert loss_cell(gone).text == ""

@@ -52,7 +52,7 @@ def tells(window: Window, panel: VariablesPanel, **values: object) -> None:
     run = window.session.runs._runner
     assert run is not None
     told = tuple(display_value(id, value) for id, value in values.items())
-    window.session.runs.on_runner(RunnerEvent("variables", run.run, values=told))
+    window.session.runs.on_runner_event(RunnerEvent("variables", run.run, values=told))
     ticks(window, panel, 1)
 
 

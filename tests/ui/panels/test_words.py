@@ -12,7 +12,7 @@ from PySide6.QtCore import QAbstractItemModel, QAbstractListModel, QModelIndex, 
 from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
 
-from app.core.run.acting.picture_point import TYPES, default_topic
+from app.core.run.acting.picture_point import MESSAGE_TYPES, default_topic
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Robot
 from app.ui.panels.alarms.phrases import payload_text
@@ -23,7 +23,7 @@ from app.ui.panels.nodes import rows as nodes
 from app.ui.panels.topics import columns as topics
 from app.ui.shell.docking.dock import Dock
 from app.ui.theme.theme import Theme
-from app.ui.widgets.table.cells import PADDING, head_font, head_width
+from app.ui.widgets.table.cells import PADDING, header_font, header_width
 from nep.programs.alarms import AlarmRule
 from tests.pseudo import ROOT, texts_of, untranslated
 from tests.ui.clipping import clipped
@@ -137,7 +137,7 @@ def named_in(rules: Iterable[AlarmRule]) -> Iterator[str]:
 
 def data_of(session: Session) -> Iterator[str]:
     """What comes from elsewhere, in whatever language it is."""
-    yield from TYPES
+    yield from MESSAGE_TYPES
     for topic in session.topics:
         yield default_topic(topic.name)
         yield from (topic.name, topic.msg_type, topic.msg_type.rpartition("/")[2], *topic.publisher_nodes)
@@ -146,7 +146,7 @@ def data_of(session: Session) -> Iterator[str]:
     for link in session.fleet.links:
         yield from (link.name, *words_of(link.robot), *texts_in((link.values, link.drawing)))
         yield link.last_stop or ""
-        yield from (text for made in link.past_invocations for text in texts_in((made.given, made.output)))
+        yield from (text for made in link.past_invocations for text in texts_in((made.input, made.output)))
     for record in session.console.records:
         yield from (
             record.text,
@@ -208,7 +208,9 @@ def test_table_columns_are_wide_enough_for_their_headers(pseudo, shown, name) ->
         panel.refresh()
         table = panel.table
         for place, column in enumerate(table.columns):
-            assert table.columnWidth(place) >= head_width(table.theme, column) or table.isColumnHidden(place)
+            assert table.columnWidth(place) >= header_width(table.theme, column) or table.isColumnHidden(
+                place
+            )
             assert table.model().headerData(place, Qt.Orientation.Horizontal, Qt.ItemDataRole.ToolTipRole)
 
 
@@ -217,7 +219,7 @@ def test_table_columns_are_wide_enough_for_their_headers(pseudo, shown, name) ->
 def test_headers_of_the_narrowest_tables_are_not_clipped_in_any_language(theme, language, columns) -> None:
     """Else a translator finds a shorter word: the table gives a column no more room where it is narrow."""
     catalog = words.read(words.po_file(words.LOCALE_FOLDER, language), language)
-    metrics = QFontMetricsF(head_font(theme))
+    metrics = QFontMetricsF(header_font(theme))
     for column in columns:
         entry = catalog.get(column.title, getattr(column.title, "context", None))
         for head in (column.title, entry.string if entry is not None else ""):

@@ -53,9 +53,9 @@ def test_menu_commands_open_their_panels_and_stop_disarms(window: MainWindow) ->
     assert not acting.arming.is_on, "nothing is armed by opening a panel"
     acting.arm()
     acting.allow(Target("topic", "/blackboard"))
-    window._show_facts()
+    window._update_status_bar()
     assert "Armed 5:00" in window.status.texts()
     run("run.stop")
     assert not acting.arming.is_on
-    window._show_facts()
+    window._update_status_bar()
     assert not any(words.startswith("Armed") for words in window.status.texts())

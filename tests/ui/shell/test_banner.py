@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 from app.core.run.view import RunView
 from app.ui.shell.bars.banner import CLICK_GUARD_S
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.main_window import FACTS_REFRESH_TICKS, MainWindow
+from app.ui.shell.main_window import STATUS_REFRESH_TICKS, MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -61,7 +61,7 @@ def say(window: MainWindow, name: str = "one", severity: str = "error") -> None:
 
 
 def settle(window: MainWindow) -> None:
-    for _ in range(FACTS_REFRESH_TICKS):  # Qt lays out what lies in what was laid out
+    for _ in range(STATUS_REFRESH_TICKS):  # Qt lays out what lies in what was laid out
         window.tick()
         QApplication.processEvents()
 

@@ -13,14 +13,14 @@ import pytest
 from PySide6.QtWidgets import QMenu
 
 import app
-from app.ui.shell.actions.actions import ROLES, STOP
+from app.ui.shell.actions.actions import MENU_ROLES, STOP_COMMAND
 from app.ui.shell.actions.command import UnknownCommandError
 from app.ui.shell.bars.banner import STEP_ICONS
-from app.ui.shell.bars.run_bar import PACES
+from app.ui.shell.bars.run_bar import SPEED_COMMANDS
 from app.ui.shell.commands.behaviours import TabPosition
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.menus import LAYOUT_COMMANDS
-from app.ui.shell.commands.robots import RobotSwap
+from app.ui.shell.commands.robots import RobotReplacement
 from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS
 from app.ui.shell.main_window import MainWindow
 from tests.ui import sample_data
@@ -125,7 +125,7 @@ def test_every_referenced_command_is_registered() -> None:
 
 
 def test_lists_of_command_ids_contain_only_existing_commands() -> None:
-    assert {*STEP_ICONS, *ROLES, *PACES, *LAYOUT_COMMANDS, STOP} <= IDS
+    assert {*STEP_ICONS, *MENU_ROLES, *SPEED_COMMANDS, *LAYOUT_COMMANDS, STOP_COMMAND} <= IDS
 
 
 def test_tab_menu_lists_only_tab_commands() -> None:
@@ -159,7 +159,7 @@ def test_unknown_command_id_from_a_panel_raises_immediately(window: MainWindow) 
 
 def test_command_arguments_are_typed() -> None:
     assert TabPosition.parse("a:b:2") == TabPosition("a:b", 2)
-    assert RobotSwap.parse("NAO:Pepper:2") == RobotSwap("NAO", "Pepper:2")
+    assert RobotReplacement.parse("NAO:Pepper:2") == RobotReplacement("NAO", "Pepper:2")
     with pytest.raises(ValueError, match="invalid literal"):
         TabPosition.parse("key:first")
 

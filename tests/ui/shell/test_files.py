@@ -82,7 +82,7 @@ def test_unsaved_behaviour_without_a_file_is_kept_when_its_tab_is_closed(
     commands.run("tab.close")
     kept = list((home / "kept").glob("New behaviour*.nepb"))
     assert len(kept) == 1
-    assert [file.path for file in window.session.settings.recent] == [kept[0].resolve()]
+    assert [file.path for file in window.session.settings.recent_files] == [kept[0].resolve()]
     assert window.toast.text == "Closed New behaviour. You'll find it under Recent."
     assert names(window) == ["New behaviour"]
     assert window.session.document.is_blank
@@ -326,7 +326,7 @@ def test_save_as_renames_the_tab_and_keeps_the_old_file(
     assert names(window) == ["New"]
     assert old.read_bytes() == before
     assert b'"z"' in answers.path.read_bytes()
-    assert [file.name for file in window.session.settings.recent] == ["New", "Old"]
+    assert [file.name for file in window.session.settings.recent_files] == ["New", "Old"]
     assert answers.asked[-1] == f"save {tmp_path / 'Old.nepb'}"
 
 

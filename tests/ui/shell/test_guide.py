@@ -15,7 +15,7 @@ from app import resources
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.table import COMMANDS
 from app.ui.shell.dialogs.about import AboutSheet
-from app.ui.shell.dialogs.guide import PICTURE_RATIO, GuidePage, GuideSheet, read_pages
+from app.ui.shell.dialogs.guide import IMAGE_PIXEL_RATIO, GuidePage, GuideSheet, read_pages
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from nep import i18n
@@ -98,7 +98,7 @@ def test_every_image_exists_in_every_language_and_theme(page: str) -> None:
             path = FOLDER / language / theme / f"{name}.png"
             image = QImage(str(path))
             assert not image.isNull(), path
-            assert round(300 * PICTURE_RATIO) <= image.width() <= round(640 * PICTURE_RATIO), path
+            assert round(300 * IMAGE_PIXEL_RATIO) <= image.width() <= round(640 * IMAGE_PIXEL_RATIO), path
             assert path.stat().st_size < MAX_SIZE, path
             found.append((image.size(), image.pixelColor(4, 4).lightness()))
         (light_size, light), (dark_size, dark) = found

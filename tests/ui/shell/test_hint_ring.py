@@ -10,7 +10,7 @@ from pytestqt.qtbot import QtBot
 
 from app.ui.shell.hint_ring import HintRing
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, name_command
+from app.ui.widgets import Button, assign_command
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -22,7 +22,7 @@ def place(qtbot: QtBot, theme: Theme) -> QWidget:
     button = Button(theme, "Run")
     button.setParent(made)
     button.setGeometry(100, 50, 90, 30)
-    name_command(button, "run.run")
+    assign_command(button, "run.run")
     qtbot.addWidget(made)
     made.show()
     return made

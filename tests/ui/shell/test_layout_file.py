@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.docking.layout_file import LayoutFileError, layout_bytes, read_layout
+from app.ui.shell.docking.layout_file import LayoutFileError, decode_layout, encode_layout
 from app.ui.shell.main_window import MainWindow
 from tests.ui.shell_parts import Answers
 
@@ -19,21 +19,21 @@ PANELS = ("topics", "inspector", "plot")
 
 
 def changed(**values: object) -> bytes:
-    return json.dumps({**json.loads(layout_bytes("Mine", "developer", SAVED)), **values}).encode()
+    return json.dumps({**json.loads(encode_layout("Mine", "developer", SAVED)), **values}).encode()
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
 def test_written_layout_is_read_back(encoding: str):
-    saved = layout_bytes("Mine", "developer", SAVED).decode().encode(encoding)
-    found = read_layout(saved, "file", PANELS)
-    assert (found.name, found.base, found.saved, found.unknown) == ("Mine", "developer", SAVED, ())
+    saved = encode_layout("Mine", "developer", SAVED).decode().encode(encoding)
+    found = decode_layout(saved, "file", PANELS)
+    assert (found.name, found.base, found.saved, found.unknown_panels) == ("Mine", "developer", SAVED, ())
 
 
 def test_unknown_panels_of_a_layout_are_reported_once_and_skipped():
-    found = read_layout(layout_bytes("Mine", "developer", SAVED), "file", ("topics",))
-    assert (found.saved["open"], found.unknown) == (["topics"], ("plot",))
-    found = read_layout(layout_bytes("Mine", "developer", SAVED), "file", ("plot",))
-    assert (found.saved["open"], found.saved["panels"], found.unknown) == (
+    found = decode_layout(encode_layout("Mine", "developer", SAVED), "file", ("topics",))
+    assert (found.saved["open"], found.unknown_panels) == (["topics"], ("plot",))
+    found = decode_layout(encode_layout("Mine", "developer", SAVED), "file", ("plot",))
+    assert (found.saved["open"], found.saved["panels"], found.unknown_panels) == (
         ["plot", "plot#2"],
         {},
         ("topics",),
@@ -46,7 +46,7 @@ def test_unknown_panels_of_a_layout_are_reported_once_and_skipped():
      ("\x00", "the file")],
 )  # fmt: skip
 def test_layout_name_is_reduced_to_a_short_single_line(name, shown):
-    assert read_layout(changed(name=name), "the file", PANELS).name == shown
+    assert decode_layout(changed(name=name), "the file", PANELS).name == shown
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_layout_name_is_reduced_to_a_short_single_line(name, shown):
 )
 def test_invalid_layout_file_is_rejected_with_a_reason(data, sentence):
     with pytest.raises(LayoutFileError, match=f"^{sentence}$"):
-        read_layout(data, "file", PANELS)
+        decode_layout(data, "file", PANELS)
 
 
 def test_layout_is_exported_imported_and_import_can_be_undone(
@@ -97,12 +97,12 @@ def test_layout_is_exported_imported_and_import_can_be_undone(
     assert window.saved_layouts.all() == ()
     saved = json.loads(file.read_bytes())["arrangement"]
     saved["open"].append("teleport")
-    file.write_bytes(layout_bytes("Arm", "developer", saved))
+    file.write_bytes(encode_layout("Arm", "developer", saved))
     for name in ("Arm", "Arm 2"):
         commands.files.open_all([file])  # a drop, or the command line
         assert window.toast.text == f"Opened the layout “{name}”. Unknown panels were skipped: teleport"
         assert set(window.bench.open_names()) == {"topics", "console"}
-    file.write_bytes(layout_bytes("Arm", "developer", {**saved, "docks": ""}))  # Qt has nothing to put back
+    file.write_bytes(encode_layout("Arm", "developer", {**saved, "docks": ""}))  # Qt has nothing to put back
     commands.files.open_all([file])
     assert window.toast.text == "Can't open Mine.nep-layout: the file is damaged"
     assert set(window.bench.open_names()) == {"topics", "console"}

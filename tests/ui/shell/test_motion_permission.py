@@ -14,7 +14,7 @@ from app.core.robots.motion.permission import MotionPermission
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, thing_description
 from app.robots.turtle import ROBOT
-from app.ui.shell.dialogs.motion_permission import MotionQuestion
+from app.ui.shell.dialogs.motion_permission import MotionPermissionCard
 from app.ui.theme.theme import Theme
 from tests.ui.clipping import clipped
 
@@ -32,7 +32,7 @@ class Window(QWidget):
         column.addWidget(self.field)
         self.permission = MotionPermission(Settings(folder))
         self.complaints: list[str] = []
-        self.question = MotionQuestion(Theme("light"), self, self.permission, self.complaints.append)
+        self.question = MotionPermissionCard(Theme("light"), self, self.permission, self.complaints.append)
         self.done: list[str] = []
 
     def ask(self, *actions: str) -> None:

@@ -23,7 +23,7 @@ from app.ui.panels.registry import PanelRegistry
 from app.ui.panels.table_panel import TablePanel
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.docking.dock import Dock
-from app.ui.shell.main_window import FACTS_REFRESH_TICKS, MainWindow
+from app.ui.shell.main_window import STATUS_REFRESH_TICKS, MainWindow
 from app.ui.theme.theme import Theme
 from tests.ui.panels.test_behaviour import Editor
 from tests.ui.shell_parts import Answers, free_address
@@ -226,7 +226,7 @@ def test_toasts_and_banners_leak_no_objects(window: MainWindow) -> None:
         window.session.alerts.raise_alert(
             "x", "error", "This is wrong.", "Mend it.", button="Stop", action="run.stop"
         )
-        for _ in range(FACTS_REFRESH_TICKS):  # the status bar tells of alerts, too
+        for _ in range(STATUS_REFRESH_TICKS):  # the status bar tells of alerts, too
             window.tick()
         window.session.alerts.resolve("x")
         window.tick()

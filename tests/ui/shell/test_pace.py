@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.ui.shell.bars.run_bar import PACES
+from app.ui.shell.bars.run_bar import SPEED_COMMANDS
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
 
@@ -33,7 +33,7 @@ def test_speed_applies_to_the_running_program_and_to_later_programs(
 ) -> None:
     runs, runner = window.session.runs, Runner()
     runs._runner = runner  # type: ignore[assignment]
-    for name in PACES:
+    for name in SPEED_COMMANDS:
         commands.run(name)
     assert runner.paces == [0.0, 0.5, 1.5]
     assert runs.pace_s == 1.5

@@ -14,7 +14,7 @@ from app.core.documents.document import Document
 from app.core.network.topics import Topic
 from app.core.storage.settings import RecentFile
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.dialogs.command_palette import Palette
+from app.ui.shell.dialogs.command_palette import CommandPalette
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import Example
@@ -124,7 +124,7 @@ class Steady(Overlay):
 
 
 @pytest.fixture
-def palette(qtbot, window: MainWindow, commands: Commands) -> Palette:
+def palette(qtbot, window: MainWindow, commands: Commands) -> CommandPalette:
     """The palette, open over the Developer layout."""
     window.theme.set_motion("on")
     window.show()
@@ -132,21 +132,23 @@ def palette(qtbot, window: MainWindow, commands: Commands) -> Palette:
     qtbot.waitUntil(window.isActiveWindow)
     commands.run("layout.developer")
     QTest.keyClick(window, Qt.Key.Key_K, CTRL)
-    made = window.findChild(Palette)
+    made = window.findChild(CommandPalette)
     assert made is not None
     assert made.isVisible()
     return made
 
 
-def words(palette: Palette) -> list[str]:
+def words(palette: CommandPalette) -> list[str]:
     return [line.entry.text for line in palette.rows.lines.lines if isinstance(line, Match)]
 
 
-def headings(palette: Palette) -> list[str]:
+def headings(palette: CommandPalette) -> list[str]:
     return [line.text for line in palette.rows.lines.lines if isinstance(line, Heading)]
 
 
-def test_palette_is_640_px_wide_128_px_from_the_top_and_focused(palette: Palette, window: MainWindow) -> None:
+def test_palette_is_640_px_wide_128_px_from_the_top_and_focused(
+    palette: CommandPalette, window: MainWindow
+) -> None:
     assert (palette.width(), palette.y()) == (640, 128)
     assert abs(palette.geometry().center().x() - window.rect().center().x()) <= 1
     assert palette.field.hasFocus()
@@ -154,7 +156,7 @@ def test_palette_is_640_px_wide_128_px_from_the_top_and_focused(palette: Palette
 
 
 def test_palette_opens_in_120_ms_and_immediately_with_reduced_motion(
-    qtbot, palette: Palette, window: MainWindow
+    qtbot, palette: CommandPalette, window: MainWindow
 ) -> None:
     assert palette.graphicsEffect() is None
     palette.dismiss()
@@ -165,7 +167,7 @@ def test_palette_opens_in_120_ms_and_immediately_with_reduced_motion(
 
 
 def test_stop_button_stays_undimmed_and_clickable_above_the_palette(
-    palette: Palette, window: MainWindow
+    palette: CommandPalette, window: MainWindow
 ) -> None:
     stop = window.tool_bar.stop
     middle = stop.mapTo(window, stop.rect().center())
@@ -181,7 +183,7 @@ def test_stop_button_stays_undimmed_and_clickable_above_the_palette(
 @pytest.mark.parametrize("percent", [200, 125, 100])
 @pytest.mark.parametrize("layout", ["behaviour", "developer"])
 def test_overlay_cutout_follows_the_stop_button_when_the_text_size_changes(
-    qtbot, palette: Palette, window: MainWindow, layout: str, percent: int
+    qtbot, palette: CommandPalette, window: MainWindow, layout: str, percent: int
 ) -> None:
     """Whatever opens over the window: one that keeps its place is not laid out again by itself."""
     palette.dismiss()
@@ -204,7 +206,7 @@ def test_overlay_cutout_follows_the_stop_button_when_the_text_size_changes(
     qtbot.waitUntil(follows)
 
 
-def test_f12_stops_while_the_palette_is_open(palette: Palette, commands: Commands) -> None:
+def test_f12_stops_while_the_palette_is_open(palette: CommandPalette, commands: Commands) -> None:
     stops: list[str] = []
     commands.actions["run.stop"].triggered.connect(lambda: stops.append("stop"))
     QTest.keyClick(palette.field, Qt.Key.Key_F12)
@@ -212,7 +214,7 @@ def test_f12_stops_while_the_palette_is_open(palette: Palette, commands: Command
     assert palette.isVisible()
 
 
-def test_command_is_found_and_run(palette: Palette, window: MainWindow) -> None:
+def test_command_is_found_and_run(palette: CommandPalette, window: MainWindow) -> None:
     QTest.keyClicks(palette.field, "dark")
     assert words(palette)[0] == "Dark"
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
@@ -223,13 +225,15 @@ def test_command_is_found_and_run(palette: Palette, window: MainWindow) -> None:
     assert words(palette)[0] == "Dark"
 
 
-def test_recently_used_commands_are_remembered_after_restart(palette: Palette, window: MainWindow) -> None:
+def test_recently_used_commands_are_remembered_after_restart(
+    palette: CommandPalette, window: MainWindow
+) -> None:
     QTest.keyClicks(palette.field, "larger")
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
     assert window.session.settings.get("palette_last", []) == ["command:text.larger"]
 
 
-def test_results_are_selected_by_keyboard(palette: Palette) -> None:
+def test_results_are_selected_by_keyboard(palette: CommandPalette) -> None:
     order = words(palette)
 
     def chosen_after(key: Qt.Key) -> str:
@@ -247,7 +251,9 @@ def test_results_are_selected_by_keyboard(palette: Palette) -> None:
     assert chosen_after(Qt.Key.Key_Home) == order[0]
 
 
-def test_esc_and_ctrl_k_close_the_palette_and_restore_focus(palette: Palette, window: MainWindow) -> None:
+def test_esc_and_ctrl_k_close_the_palette_and_restore_focus(
+    palette: CommandPalette, window: MainWindow
+) -> None:
     palette.dismiss()
     panel = window.benches["developer"].docks["topics"].panel
     assert isinstance(panel, PlainPanel)
@@ -261,12 +267,12 @@ def test_esc_and_ctrl_k_close_the_palette_and_restore_focus(palette: Palette, wi
     assert not palette.isVisible()
 
 
-def test_click_outside_closes_the_palette(palette: Palette) -> None:
+def test_click_outside_closes_the_palette(palette: CommandPalette) -> None:
     QTest.mouseClick(palette._scrim, Qt.MouseButton.LeftButton, pos=QPoint(20, 400))
     assert not palette.isVisible()
 
 
-def test_tab_stays_inside_the_palette(palette: Palette) -> None:
+def test_tab_stays_inside_the_palette(palette: CommandPalette) -> None:
     for _ in range(3):
         QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
         focus = QApplication.focusWidget()
@@ -274,7 +280,9 @@ def test_tab_stays_inside_the_palette(palette: Palette) -> None:
         assert palette.isAncestorOf(focus)
 
 
-def test_panels_topics_and_files_are_found(palette: Palette, window: MainWindow, tmp_path: Path) -> None:
+def test_panels_topics_and_files_are_found(
+    palette: CommandPalette, window: MainWindow, tmp_path: Path
+) -> None:
     palette.dismiss()
     topics = window.session.topics
     topics._topics["/faces"] = Topic("/faces", "json", "json")
@@ -316,7 +324,9 @@ def test_examples_are_found_and_open_as_new_behaviours(palette, window: MainWind
     assert window.session.document.path is None
 
 
-def test_unavailable_command_shows_the_reason_and_is_not_run(palette: Palette, window: MainWindow) -> None:
+def test_unavailable_command_shows_the_reason_and_is_not_run(
+    palette: CommandPalette, window: MainWindow
+) -> None:
     palette.field.setText("smaller text")
     entry = palette.rows.entry
     assert entry is not None
@@ -326,7 +336,7 @@ def test_unavailable_command_shows_the_reason_and_is_not_run(palette: Palette, w
     assert window.theme.text_percent == 100
 
 
-def test_empty_result_is_reported(palette: Palette) -> None:
+def test_empty_result_is_reported(palette: CommandPalette) -> None:
     palette.field.setText("qqqq")
     assert palette.rows.entry is None
     assert palette.nothing.text() == "No results for “qqqq”."
@@ -335,7 +345,7 @@ def test_empty_result_is_reported(palette: Palette) -> None:
     assert palette.isVisible()
 
 
-def test_result_list_is_bounded_with_ten_thousand_topics(palette: Palette, window: MainWindow) -> None:
+def test_result_list_is_bounded_with_ten_thousand_topics(palette: CommandPalette, window: MainWindow) -> None:
     palette.dismiss()
     for number in range(10_000):
         window.session.topics._topics[f"/t{number}"] = Topic(f"/t{number}", "json", "json")
@@ -348,7 +358,7 @@ def test_result_list_is_bounded_with_ten_thousand_topics(palette: Palette, windo
     assert palette.height() < 600
 
 
-def test_screen_reader_text_contains_command_shortcut_and_reason(palette: Palette) -> None:
+def test_screen_reader_text_contains_command_shortcut_and_reason(palette: CommandPalette) -> None:
     palette.field.setText("stop the program")
     index = palette.rows.currentIndex()
     spoken = index.data(Qt.ItemDataRole.AccessibleTextRole)
@@ -357,7 +367,7 @@ def test_screen_reader_text_contains_command_shortcut_and_reason(palette: Palett
     assert palette.accessibleName() == "Command palette"
 
 
-def test_search_field_in_the_app_bar_opens_the_palette(palette: Palette, window: MainWindow) -> None:
+def test_search_field_in_the_app_bar_opens_the_palette(palette: CommandPalette, window: MainWindow) -> None:
     palette.dismiss()
     assert window.bar.search.toolTip() == "Find a command or panel (Ctrl+K)"
     QTest.mouseClick(window.bar.search, Qt.MouseButton.LeftButton)

@@ -15,7 +15,7 @@ from PySide6.QtPrintSupport import QPrintDialog, QPrinter
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.session import Session
-from app.ui.shell.commands.printing import Printing, default_page_layout, paint_pdf
+from app.ui.shell.commands.printing import PrintCommands, default_page_layout, paint_pdf
 from app.ui.shell.commands.shell import Shell
 from tests.ui.shell_parts import Answers
 
@@ -55,7 +55,7 @@ class Case:
         shell = SimpleNamespace(editor=lambda: self.editor, show_toast=self.said.append, surface=surface)
         session = SimpleNamespace(document=SimpleNamespace(name="Tea", path=None))
         self.answers = Answers()
-        self.printing = Printing(
+        self.printing = PrintCommands(
             cast("Shell", shell), cast("Session", session), self.answers, lambda: printers
         )
 

@@ -12,7 +12,7 @@ from PySide6.QtGui import QColor, QGuiApplication, QImage
 from pytestqt.qtbot import QtBot
 
 from app.core.session import Session
-from app.ui.shell.commands.program_pictures import ProgramPictures
+from app.ui.shell.commands.program_pictures import ImageCommands
 from app.ui.shell.commands.shell import Shell
 from tests.ui.shell_parts import Answers
 
@@ -29,10 +29,10 @@ class Editor:
         done(self.data)
 
 
-def made(editor: Editor, said: list[str], answers: Answers | None = None) -> ProgramPictures:
+def made(editor: Editor, said: list[str], answers: Answers | None = None) -> ImageCommands:
     shell = SimpleNamespace(editor=lambda: editor, show_toast=said.append)
     session = SimpleNamespace(document=SimpleNamespace(name="Tea", path=None))
-    return ProgramPictures(cast("Shell", shell), cast("Session", session), answers or Answers())
+    return ImageCommands(cast("Shell", shell), cast("Session", session), answers or Answers())
 
 
 def test_typed_file_extension_selects_the_image_format(tmp_path: Path) -> None:

@@ -114,13 +114,13 @@ class Answered:
 
 def test_only_the_current_question_can_be_answered_and_only_once() -> None:
     asking, runner = OpenQuestion(), Answered(4)
-    asking.apply(RunnerEvent("ask", 4, text="Nobody runs yet", question=9))
+    asking.on_event(RunnerEvent("ask", 4, text="Nobody runs yet", question=9))
     assert asking.question is None
     asking.reset(cast("Runner", runner))
-    asking.apply(RunnerEvent("ask", 4, text="Name?", question=1))
+    asking.on_event(RunnerEvent("ask", 4, text="Name?", question=1))
     shown = asking.question
     assert shown is not None
-    asking.apply(RunnerEvent("ask", 4, text="Age?", question=2))
+    asking.on_event(RunnerEvent("ask", 4, text="Age?", question=2))
     asking.answer(shown, "late")
     assert runner.got == []
     newest = asking.question
@@ -128,9 +128,9 @@ def test_only_the_current_question_can_be_answered_and_only_once() -> None:
     asking.answer(newest, "7")
     asking.answer(newest, "8")
     assert (runner.got, asking.question) == ([(2, "7")], None)
-    asking.apply(RunnerEvent("ask", 4, question=0))
+    asking.on_event(RunnerEvent("ask", 4, question=0))
     assert asking.question is None
-    asking.apply(RunnerEvent("ask", 4, text="Name?", question=3))
+    asking.on_event(RunnerEvent("ask", 4, text="Name?", question=3))
     asking.clear()
     assert asking.question is None
 

@@ -73,7 +73,7 @@ def sheet_of(window: MainWindow) -> RecordSheet:
 
 def shown(window: MainWindow) -> str:
     window.tools.refresh()
-    window._show_facts()
+    window._update_status_bar()
     return window.tools.record.text()
 
 
@@ -91,7 +91,7 @@ def test_shortcut_starts_and_stops_recording_and_the_bars_show_the_recording(win
     assert "Recording 0:42, 168 MB, 2 lost" in window.status.texts()
     assert window.commands.actions.disabled_reason("recording.stop") == ""
     window.commands.run("layout.behaviour")
-    window._show_facts()
+    window._update_status_bar()
     assert any(words.startswith("Recording 0:42") for words in window.status.texts())
     window.commands.run("recording.toggle")
     recorder.say("ended", status=status(duration_s=42.0, size_bytes=168_000_000))
@@ -128,7 +128,7 @@ def test_only_selected_topics_are_recorded(window, recorder):
     assert sheet.count.text().startswith(f"{len(names)} of {len(names)}")
     sheet._set_mode("chosen")
     assert session.recordings.choice.topics == tuple(names)
-    sheet._toggle("/odom")
+    sheet._toggle_topic("/odom")
     assert sheet.count.text().startswith(f"{len(names) - 1} of {len(names)}")
     place = sheet.model.index_of("/odom").row()
     assert [sheet.model.cell_at(place, column).accessible_text for column in (0,)] == ["excluded"]
@@ -223,7 +223,7 @@ def test_saving_the_last_seconds_offers_to_enable_the_flight_recorder(window, re
     window.commands.recording._enable_flight_recorder()
     recorder.say("ring")
     recorder.say("figures", recording=None, ring={"seconds": 41.0, "size_bytes": 10**9}, free_bytes=None)
-    window._show_facts()
+    window._update_status_bar()
     assert "last 41 s available" in window.status.texts()
     window.commands.run("recording.keep")
     assert recorder.ops() == ["ring", "keep"]
@@ -241,7 +241,7 @@ def test_saving_the_last_seconds_offers_to_enable_the_flight_recorder(window, re
     order = recorder.line.orders[-1]
     assert (order["topics"], order["left_out"]) == (["/arm/*"], ["/arm/raw"])
     sheet.ring_topics.show_patterns(("/b\x01",), ())
-    sheet.ring_topics.settled.emit()
+    sheet.ring_topics.editing_finished.emit()
     assert recorder.session.recordings.wish.patterns == ("/arm/*",)
     assert "isn't a valid topic name" in sheet.ring_words.text()
     sheet.ring.click()

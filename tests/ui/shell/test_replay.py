@@ -203,7 +203,7 @@ def test_tool_bar_and_status_bar_show_whether_live_or_recorded_data_are_shown(qt
     opened(qtbot, window, path)
     window.tools.refresh()
     assert source.text() == "Tour.mcap  0:00"
-    window._show_facts()
+    window._update_status_bar()
     assert window.status.texts()[0].startswith("Tour.mcap, ")
     assert "The live network keeps running" in window.status.texts()
     QTest.mouseClick(source.back, Qt.MouseButton.LeftButton)

@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 
 from app.core.documents.file_format import read_file
 from app.core.reports.crash import Crash
-from app.core.reports.crash_reports import ALERT, CrashReports, show_crash_alert
+from app.core.reports.crash_reports import ALERT_ID, CrashReports, show_crash_alert
 from app.core.session import Session
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.reporting import ReportCommands
@@ -186,7 +186,7 @@ def test_banner_offers_a_crash_report_that_contains_the_crash(
     sheet = window.findChild(ReportSheet)
     assert sheet is not None
     assert "1 crash report" in lines(sheet)
-    assert not session.alerts.has(ALERT)
+    assert not session.alerts.has(ALERT_ID)
     answers.path = tmp_path / "report.zip"
     written(qtbot, sheet)
     crashes = [data for name, data in inside(tmp_path / "report.zip").items() if name.startswith("crashes/")]
@@ -201,9 +201,9 @@ def test_dismissed_crash_is_not_offered_again(window: MainWindow, session: Sessi
     window.banner.banner.close_button.click()
     window.tick()
     assert not window.banner.isVisible()
-    session.alerts.resolve(ALERT)  # as at the next start
+    session.alerts.resolve(ALERT_ID)  # as at the next start
     show_crash_alert(session.alerts, CrashReports())
-    assert not session.alerts.has(ALERT)
+    assert not session.alerts.has(ALERT_ID)
 
 
 def test_report_sheet_is_operated_by_keyboard(

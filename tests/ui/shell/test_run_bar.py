@@ -12,7 +12,7 @@ from app.core.robots.stop.report import StopStatus
 from app.core.run.view import RunView
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.actions.command import Command
-from app.ui.shell.bars.run_bar import PACES, RunBar, ToolBar
+from app.ui.shell.bars.run_bar import SPEED_COMMANDS, RunBar, ToolBar
 from app.ui.theme.theme import Theme
 from app.ui.widgets import StopButton, paint
 
@@ -125,7 +125,7 @@ def test_restart_replaces_run_and_is_filled_when_the_blocks_were_edited(bar: Run
 
 def test_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
     told: list[str] = []
-    names = ("run.run", "run.restart", "run.pause", "run.step", "run.stop", "run.confirm", *PACES)
+    names = ("run.run", "run.restart", "run.pause", "run.step", "run.stop", "run.confirm", *SPEED_COMMANDS)
 
     def row(name: str) -> Command[None]:
         return Command(name, name, lambda _do: told.append(name))
@@ -182,7 +182,7 @@ def test_stop_button_fits_all_its_texts_and_its_shortcut(qtbot, theme: Theme, pl
     stop.resize(size)
     font, key_font = stop._fonts()
     key = paint.width_of(key_font, "F12") + 7 if place != "runBar" else 0
-    needed = stop._side() + 8 + paint.width_of(font, word) + key
+    needed = stop._icon_side() + 8 + paint.width_of(font, word) + key
     assert needed + 12 <= size.width() - 2 * 4, "within its frame, with some air"
 
 

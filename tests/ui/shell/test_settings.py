@@ -116,10 +116,10 @@ def test_missing_recent_files_are_disabled_and_the_list_can_be_cleared(
         "Clear recent files": True,
     }
     commands.run("file.forget_recent")
-    assert settings.all_recent == []
+    assert settings.all_recent_files == []
     window.show()
     QTest.mouseClick(window.toast.button, Qt.MouseButton.LeftButton)
-    assert [file.name for file in settings.all_recent] == ["there", "gone"]
+    assert [file.name for file in settings.all_recent_files] == ["there", "gone"]
 
 
 def test_failed_settings_write_is_reported_once_until_a_write_succeeds(tmp_path: Path) -> None:

@@ -13,10 +13,10 @@ from PySide6.QtWidgets import QApplication
 
 from app.core.session import Session
 from app.ui.panels.base import PanelContext
-from app.ui.shell.dialogs.command_palette import TITLES, Palette
-from app.ui.shell.docking.dock import Dock, key_of, parse_key
+from app.ui.shell.dialogs.command_palette import GROUP_TITLES, CommandPalette
+from app.ui.shell.docking.dock import Dock, format_key, parse_key
 from app.ui.shell.docking.layouts import layout_named
-from app.ui.shell.docking.workbench import MAX_PER_KIND, Workbench
+from app.ui.shell.docking.workbench import MAX_PANELS_PER_KIND, Workbench
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from app.ui.widgets.lists.entry_list import Heading
@@ -95,7 +95,7 @@ def apart(one: Dock, other: Dock) -> bool:
 )  # fmt: skip
 def test_panel_key_encodes_kind_and_number(key, kind) -> None:
     assert parse_key(key) == kind
-    assert key_of(*kind) == key
+    assert format_key(*kind) == key
 
 
 def test_additional_panel_opens_next_to_the_first_with_a_number_and_its_own_topic(
@@ -136,9 +136,9 @@ def test_single_instance_panel_offers_no_additional_panel(bench) -> None:
 
 
 def test_number_of_panels_of_a_kind_is_limited(bench, window) -> None:
-    opened = [bench.open_another("image") for _ in range(MAX_PER_KIND)]
-    assert len([dock for dock in opened if dock is not None]) == MAX_PER_KIND - 1
-    assert window.toast.text == f"The maximum of {MAX_PER_KIND} panels of this kind is already open"
+    opened = [bench.open_another("image") for _ in range(MAX_PANELS_PER_KIND)]
+    assert len([dock for dock in opened if dock is not None]) == MAX_PANELS_PER_KIND - 1
+    assert window.toast.text == f"The maximum of {MAX_PANELS_PER_KIND} panels of this kind is already open"
 
 
 def test_panels_are_restored_with_their_topics_after_restart(qtbot, bench, window) -> None:
@@ -234,7 +234,7 @@ def test_command_for_an_additional_panel_is_found_in_the_palette(bench, window, 
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
     window.commands.run("palette.open")
-    palette = window.findChild(Palette)
+    palette = window.findChild(CommandPalette)
     assert palette is not None
     lines = palette.rows.lines.lines
     assert "Another panel" in [line.text for line in lines if isinstance(line, Heading)]
@@ -246,5 +246,5 @@ def test_command_for_an_additional_panel_is_found_in_the_palette(bench, window, 
 
 def test_every_entry_kind_in_the_palette_has_a_heading(bench, window) -> None:
     kinds = {entry.kind for entry in window.commands.view._entries.all()}
-    assert kinds <= TITLES.keys()
+    assert kinds <= GROUP_TITLES.keys()
     assert "another" in kinds

@@ -12,12 +12,12 @@ from PySide6.QtTest import QTest
 from app.core.storage.settings import Settings
 from app.robots.description.description import Parameter
 from app.ui.panels.console.list import LogFindField
-from app.ui.panels.robots.controls.number import OpenNumber
+from app.ui.panels.robots.controls.number import OpenNumberEdit
 from app.ui.shell.actions.shortcuts import FIXED_KEYS, Shortcuts
 from app.ui.shell.bars.app_bar import AppBar
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.table import COMMANDS
-from app.ui.shell.dialogs.command_palette import Palette
+from app.ui.shell.dialogs.command_palette import CommandPalette
 from app.ui.shell.dialogs.shortcuts import ShortcutSheet
 from app.ui.shell.docking.layouts import LAYOUTS
 from app.ui.shell.main_window import MainWindow
@@ -97,7 +97,7 @@ def test_text_navigation_keys_are_handled_by_the_text_field(
     words = LogFindField(theme)
     qtbot.addWidget(words)
     words.exited.connect(lambda: left.append("console"))
-    number = OpenNumber(theme, Parameter("n", "n", "number", default=5))
+    number = OpenNumberEdit(theme, Parameter("n", "n", "number", default=5))
     qtbot.addWidget(number)
     number.setText("5")
     for each in (field, words, number):
@@ -250,7 +250,7 @@ def test_changed_shortcut_applies_immediately_to_action_tooltip_and_palette(
     QTest.keyClick(window, Qt.Key.Key_F8)
     assert paused == ["pause"]
     commands.view.open_palette()
-    palette = window.findChild(Palette)
+    palette = window.findChild(CommandPalette)
     assert palette is not None
     palette.field.setText("pause")
     assert palette.rows.entry is not None
@@ -328,7 +328,7 @@ def test_ctrl_enter_in_the_palette_opens_the_shortcut_sheet(
 ) -> None:
     sheet.dismiss()
     commands.view.open_palette()
-    palette = window.findChild(Palette)
+    palette = window.findChild(CommandPalette)
     assert palette is not None
     palette.field.setText("save as")
     QTest.keyClick(palette.field, Qt.Key.Key_Return, CTRL)

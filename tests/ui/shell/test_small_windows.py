@@ -25,7 +25,7 @@ from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.theme.theme import Mode, Theme
 from app.ui.widgets import Chip, StopButton
-from app.ui.widgets.menus import avoid_stop
+from app.ui.widgets.menus import geometry_beside_stop
 from tests.ui.clipping import clipped
 from tests.ui.fakes import Session
 from tests.ui.shell_parts import Answers
@@ -330,14 +330,14 @@ STOP = QRect(780, 50, 230, 52)
     ],
 )
 def test_menu_that_would_cover_stop_is_moved(menu: QRect, goes_to: tuple[int, int]) -> None:
-    assert avoid_stop(menu, STOP, SCREEN).topLeft().toTuple() == goes_to
-    assert avoid_stop(menu, STOP, SCREEN).size() == menu.size()
+    assert geometry_beside_stop(menu, STOP, SCREEN).topLeft().toTuple() == goes_to
+    assert geometry_beside_stop(menu, STOP, SCREEN).size() == menu.size()
 
 
 def test_menu_that_is_too_wide_to_avoid_stop_is_narrowed() -> None:
-    assert avoid_stop(QRect(0, 0, 1000, 590), STOP, SCREEN) == QRect(0, 0, 780, 590)
+    assert geometry_beside_stop(QRect(0, 0, 1000, 590), STOP, SCREEN) == QRect(0, 0, 780, 590)
     early = QRect(100, 50, 230, 52)  # left of this there is no room for words
-    assert avoid_stop(QRect(0, 0, 1000, 590), early, SCREEN) == QRect(0, 0, 1000, 590)
+    assert geometry_beside_stop(QRect(0, 0, 1000, 590), early, SCREEN) == QRect(0, 0, 1000, 590)
 
 
 @pytest.mark.parametrize("wide", [24, 34, 90])

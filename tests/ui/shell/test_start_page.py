@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QLabel, QScrollArea
 
 from app import resources
 from app.core.storage.settings import RecentFile
-from app.ui.shell.start_page.cards import BigCard, CardTitle
+from app.ui.shell.start_page.cards import CardTitle, StartCard
 from app.ui.shell.start_page.open_work import OpenWork
 from app.ui.shell.start_page.page import StartPage, read_examples
 from app.ui.shell.start_page.preview import Row, category_of, rows
@@ -21,7 +21,7 @@ from app.ui.text.dates import relative_day_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
 from app.ui.widgets.buttons import LinkButton
-from nep.i18n import PSEUDO, install
+from nep.i18n import PSEUDO_LANGUAGE, install
 from tests.ui.shell_parts import examples
 from tools.words import compile_all, extract
 
@@ -61,9 +61,9 @@ def test_start_page_has_exactly_one_primary_button(page: StartPage) -> None:
     assert [b.text() for b in page.findChildren(Button) if b.kind == "primary"] == ["Use the virtual robot"]
 
 
-def cards(page: StartPage) -> list[BigCard]:
+def cards(page: StartPage) -> list[StartCard]:
     """The large cards from left to right."""
-    return sorted(page.findChildren(BigCard), key=lambda card: (card.y(), card.x()))
+    return sorted(page.findChildren(StartCard), key=lambda card: (card.y(), card.x()))
 
 
 def filled(page: StartPage) -> list[str]:
@@ -247,7 +247,7 @@ def test_example_titles_and_descriptions_are_translated(monkeypatch, tmp_path: P
     monkeypatch.setattr("nep.i18n._current", None)
     extract(tmp_path)
     compile_all(tmp_path)
-    install(PSEUDO, tmp_path)
+    install(PSEUDO_LANGUAGE, tmp_path)
     for each in read_examples(resources.folder() / "examples"):
         assert each.name.startswith("[")
         assert each.text.startswith("[")

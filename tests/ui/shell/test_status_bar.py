@@ -8,7 +8,7 @@ import pytest
 
 from app.core.network.master import MasterState
 from app.ui.shell.bars.app_bar import robots_chip
-from app.ui.shell.bars.status_bar import StatusBar, StatusFacts
+from app.ui.shell.bars.status_bar import StatusBar, StatusFormatter
 from app.ui.theme.theme import Theme
 from tests.ui import fakes
 from tests.ui.shell_parts import robots_in
@@ -21,8 +21,8 @@ def session() -> fakes.Session:
     return fakes.Session.full()
 
 
-def facts(session: object) -> StatusFacts:
-    return StatusFacts(session, clock=time.gmtime)  # type: ignore[arg-type]
+def facts(session: object) -> StatusFormatter:
+    return StatusFormatter(session, clock=time.gmtime)  # type: ignore[arg-type]
 
 
 def test_health_item_shows_alerts_before_robots(session: fakes.Session) -> None:
@@ -46,7 +46,7 @@ def test_health_item_matches_the_health_panel(session: fakes.Session) -> None:
 def test_robot_that_has_not_reported_is_connected_and_not_healthy(session: fakes.Session) -> None:
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
-    link.replied_s, link.values = None, {}
+    link.last_reply_s, link.values = None, {}
     for topic in session.topics:
         topic.rate_hz = topic.age_s = None
     assert facts(session).health() == ("circle-dashed", "Pepper is connected", "off")
@@ -121,9 +121,9 @@ def test_empty_status_items_leave_no_gap(qtbot, theme: Theme) -> None:
     qtbot.addWidget(bar)
     bar.resize(900, 26)
     bar.show()
-    bar.show_facts((("", "one", None), ("", "", None), ("", "two", None)), (("", "right", None),))
+    bar.show_entries((("", "one", None), ("", "", None), ("", "two", None)), (("", "right", None),))
     assert bar.texts() == ["one", "two", "right"]
-    bar.show_facts((("", "one", None),), ())
+    bar.show_entries((("", "one", None),), ())
     assert bar.texts() == ["one"]
 
 

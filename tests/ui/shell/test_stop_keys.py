@@ -16,7 +16,7 @@ import app.ui
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.studio_dialogs import StudioDialogs
 from app.ui.shell.main_window import MainWindow
-from app.ui.widgets.field_drag import DragKeys, drag_field
+from app.ui.widgets.field_drag import DragKeyFilter, drag_field
 from app.ui.widgets.inputs.combo_box import ComboBox
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -221,6 +221,6 @@ def test_stop_works_during_drag_and_drop_of_a_field(
 def test_keys_that_control_a_drag_do_not_trigger_stop(window: MainWindow, monkeypatch, key: Qt.Key) -> None:
     ended: list[str] = []
     monkeypatch.setattr(QDrag, "cancel", staticmethod(lambda: ended.append("cancelled")))
-    keys = DragKeys(ended.append)
+    keys = DragKeyFilter(ended.append)
     assert not keys.eventFilter(window, QKeyEvent(QEvent.Type.KeyPress, key, Qt.KeyboardModifier.NoModifier))
     assert ended == []

@@ -17,11 +17,11 @@ from websockets.sync.client import connect
 
 from app.core.network.web_pages import WebPages
 from app.ui.shell.dialogs.web_pages import WebPagesSheet
-from app.ui.shell.dialogs.web_pages.qr_code import QUIET_ZONE, modules_of
+from app.ui.shell.dialogs.web_pages.qr_code import QUIET_ZONE, encode_modules
 from app.ui.theme.theme import Theme
 from app.ui.widgets.keyboard import tab_stops
 from nep.masters.master import Master
-from nep.programs.web.context import PageTopic, Refusal
+from nep.programs.web.context import PageTopic, Rejection
 from nep.system.addresses import OwnAddress
 from tests.core.network.fake_web_server import FakeWebServer, page
 from tests.pseudo import untranslated
@@ -145,7 +145,7 @@ def test_disconnected_page_is_struck_through_without_a_button(desk: Desk) -> Non
     sheet.refresh()
     row = sheet.model.page_row(sheet.model.index(0, 0))
     assert row is not None
-    assert row.listed.gone_s is not None
+    assert row.listed_page.gone_s is not None
     sheet.table.setCurrentIndex(sheet.model.index(0, 0))
     QTest.keyClick(sheet.table, Qt.Key.Key_Delete)
     assert [each.id for each in server.pages] == [2]
@@ -154,7 +154,7 @@ def test_disconnected_page_is_struck_through_without_a_button(desk: Desk) -> Non
 def test_row_button_disconnects_its_page(desk: Desk) -> None:
     server, sheet = with_pages(desk), desk.sheet
     row = QRectF(sheet.table.visualRect(sheet.model.index(1, 0)))
-    button = sheet.table.cell("disconnect", row).center().toPoint()
+    button = sheet.table.cell_rect("disconnect", row).center().toPoint()
     QTest.mouseClick(sheet.table.viewport(), Qt.MouseButton.LeftButton, pos=button)
     assert ([each.id for each in server.pages], server.kept_out) == ([1], {2})
     _words, undo = desk.said[-1]
@@ -210,7 +210,7 @@ def test_qr_code_encodes_the_test_page_url_and_stays_light_in_the_dark_theme(
     assert code.text == f"http://192.168.1.20:9090/?token={desk.web.token}"
     theme.set_mode("dark")
     image = code.grab().toImage()
-    size = len(modules_of(code.text))
+    size = len(encode_modules(code.text))
     ratio = image.width() / code.width()
     side = int(image.width() / (size + 2 * QUIET_ZONE))
     quiet = (image.width() - side * size) / 2
@@ -268,7 +268,7 @@ def test_tab_order_follows_the_reading_order(desk: Desk) -> None:
 
 def test_rejected_robot_links_to_the_selection_of_robots(desk: Desk) -> None:
     server, sheet = desk.switch_on(), desk.sheet
-    server.refusals = (Refusal(1.0, "http://lab.example", "refused", kind="robot", robot="Turtle"),)
+    server.rejections = (Rejection(1.0, "http://lab.example", "refused", kind="robot", robot="Turtle"),)
     sheet.refresh()
     sheet.notice.button.click()
     assert sheet.permissions.robots.boxes["Turtle"].isVisible()
@@ -319,7 +319,7 @@ def test_texts_are_translated_and_fit(
     desk.window.resize(*size)
     desk.web.listen_on(WIFI.host)
     server = with_pages(desk)
-    server.refusals = (Refusal(1.0, "http://lab.example", "refused", "http://lab.example", "origin"),)
+    server.refusals = (Rejection(1.0, "http://lab.example", "refused", "http://lab.example", "origin"),)
     desk.sheet.permissions.robots.open_list()
     desk.sheet.permissions.origins.edit.setText("wrong")
     desk.sheet.permissions.origins.edit.completed.emit()
@@ -359,7 +359,7 @@ def test_status_bar_shows_access_and_connected_pages_and_opens_the_sheet(window)
     web._server, web.state, web.host = server, "on", WIFI.host
     server.pages = (page(1), page(2))
     web.refresh()
-    window._show_facts()
+    window._update_status_bar()
     (item,) = [each for each in window.status.items() if WIFI.host in each.text]
     assert "2" in item.text
     QTest.mouseClick(item, Qt.MouseButton.LeftButton)
@@ -369,5 +369,5 @@ def test_status_bar_shows_access_and_connected_pages_and_opens_the_sheet(window)
     server.pages = ()
     web.host = ""
     web.refresh()
-    window._show_facts()
+    window._update_status_bar()
     assert [each for each in window.status.items() if WIFI.host in each.text] == []

@@ -22,10 +22,10 @@ from app.core.storage.settings import Settings
 from app.ui.application import startup_problem, translate_qt
 from app.ui.shell.actions.shortcuts import FIXED_KEYS
 from app.ui.shell.bars.app_bar import robots_chip
-from app.ui.shell.bars.status_bar import StatusFacts
+from app.ui.shell.bars.status_bar import StatusFormatter
 from app.ui.shell.commands.table import COMMANDS
-from app.ui.shell.dialogs.command_palette import Palette
-from app.ui.shell.dialogs.motion_permission import MotionQuestion
+from app.ui.shell.dialogs.command_palette import CommandPalette
+from app.ui.shell.dialogs.motion_permission import MotionPermissionCard
 from app.ui.shell.dialogs.name import NameSheet
 from app.ui.shell.dialogs.network_access import NetworkAccessSheet
 from app.ui.shell.dialogs.overlay import Overlay
@@ -125,13 +125,13 @@ def settle(qtbot) -> None:
 @pytest.fixture
 def language(request: pytest.FixtureRequest) -> Iterator[str]:
     """Install the language of the window: the pseudo-language unless a test names another one."""
-    code = getattr(request, "param", i18n.PSEUDO)
-    if code == i18n.PSEUDO:
+    code = getattr(request, "param", i18n.PSEUDO_LANGUAGE)
+    if code == i18n.PSEUDO_LANGUAGE:
         request.getfixturevalue("pseudo")
     else:
         i18n.install(code)
     yield code
-    if code != i18n.PSEUDO:
+    if code != i18n.PSEUDO_LANGUAGE:
         i18n.install(i18n.ENGLISH)
 
 
@@ -164,7 +164,7 @@ def everything(qtbot, window: MainWindow, look: Look) -> None:
     for layout, bar in (("behaviour", window.run_bar), ("developer", window.tool_bar)):
         commands.run(f"layout.{layout}")
         window.tick()
-        window._show_facts()
+        window._update_status_bar()
         window.toast.show_toast(_("Nothing is running"), _("Undo"), lambda: None)
         for view in views():
             bar.show_view(view)
@@ -269,13 +269,13 @@ def test_all_commands_and_shortcuts_are_translated(whole: MainWindow) -> None:
 
 def test_command_palette_and_shortcut_sheet_are_translated(qtbot, whole: MainWindow) -> None:
     whole.commands.run("palette.open")
-    (palette,) = whole.findChildren(Palette)
+    (palette,) = whole.findChildren(CommandPalette)
     for typed in ("", "ŕúñ", "nowhere"):
         palette.field.setText(typed)
         assert forgotten(palette, "nowhere") == []
         assert untranslated(palette.foot.counted) == []
     palette.dismiss()
-    assert untranslated(" ".join(_(said) for _keys, said in palette.foot.KEYS)) == []
+    assert untranslated(" ".join(_(said) for _keys, said in palette.foot.KEY_HINTS)) == []
     whole.commands.run("help.shortcuts")
     (sheet,) = whole.findChildren(ShortcutSheet)
     told = []
@@ -350,7 +350,7 @@ def test_motion_permission_question_is_translated(qtbot, pseudo, tmp_path: Path)
     qtbot.addWidget(window)
     window.show()
     moving = MotionPermission(Settings(tmp_path))
-    question = MotionQuestion(Theme("light"), window, moving, print)
+    question = MotionPermissionCard(Theme("light"), window, moving, print)
     moving.request_permission([(ROVER, ("move",))], lambda: None)
     question.refresh()
     settle(qtbot)
@@ -374,7 +374,7 @@ def test_robots_chip_is_translated(pseudo, states: tuple[str, ...], run: str) ->
 
 @pytest.mark.parametrize("session", [fakes.Session, fakes.Session.full], ids=["empty", "full"])
 def test_status_bar_items_are_translated(pseudo, session) -> None:
-    facts = StatusFacts(session())
+    facts = StatusFormatter(session())
     told = [facts.health(), facts.save_state(), facts.topics(), facts.master(), facts.traffic()]
     told += [facts.lost(), facts.displayed_messages(), facts.window()]
     for alert in list(facts._session.alerts.active):

@@ -12,7 +12,7 @@ import pytest
 
 from app.core.reports import studio_versions
 from app.core.reports.crash import Crash
-from app.core.reports.crash_reports import ALERT, CrashReports
+from app.core.reports.crash_reports import ALERT_ID, CrashReports
 from app.core.reports.studio_run import StudioRun
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -40,7 +40,7 @@ class Run:
 
 def test_crashes_of_several_windows_are_combined_into_one_alert(session: Session, home: Path) -> None:
     report_crashes(session, Run(Crash("studio", "without a word"), Crash("studio", "without a word")))
-    assert [each.id for each in session.alerts.active] == [ALERT]
+    assert [each.id for each in session.alerts.active] == [ALERT_ID]
     assert len(CrashReports().all()) == 2
     again = Session(Settings(home), journal_folder=home / "journal", start_processes=False)
     report_crashes(again, Run())
@@ -74,7 +74,7 @@ def test_no_alert_is_raised_without_data_of_a_newer_studio(session: Session) -> 
 
 
 def test_versions_are_recorded_with_the_time_of_their_first_start(window: MainWindow, home: Path) -> None:
-    window.state.save(studio_versions.KEY, [{"version": "0.0.9", "since_s": 1000.0}])
+    window.state.save(studio_versions.SETTING_KEY, [{"version": "0.0.9", "since_s": 1000.0}])
     save_version(window, 2000.0)
     save_version(window, 3000.0)
     told = [("0.0.9", 1000.0), (__version__, 2000.0)]

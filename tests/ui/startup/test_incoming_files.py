@@ -12,7 +12,7 @@ from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.ui.startup.file_open import IncomingFiles
+from app.ui.startup.file_open import FileDropFilter
 
 COPY, LEFT, NONE = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
 
@@ -26,7 +26,7 @@ def taken() -> list[list[Path]]:
 def window(qtbot, taken) -> QWidget:
     made = QWidget()
     qtbot.addWidget(made)
-    IncomingFiles(made, lambda paths: taken.append(list(paths)))
+    FileDropFilter(made, lambda paths: taken.append(list(paths)))
     return made
 
 

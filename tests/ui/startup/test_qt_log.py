@@ -15,7 +15,13 @@ import pytest
 from PySide6.QtCore import QMessageLogContext, QtMsgType
 
 from app.core.faults import CONSOLE_EXTRA, LogFile
-from app.ui.startup.qt_log import FLAGS, ConsoleHandler, TerminalHandler, on_qt_message, quiet_chromium
+from app.ui.startup.qt_log import (
+    FLAGS_VARIABLE,
+    ConsoleHandler,
+    TerminalHandler,
+    on_qt_message,
+    quiet_chromium,
+)
 
 
 @pytest.mark.parametrize(
@@ -53,10 +59,10 @@ def test_fatal_qt_messages_are_always_logged(caplog: pytest.LogCaptureFixture) -
     ],
 )
 def test_chromium_flags_of_the_user_are_kept(before: str | None, after: str) -> None:
-    environ = {} if before is None else {FLAGS: before}
+    environ = {} if before is None else {FLAGS_VARIABLE: before}
     quiet_chromium(environ)
-    assert environ[FLAGS] == after
-    assert "sandbox" not in environ[FLAGS]
+    assert environ[FLAGS_VARIABLE] == after
+    assert "sandbox" not in environ[FLAGS_VARIABLE]
 
 
 def test_log_records_are_buffered_until_drained_by_the_console() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.ui.startup.qt_log import FLAGS
+from app.ui.startup.qt_log import FLAGS_VARIABLE
 from app.ui.startup.sandbox import (
     DISABLE_VARIABLE,
     NO_NAMESPACES_FLAG,
@@ -71,9 +71,9 @@ def test_each_namespace_restriction_is_detected() -> None:
 
 
 def test_namespace_sandbox_is_disabled_without_namespaces_and_user_flags_are_kept() -> None:
-    environ = {FLAGS: "--log-level=3"}
+    environ = {FLAGS_VARIABLE: "--log-level=3"}
     configure_sandbox(environ, Told(False))
-    assert environ == {FLAGS: f"--log-level=3 {NO_NAMESPACES_FLAG}"}
+    assert environ == {FLAGS_VARIABLE: f"--log-level=3 {NO_NAMESPACES_FLAG}"}
 
 
 def test_sandbox_flags_are_unchanged_with_namespaces_or_without_a_test_process() -> None:
@@ -85,7 +85,12 @@ def test_sandbox_flags_are_unchanged_with_namespaces_or_without_a_test_process()
 
 @pytest.mark.parametrize(
     ("environ", "platform"),
-    [({}, "win32"), ({}, "darwin"), ({DISABLE_VARIABLE: "1"}, "linux"), ({FLAGS: "--no-sandbox"}, "linux")],
+    [
+        ({}, "win32"),
+        ({}, "darwin"),
+        ({DISABLE_VARIABLE: "1"}, "linux"),
+        ({FLAGS_VARIABLE: "--no-sandbox"}, "linux"),
+    ],
 )
 def test_no_sandbox_test_runs_on_other_systems_or_if_the_user_set_the_option(
     environ: dict[str, str], platform: str

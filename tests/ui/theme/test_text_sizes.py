@@ -213,7 +213,7 @@ def test_status_bar_elides_items_that_do_not_fit(qtbot, theme: Theme, percent: i
     master = ("circle-check", "Master 127.0.0.1:7780", "ok")
     traffic = ("", "17 nodes, 113 topics, 1269 messages/s", None)
     lost = ("triangle-alert", "1200 lost in 30 s", "warn")
-    bar.show_facts(
+    bar.show_entries(
         (master, ("lock", "This computer only", None), traffic, lost), (("", "Window 13 ms", None),)
     )
     qtbot.wait(SETTLE_MS)

@@ -116,7 +116,7 @@ def test_bundled_fonts_load_in_all_four_weights(qapp: QApplication) -> None:
     for family in ("Inter", "JetBrains Mono"):
         assert family in QFontDatabase.families()
         for weight in (400, 500, 600, 700):
-            font = fonts.make([family], 14, weight)
+            font = fonts.make_font([family], 14, weight)
             assert (QFontInfo(font).family(), QFontInfo(font).weight()) == (family, weight)
 
 

@@ -21,7 +21,7 @@ __all__ = [
 ]  # fmt: skip
 
 _NUMBER = re.compile(r"(?<![\d.,])[-−]?\d+(?:[.,]\d+)*")  # noqa: RUF001 (the sign that people read)
-_THOUSANDS = re.compile(r"[1-9]\d{0,2}(?:,\d{3})+(?:\.\d+)?")
+_GROUPED_NUMBER = re.compile(r"[1-9]\d{0,2}(?:,\d{3})+(?:\.\d+)?")
 _MAX_DIGITS = 300
 
 
@@ -145,7 +145,7 @@ def _parse_number(value: object) -> int | float | None:
     if match is None or len(match[0]) > _MAX_DIGITS:
         return None
     minus, digits = match[0][0] in "-−", match[0].lstrip("-−")  # noqa: RUF001 (the sign that people read)
-    if _THOUSANDS.fullmatch(digits):
+    if _GROUPED_NUMBER.fullmatch(digits):
         digits = digits.replace(",", "")
     pieces = re.split(r"[.,]", digits)
     found = int(pieces[0]) if len(pieces) == 1 else float(f"{pieces[0]}.{pieces[1]}")

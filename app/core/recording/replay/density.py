@@ -27,7 +27,7 @@ class Density:
 
     start_ns: int
     end_ns: int
-    buckets: int
+    bucket_count: int
     counts: Mapping[str, Sequence[int]]
 
     def peak(self, topic: str) -> int:
@@ -92,7 +92,7 @@ class Densities:
 
         After a failure, `problem` contains the reason.
         """
-        density, losses, spans = (self._pop(owner) for owner in ("density", "losses", "spans"))
+        density, losses, spans = (self._pop_result(owner) for owner in ("density", "losses", "spans"))
         if density is not None:
             self.newest = density.density
         if losses is not None:
@@ -101,7 +101,7 @@ class Densities:
             self.spans = spans.spans or RecordedSpans()
         return density is not None or losses is not None or spans is not None
 
-    def _pop(self, owner: str) -> _Result | None:
+    def _pop_result(self, owner: str) -> _Result | None:
         try:
             return self._worker.pop_result(owner)
         except NepError as error:

@@ -34,7 +34,7 @@ from nep.recordings.reader import RecordedTopic
 
 FAILED, NOT_CLOSED, DAMAGED = "recording:failed", "recording:not-closed", "recording:damaged"
 """Ids of the alerts of a replay."""
-SHOW_FILE = "recording.folder"
+SHOW_FILE_COMMAND = "recording.folder"
 """Prefix of the window command that shows a file in its folder. The path of the file follows."""
 LOG_TOPICS = (LOG_TOPIC, LAST_ERRORS_TOPIC)
 STEP_NS = 1_000_000_000
@@ -331,7 +331,7 @@ class Replay:
         self.series.origin_ns = recording.start_ns
         if self.sending is not None:
             self.sending.open(opened)
-        self.graph = graph_of(recording.topics, opened.stats)
+        self.graph = create_graph(recording.topics, opened.stats)
         self.topics.update(self.graph, now)
         self.chosen = next(iter(recording.topics), "")
         self.densities = Densities(recording)
@@ -351,7 +351,7 @@ class Replay:
             self._has_failed = True
             title = _("{name} can't be played.").format(name=self.name)
             sentence = f"{reason[:1].upper()}{reason[1:]}."
-            action = f"{SHOW_FILE}:{self.path}"
+            action = f"{SHOW_FILE_COMMAND}:{self.path}"
             self._alerts.raise_alert(
                 FAILED, "error", title, sentence, button=_("Show the file"), action=action
             )
@@ -373,9 +373,9 @@ class Replay:
         self._alerts.raise_alert(NOT_CLOSED, "info", title, detail)
 
     def _apply_seek(self, messages: Sequence[Message], now: float) -> None:
-        self.topics.rewind()
-        self.series.rewind()
-        self.console.rewind()
+        self.topics.reset()
+        self.series.reset()
+        self.console.reset()
         for message in messages:
             self._add(message.topic, Batch([message]), now)
 
@@ -385,7 +385,7 @@ class Replay:
         for topic, messages in handed.history.items():
             batch = Batch(list(messages))
             self._add(topic, Batch(batch.messages[-2:]), now)
-            self.series.rewind([topic])
+            self.series.reset([topic])
             self.series.add({topic: batch})
 
     def _add(self, topic: str, batch: Batch, now: float) -> None:
@@ -404,7 +404,7 @@ class Replay:
         self.topics.unwatch(topic)
 
 
-def graph_of(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicStats]) -> GraphView:
+def create_graph(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicStats]) -> GraphView:
     """Return a graph that represents a recording: its topics, their publisher counts, and losses."""
     found = {}
     for name, topic in topics.items():

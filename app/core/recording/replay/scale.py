@@ -27,7 +27,7 @@ class TimeScale:
 
     first_ns: int
     last_ns: int
-    begin_ns: int
+    start_ns: int
     end_ns: int
 
     @classmethod
@@ -39,20 +39,20 @@ class TimeScale:
     @property
     def span_ns(self) -> int:
         """Length of the visible range."""
-        return self.end_ns - self.begin_ns
+        return self.end_ns - self.start_ns
 
     @property
     def is_full(self) -> bool:
         """True if the scale shows the whole recording."""
-        return (self.begin_ns, self.end_ns) == (self.first_ns, self.last_ns)
+        return (self.start_ns, self.end_ns) == (self.first_ns, self.last_ns)
 
     def relative_position(self, at_ns: int) -> float:
         """Return the position of a time in the visible range: 0 at the left edge, 1 at the right edge."""
-        return (at_ns - self.begin_ns) / self.span_ns
+        return (at_ns - self.start_ns) / self.span_ns
 
     def time(self, share: float) -> int:
         """Return the time at a position (0 at the left edge, 1 at the right), limited to the recording."""
-        at_ns = self.begin_ns + round(share * self.span_ns)
+        at_ns = self.start_ns + round(share * self.span_ns)
         return max(self.first_ns, min(self.last_ns, at_ns))
 
     def zoomed(self, factor: float, at_ns: int) -> TimeScale:
@@ -64,23 +64,23 @@ class TimeScale:
         """
         whole = self.last_ns - self.first_ns
         span = max(MIN_SPAN_NS, min(whole, round(self.span_ns * factor)))
-        return self._placed(at_ns - round(self.relative_position(at_ns) * span), span)
+        return self._with_start(at_ns - round(self.relative_position(at_ns) * span), span)
 
     def moved(self, by_ns: int) -> TimeScale:
         """Return the scale shifted by a duration in ns."""
-        return self._placed(self.begin_ns + by_ns, self.span_ns)
+        return self._with_start(self.start_ns + by_ns, self.span_ns)
 
     def with_time(self, at_ns: int) -> TimeScale:
         """Return the scale, shifted as far as necessary to make a time visible."""
-        if self.begin_ns <= at_ns <= self.end_ns:
+        if self.start_ns <= at_ns <= self.end_ns:
             return self
-        return self._placed(at_ns - self.span_ns // 8, self.span_ns)
+        return self._with_start(at_ns - self.span_ns // 8, self.span_ns)
 
-    def _placed(self, begin_ns: int, span: int) -> TimeScale:
+    def _with_start(self, begin_ns: int, span: int) -> TimeScale:
         begin_ns = max(self.first_ns, min(begin_ns, self.last_ns - span))
-        return replace(self, begin_ns=begin_ns, end_ns=begin_ns + span)
+        return replace(self, start_ns=begin_ns, end_ns=begin_ns + span)
 
-    def step_s(self, most: int) -> float:
+    def mark_interval_s(self, most: int) -> float:
         """Return the interval between ruler marks in seconds.
 
         Args:
@@ -96,9 +96,9 @@ class TimeScale:
             most: Maximum number of marks.
             by_clock: True to align the marks to the local time of day, False to the recording's start.
         """
-        step_ns = round(self.step_s(most) * 1e9)
+        step_ns = round(self.mark_interval_s(most) * 1e9)
         origin_ns = offset_ns(self.first_ns) if by_clock else self.first_ns
-        number = -((origin_ns - self.begin_ns) // step_ns)
+        number = -((origin_ns - self.start_ns) // step_ns)
         while (at_ns := origin_ns + number * step_ns) <= self.end_ns:
             yield at_ns
             number += 1

@@ -73,7 +73,7 @@ class SentTopic:
     checked: dict[Publisher, int] = field(default_factory=dict)
     is_ready: bool = False
     count: int = 0
-    skipped: int = 0
+    dropped_count: int = 0
     problem: str = ""
 
     @property
@@ -146,7 +146,7 @@ class ReplayOutbox:
         if publisher is None:
             self._create_publisher(sent, kind)
         if publisher is None or late_s > MAX_DELAY_S or self._is_rejected(sent, publisher):
-            sent.skipped += 1
+            sent.dropped_count += 1
             return
         data, extension = bytes(message.data), dict(message.extension) or None
         try:
@@ -176,7 +176,7 @@ class ReplayOutbox:
             return
         sent.requested_types.add(msg_type)
 
-        def make(node: Node) -> None:
+        def create_job(node: Node) -> None:
             if not self._is_active(sent):
                 return
             try:
@@ -191,7 +191,7 @@ class ReplayOutbox:
             if not self._is_active(sent):
                 self._close(sent)
 
-        self._submit("", make)
+        self._submit("", create_job)
 
     def _is_active(self, sent: SentTopic) -> bool:
         with self._lock:
@@ -225,7 +225,7 @@ class ReplaySending:
         self._is_asking = False
         """True while the question about the first pending route is open."""
         self._worker: BackgroundWorker[tuple[MovingTopics, frozenset[str]]] | None = None
-        self.on_change: Callable[[], object] = _ignore
+        self.on_change: Callable[[], object] = _do_nothing
         """Called when the set of published topics changes."""
 
     def open(self, opened: OpenedRecording) -> None:
@@ -255,7 +255,7 @@ class ReplaySending:
         known = self._moving
         if known is not None and (known.robots_moved_by(recorded) or known.robots_moved_by(name)):
             return True
-        return bool(self._acting.gate.moved_by(name))
+        return bool(self._acting.gate.robots_moved_by(name))
 
     def select(self, recorded: str, name: str | None) -> str:
         """Choose a topic for publishing. Chosen topics are published once they are armed.
@@ -339,7 +339,7 @@ class ReplaySending:
         self._acting.notify_moved(route.target, "replay")
         self.outbox.start(route, turn, topic.msg_type, is_latched=route.recorded in self._latched)
         self._log(route, _("sent during playback"))
-        self._changed()
+        self._mark_changed()
 
     def stop(self) -> None:
         """Stop publishing all topics when the recording is closed."""
@@ -358,9 +358,9 @@ class ReplaySending:
         if self.outbox.stop(sent.route.recorded) is not None:
             words = ", ".join(filter(None, (sent.problem, sent_text(sent))))
             self._log(sent.route, words, sent.count, is_bad=bool(sent.problem))
-            self._changed()
+            self._mark_changed()
 
-    def _changed(self) -> None:
+    def _mark_changed(self) -> None:
         self.revision += 1
         self.on_change()
 
@@ -409,7 +409,7 @@ def _moving_and_latched_topics(recording: Recording) -> tuple[MovingTopics, froz
 def sent_text(sent: SentTopic) -> str:
     """Format the message counts of a topic, such as "412 sent, 3 left out, being late"."""
     words = ngettext("{count} sent", "{count} sent", sent.count).format(count=sent.count)
-    return f"{words}, {late_text(sent.skipped)}" if sent.skipped else words
+    return f"{words}, {late_text(sent.dropped_count)}" if sent.dropped_count else words
 
 
 def late_text(count: int) -> str:
@@ -418,4 +418,4 @@ def late_text(count: int) -> str:
     return template.format(count=count)
 
 
-def _ignore() -> None: ...
+def _do_nothing() -> None: ...

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 from app.core.faults import error_text
-from app.core.network.mailbox import Drained, Mailbox
+from app.core.network.mailbox import DrainResult, Mailbox
 from app.core.recording.opener import LocalOpener, RecordingOpener
 from app.core.recording.replay.opening import OpenedRecording, open_recording
 from nep.errors import NepError, RecordingError
@@ -27,7 +27,7 @@ from nep.recordings.reader import Recording
 
 RATE_WINDOW_S = 2.0
 STATISTICS_INTERVAL_S = 0.5
-TOPICS_AT_ONCE = 100
+TOPICS_PER_STATS_READ = 100
 STATS_PAUSE_FACTOR = 10.0
 """Minimum pause between two readings of statistics, as a multiple of the duration of the last reading."""
 HISTORY_S = (5.0, 20.0, 60.0, 180.0)
@@ -47,7 +47,7 @@ Forward = Callable[[Sequence[Message], Sequence[float]], object]
 """Callback for played messages and their delays in seconds. Called in the replay thread."""
 
 
-class PictureSink(Protocol):
+class ImageSink(Protocol):
     """Receiver of images, which decodes them in another thread.
 
     Its methods are called in the replay thread.
@@ -56,7 +56,7 @@ class PictureSink(Protocol):
     def offer(self, messages: Sequence[Message]) -> None:
         """Add images, oldest first."""
 
-    def rewind(self, topics: Sequence[str]) -> None:
+    def reset(self, topics: Sequence[str]) -> None:
         """Discard the images of all topics except ``topics``. Called after a seek."""
 
 
@@ -103,7 +103,7 @@ class ReplayResults:
 
     seek_messages: Sequence[Message] | None = None
     history: dict[str, Sequence[Message]] = field(default_factory=dict)
-    drained: Drained = field(default_factory=lambda: Drained({}, [], 0))
+    drained: DrainResult = field(default_factory=lambda: DrainResult({}, [], 0))
     stats: dict[str, ReplayStats] = field(default_factory=dict)
 
 
@@ -116,7 +116,7 @@ class ReplaySource:
     def __init__(
         self,
         path: Path,
-        pictures: PictureSink,
+        pictures: ImageSink,
         *,
         clock: Callable[[], float] = time.monotonic,
         opener: RecordingOpener | None = None,
@@ -349,7 +349,7 @@ class ReplaySource:
     def _apply_seek(self, messages: Sequence[Message]) -> None:
         own = [_own_copy(message) for message in messages if message.topic in self._chosen]
         pictures = [each for each in own if each.codec == "image"]
-        self._pictures.rewind([each.topic for each in pictures])
+        self._pictures.reset([each.topic for each in pictures])
         self._pictures.offer(pictures)
         with self._changed:
             self._mailbox = Mailbox()
@@ -404,7 +404,9 @@ class ReplaySource:
         if self.opened is None:
             return
         names, at_ns = list(self.opened.recording.topics), playback.status().position_ns
-        self._figures = [(at_ns, names[k : k + TOPICS_AT_ONCE]) for k in range(0, len(names), TOPICS_AT_ONCE)]
+        self._figures = [
+            (at_ns, names[k : k + TOPICS_PER_STATS_READ]) for k in range(0, len(names), TOPICS_PER_STATS_READ)
+        ]
         self._next_figures = self._clock() + max(STATISTICS_INTERVAL_S, STATS_PAUSE_FACTOR * self._figures_s)
         self._figures_s = 0.0
 

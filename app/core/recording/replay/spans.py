@@ -33,7 +33,7 @@ class RecordedSpan:
     start_ns: int
     end_ns: int
     name: str
-    is_over: bool = False
+    has_ended: bool = False
     result: str = ""
     details: str = ""
     is_error: bool = False
@@ -83,10 +83,10 @@ class _Lane:
         end_ns = max(start_ns, self._clamp(span.end_ns))
         self._by_id[id] = replace(span, start_ns=start_ns, end_ns=end_ns)
 
-    def end(self, id: str, at_ns: int) -> None:
+    def end_span(self, id: str, at_ns: int) -> None:
         known = self._by_id.get(id)
         if known is not None:
-            self._by_id[id] = replace(known, end_ns=max(known.start_ns, self._clamp(at_ns)), is_over=True)
+            self._by_id[id] = replace(known, end_ns=max(known.start_ns, self._clamp(at_ns)), has_ended=True)
 
     def _clamp(self, at_ns: int) -> int:
         return max(self._first_ns, min(at_ns, self._last_ns))
@@ -131,7 +131,7 @@ def _read_alerts(recording: Recording, lane: _Lane) -> None:
             if isinstance(each, Mapping) and _text(each, "id")
         }
         for gone in [id for id in present if id not in there]:
-            lane.end(present.pop(gone), at_ns)
+            lane.end_span(present.pop(gone), at_ns)
         for id, each in there.items():
             if id not in present:
                 present[id] = f"alert-{id}-{at_ns}"

@@ -52,11 +52,11 @@ class MovableRobots:
     @property
     def movable(self) -> tuple[Robot, ...]:
         """Robots that can be moved, including real robots whose connection is lost."""
-        return tuple(link.robot for link in self._movable)
+        return tuple(link.robot for link in self._movable_links)
 
     @property
-    def _movable(self) -> tuple[RobotLink, ...]:
-        return tuple(link for link in self._links.values() if link.is_connected or not link.virtual)
+    def _movable_links(self) -> tuple[RobotLink, ...]:
+        return tuple(link for link in self._links.values() if link.is_connected or not link.is_virtual)
 
     @property
     def described_topics(self) -> frozenset[str]:
@@ -67,12 +67,12 @@ class MovableRobots:
     @property
     def moving_topics(self) -> MovingTopics:
         """Topics whose messages move robots. Replaced by a new object when they change."""
-        links = self._movable
-        now = [(link.robot, link.topics_before, link.identity) for link in links]
+        links = self._movable_links
+        now = [(link.robot, link.earlier_topics, link.identity) for link in links]
         described = self.described_topics
         key = (self.view.epoch, self.view.revision, described, now)
         if key != self._key:
-            known = [controls_of(link.robot, link.topics_before) for link in links]
+            known = [controls_of(link.robot, link.earlier_topics) for link in links]
             unread = description_topics(self.view) - described
             self._key, self._moving = key, moving_topics(self.view, known, unread)
         return self._moving
@@ -80,8 +80,8 @@ class MovableRobots:
 
 class _Snapshot(NamedTuple):
     moving_topics: MovingTopics = MovingTopics()
-    allowed: frozenset[str] = frozenset()
-    strangers: frozenset[str] = frozenset()
+    allowed_robots: frozenset[str] = frozenset()
+    unknown_robots: frozenset[str] = frozenset()
     described_topics: frozenset[str] = frozenset()
 
 
@@ -97,7 +97,7 @@ class MotionGate:
         self._followed_state: tuple[MovingTopics, int] | None = None
         self._snapshot = _Snapshot()
 
-    def moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
+    def robots_moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
         """Return the names of the robots that a message moves; the topic's name if the robot is unknown."""
         return self._robots.moving_topics.robots_moved_by(topic, msg_type)
 
@@ -123,8 +123,8 @@ class MotionGate:
             reason: Sentence for the user about the part of Studio that wants to publish.
         """
         known = {robot.name: robot for robot in self._robots.movable}
-        names = self.moved_by(topic, msg_type)
-        wanted = [(known[name], _actions(known[name])) for name in names if name in known]
+        names = self.robots_moved_by(topic, msg_type)
+        wanted = [(known[name], _action_names(known[name])) for name in names if name in known]
         strangers = [name for name in names if name not in known]
         is_permitted = self._permission.request_permission(wanted, go_on, strangers, reason)
         self.update()
@@ -139,7 +139,7 @@ class MotionGate:
         allowed = {
             name
             for name, robot in known.items()
-            if self._permission.is_allowed(robot) or not risky_actions(robot, _actions(robot))
+            if self._permission.is_allowed(robot) or not risky_actions(robot, _action_names(robot))
         }
         # a permission counts until the robot is identified
         strangers = self._permission.strangers - known.keys()
@@ -157,7 +157,7 @@ class MotionGate:
             [
                 name
                 for name in known.moving_topics.robots_moved_by(topic, msg_type)
-                if name not in known.allowed
+                if name not in known.allowed_robots
             ],
         )
 
@@ -176,7 +176,7 @@ class MotionGate:
         known = self._snapshot
         newcomers = moving_topics(view, (), description_topics(view) - known.described_topics)
         return _rejection_text(
-            topic, [name for name in newcomers.robots_on(topic) if name not in known.strangers]
+            topic, [name for name in newcomers.robots_on(topic) if name not in known.unknown_robots]
         )
 
 
@@ -189,6 +189,6 @@ def _rejection_text(topic: str, names: Sequence[str]) -> str:
     return template.format(robots=format_list(list(names)))
 
 
-def _actions(robot: Robot) -> Sequence[str]:
+def _action_names(robot: Robot) -> Sequence[str]:
     # All actions, because a message doesn't reveal which action it triggers.
     return [action.name for action in robot.actions]

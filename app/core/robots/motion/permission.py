@@ -20,7 +20,7 @@ from nep.i18n import _, format_list, ngettext, pgettext
 from nep.programs.robots.moving import RIZE_COMMAND_TOPIC
 
 SETTING_KEY = "robots.may_move"
-MAX_NAMED = 4
+MAX_NAMED_ACTIONS = 4
 
 
 class MayNotMoveError(AppError):
@@ -36,7 +36,7 @@ class MayNotMoveError(AppError):
 
 
 @dataclass(frozen=True)
-class Question:
+class PermissionQuestion:
     """Question to the user about the motion of robots.
 
     Attributes:
@@ -47,15 +47,15 @@ class Question:
         reason: Sentence about the origin of the command, or "" for a command of the user.
     """
 
-    moves: Mapping[str, tuple[str, ...]]
+    moving_actions: Mapping[str, tuple[str, ...]]
     on_allow: Callable[[], object]
-    strangers: tuple[str, ...] = ()
+    unknown_robots: tuple[str, ...] = ()
     reason: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Display names of all robots in the question."""
-        return (*self.moves, *map(_stranger_label, self.strangers))
+        return (*self.moving_actions, *map(_unknown_robot_label, self.unknown_robots))
 
     @property
     def title(self) -> str:
@@ -70,10 +70,10 @@ class Question:
             ngettext("{actions} moves {robot}.", "{actions} move {robot}.", len(actions)).format(
                 actions=format_list(actions), robot=name
             )
-            for name, actions in self.moves.items()
+            for name, actions in self.moving_actions.items()
         ]
-        if self.strangers:
-            names = format_list([_stranger_label(each) for each in self.strangers])
+        if self.unknown_robots:
+            names = format_list([_unknown_robot_label(each) for each in self.unknown_robots])
             template = _("The message may move {robot}, which Studio doesn't know.")
             sentences.append(template.format(robot=names))
         return _("{moves} Make sure nobody is in the way. Press F12 to stop at any time.").format(
@@ -95,7 +95,7 @@ class MotionPermission:
         self.strangers: frozenset[str] = frozenset()
         """Allowed robots without a readable description, and topics of unknown robots that were allowed."""
         self._asked: tuple[tuple[str, str], ...] = ()
-        self.question: Question | None = None
+        self.question: PermissionQuestion | None = None
         """Open question, or None."""
         self.revision = 0
 
@@ -131,7 +131,9 @@ class MotionPermission:
         if not open_ and not unknown:
             return True
         self._asked = tuple((self._program_key(robot), self._key(robot)) for robot, _key in open_)
-        self.question = Question({robot.name: moves for robot, moves in open_}, go_on, unknown, reason)
+        self.question = PermissionQuestion(
+            {robot.name: moves for robot, moves in open_}, go_on, unknown, reason
+        )
         self.revision += 1
         return False
 
@@ -150,7 +152,7 @@ class MotionPermission:
         if question is None or not let:
             return
         self._allowed.update(now for now, _key in self._asked)
-        self.strangers |= set(question.strangers)
+        self.strangers |= set(question.unknown_robots)
         try:
             if always and self._settings is not None:
                 self._settings.set(
@@ -190,7 +192,7 @@ class MotionPermission:
         return self._settings.get(SETTING_KEY, []) if self._settings is not None else []
 
 
-def _stranger_label(name: str) -> str:
+def _unknown_robot_label(name: str) -> str:
     # A robot of which only the name or a topic is known.
     return _("the robot on {topic}").format(topic=name) if "/" in name or name == RIZE_COMMAND_TOPIC else name
 
@@ -203,7 +205,9 @@ def risky_actions(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
     found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
     titles = [f"“{title}”" for title in dict.fromkeys(found)]
     return (
-        (*titles[:MAX_NAMED], pgettext("after a list", "more")) if len(titles) > MAX_NAMED else tuple(titles)
+        (*titles[:MAX_NAMED_ACTIONS], pgettext("after a list", "more"))
+        if len(titles) > MAX_NAMED_ACTIONS
+        else tuple(titles)
     )
 
 

@@ -164,7 +164,7 @@ class StopLine:
     @property
     def reply_topics(self) -> set[str]:
         """Topics of the robot's replies."""
-        return {way.answer for way in self.target.topic_sets}
+        return {way.reply for way in self.target.topic_sets}
 
     @property
     def is_complete(self) -> bool:

@@ -46,7 +46,7 @@ def ignore_moved(_names: Sequence[str], _by: str) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class UnprovenMotion:
+class UnconfirmedMotion:
     """Command to a robot whose end has not been observed.
 
     Attributes:
@@ -88,9 +88,9 @@ class MovedRobots:
         # `others_of` returns other programs that receive a robot's commands and publish its replies.
         self._program_of, self._has_ended, self._clock = program_of, has_ended, clock
         self._others_of = others_of
-        self._motions: dict[str, list[UnprovenMotion]] = {}
+        self._motions: dict[str, list[UnconfirmedMotion]] = {}
         self._count = 0
-        self._sent: dict[str, UnprovenMotion] = {}
+        self._sent: dict[str, UnconfirmedMotion] = {}
         """Newest command to each robot, as far as sent since the last but one graph."""
         self._proven: dict[str, int] = {}
         """Value of `mark` at each proven Stop since the last but one graph, by node id of the program."""
@@ -115,7 +115,7 @@ class MovedRobots:
         """Names of the robots that received a command after the second newest graph."""
         return tuple(self._sent)
 
-    def motion(self, name: str) -> UnprovenMotion | None:
+    def motion(self, name: str) -> UnconfirmedMotion | None:
         """Return the newest motion of a robot; None if the robot isn't recorded.
 
         Motions with a known sender take precedence over unfinished actions and unproven Stops.
@@ -154,7 +154,7 @@ class MovedRobots:
         for name in names:
             self._count += 1
             meant = program if program is not None else self._program_of(name)
-            motion = UnprovenMotion(self._count, name, by, self._clock(), meant, id)
+            motion = UnconfirmedMotion(self._count, name, by, self._clock(), meant, id)
             found = self._motions.setdefault(name, [])
             if not id or len(found) >= MAX_MOTIONS:  # of motions that end together only the newest is kept
                 motion = replace(motion, id="")
@@ -166,13 +166,13 @@ class MovedRobots:
                 self._sent[name] = motion
                 self._record_others(name, by, found)
 
-    def _record_others(self, name: str, by: str, found: list[UnprovenMotion]) -> None:
+    def _record_others(self, name: str, by: str, found: list[UnconfirmedMotion]) -> None:
         # Other programs of the same robot received the command too: a frozen one may execute it when it
         # resumes.
         known = {motion.program for motion in found if not motion.id}
         for other in self._others_of(name):
             if other not in known and len(found) < MAX_MOTIONS:
-                found.append(UnprovenMotion(self._count, name, by, self._clock(), other))
+                found.append(UnconfirmedMotion(self._count, name, by, self._clock(), other))
 
     def record_new_programs(self, newcomers: Mapping[str, Iterable[Identity]]) -> None:
         """Record commands that newly listed programs may have received before the graph listed them.
@@ -205,13 +205,13 @@ class MovedRobots:
             program: Program that replied.
         """
 
-        def remains(motion: UnprovenMotion) -> bool:
+        def remains(motion: UnconfirmedMotion) -> bool:
             if motion.id != id or program is None or motion.program is None:
                 return motion.id != id
             return program.node_id != motion.program.node_id
 
         if id:
-            self._retain(name, remains)
+            self._retain_motions(name, remains)
 
     def record_stopped(self, name: str, programs: Collection[str], mark: int) -> None:
         """End the motions of programs that confirmed a Stop. Motions of other programs remain.
@@ -222,7 +222,7 @@ class MovedRobots:
             mark: Value of `mark` when the Stop started.
         """
         self._proven |= dict.fromkeys(programs, mark)
-        self._retain(
+        self._retain_motions(
             name,
             lambda motion: (
                 motion.number > mark
@@ -243,7 +243,7 @@ class MovedRobots:
         """
         self.record_command((name for name in report.unconfirmed_names if name not in self), "stop")
         for name in report.stopped_names:
-            self.record_stopped(name, report.programs(name), mark)
+            self.record_stopped(name, report.confirmed_programs(name), mark)
         for name in set(report.names) - {*report.unconfirmed_names, *report.stopped_names}:
             self.record_stop_received(name, mark)
 
@@ -254,7 +254,7 @@ class MovedRobots:
             name: Name of the robot.
             mark: Value of `mark` when the Stop started.
         """
-        self._retain(name, lambda motion: motion.number > mark)
+        self._retain_motions(name, lambda motion: motion.number > mark)
         if name in self._sent and self._sent[name].number <= mark:
             del self._sent[name]
 
@@ -269,9 +269,11 @@ class MovedRobots:
 
         A virtual robot stops with its program.
         """
-        self._retain(name, lambda motion: motion.program is None or not self._has_ended(motion.program))
+        self._retain_motions(
+            name, lambda motion: motion.program is None or not self._has_ended(motion.program)
+        )
 
-    def _retain(self, name: str, stays: Callable[[UnprovenMotion], bool]) -> None:
+    def _retain_motions(self, name: str, stays: Callable[[UnconfirmedMotion], bool]) -> None:
         left = [motion for motion in self._motions.get(name, ()) if stays(motion)]
         if left:
             self._motions[name] = left

@@ -21,7 +21,7 @@ MAX_UNLISTED = 256
 MAX_ABSENT = 64
 """Maximum number of disconnected robots that a Stop is sent to because they replied earlier."""
 _COMMAND, _ANSWER = "robot/command", "robot/answer"
-_STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, confirmed=True)
+_DEFAULT_SAFE_STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, confirmed=True)
 
 
 def targets_of(
@@ -38,10 +38,10 @@ def targets_of(
     for link in links:
         is_expected = link.is_connected or link.name in moved
         earlier = moved.other_programs(link.name, link.identity)
-        target = StopTarget(link.robot, link.identity, earlier, link.topics_before, is_expected)
+        target = StopTarget(link.robot, link.identity, earlier, link.earlier_topics, is_expected)
         if is_expected:
             here.append(target)
-        elif link.has_proven_stop or link.replied_s is not None:
+        elif link.has_confirmed_stop or link.last_reply_s is not None:
             absent.append(target)
     names = {target.robot.name for target in here}
     others = [target for target in unlisted if target.robot.name not in names]
@@ -56,7 +56,7 @@ def _unknown_target(topic: str) -> StopTarget:
 
 
 def _placeholder_robot(name: str, topics: RobotTopics) -> Robot:
-    return Robot(name, "", name, False, "native", (), (), (), _STOP, (), topics, {})
+    return Robot(name, "", name, False, "native", (), (), (), _DEFAULT_SAFE_STOP, (), topics, {})
 
 
 def unlisted_targets(

@@ -37,7 +37,7 @@ class RobotStop:
     elapsed_ms: float | None
     can_confirm: bool = True
     error: str = ""
-    is_refused: bool = False
+    has_failed: bool = False
     program: str = ""
     is_waiting: bool = False
     node: str = ""
@@ -54,7 +54,7 @@ class RobotStop:
         """Problem without a full stop, such as "Pepper did not answer"; "" if the robot stopped."""
         if self.is_confirmed or not self.can_confirm:
             return ""
-        if self.program and self.is_refused:
+        if self.program and self.has_failed:
             return _("{error} (from “{program}”)").format(error=self.error, program=self.program)
         return self.error or _("{robot} didn't reply").format(robot=self.full_name)
 
@@ -93,12 +93,12 @@ class StopReport:
 
     robots: tuple[RobotStop, ...]
     elapsed_ms: float
-    strangers: tuple[tuple[str, str], ...] = ()
+    impostors: tuple[tuple[str, str], ...] = ()
 
     @property
-    def is_proven(self) -> bool:
+    def is_confirmed(self) -> bool:
         """True if there was a robot to stop, and every robot that can confirm a Stop has done so."""
-        return bool(self.robots) and not self.unproven
+        return bool(self.robots) and not self.unconfirmed_robots
 
     @property
     def status(self) -> StopStatus:
@@ -107,22 +107,22 @@ class StopReport:
         ``error`` if a robot refused or failed to reply; ``off`` if a robot can't confirm or there was
         no robot.
         """
-        if self.unproven:
+        if self.unconfirmed_robots:
             return "error"
         return "ok" if self.robots and set(self.names) == set(self.stopped_names) else "off"
 
     @property
-    def unproven(self) -> tuple[RobotStop, ...]:
+    def unconfirmed_robots(self) -> tuple[RobotStop, ...]:
         """Results of the robots that can confirm a Stop but did not."""
         return tuple(robot for robot in self.robots if robot.can_confirm and not robot.is_confirmed)
 
     @property
     def unconfirmed_names(self) -> tuple[str, ...]:
         """Names of the robots that did not confirm, without duplicates."""
-        return tuple(dict.fromkeys(robot.name for robot in self.unproven))
+        return tuple(dict.fromkeys(robot.name for robot in self.unconfirmed_robots))
 
     @property
-    def by_name(self) -> Mapping[str, RobotStop]:
+    def results_by_robot(self) -> Mapping[str, RobotStop]:
         """Worst result of each robot among all its programs, by the robot's name."""
         worst: dict[str, RobotStop] = {}
         for robot in self.robots:
@@ -131,7 +131,7 @@ class StopReport:
                 worst[robot.name] = robot
         return worst
 
-    def programs(self, name: str) -> frozenset[str]:
+    def confirmed_programs(self, name: str) -> frozenset[str]:
         """Return the node ids of the programs of a robot that confirmed the Stop."""
         return frozenset(robot.node for robot in self.robots if robot.name == name and robot.is_confirmed)
 
@@ -155,10 +155,10 @@ class StopReport:
             why: Reason why the missing robots were not reached.
         """
         there = {robot.name for robot in self.robots}
-        missing = [not_reached(name, why) for name in dict.fromkeys(names) if name not in there]
+        missing = [unreached_result(name, why) for name in dict.fromkeys(names) if name not in there]
         return replace(self, robots=(*self.robots, *missing)) if missing else self
 
-    def with_late(self, late: RobotStop) -> StopReport:
+    def with_late_reply(self, late: RobotStop) -> StopReport:
         """Return the report with a late reply applied."""
         lines = ((robot.name, robot.program) for robot in self.robots)
         if (late.name, late.program) not in lines:
@@ -168,7 +168,7 @@ class StopReport:
         return replace(self, robots=tuple(robots), elapsed_ms=max(self.elapsed_ms, late.elapsed_ms or 0.0))
 
 
-def not_reached(name: str, why: str = "") -> RobotStop:
+def unreached_result(name: str, why: str = "") -> RobotStop:
     """Return the result for a robot to which the Stop could not be sent.
 
     Args:
@@ -180,7 +180,7 @@ def not_reached(name: str, why: str = "") -> RobotStop:
 
 
 @dataclass(frozen=True, slots=True)
-class StopDone:
+class StopCompleted:
     """Event: a Stop is complete, because all robots have replied or timed out."""
 
     number: int

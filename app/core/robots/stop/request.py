@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from app.core.robots.stop.lines import StopLine
 from app.core.robots.stop.report import RobotStop
 from app.robots.description.description import RobotTopics
-from app.robots.held_messages import HeldMessages
+from app.robots.held_messages import PendingMessages
 from nep.errors import NepError
 from nep.messages.message import Message
 
@@ -37,10 +37,10 @@ class StopRequest:
     on_late: Callable[[RobotStop], object] | None
     ends: str | None = None
     error: str = ""
-    serving: dict[str, RobotStop | None] = field(default_factory=dict)
-    programs: dict[str, str] = field(default_factory=dict)
-    unknown_replies: HeldMessages = field(default_factory=HeldMessages)
-    foreign_replies: dict[str, HeldMessages] = field(default_factory=dict)
+    replies: dict[str, RobotStop | None] = field(default_factory=dict)
+    program_names: dict[str, str] = field(default_factory=dict)
+    unknown_replies: PendingMessages = field(default_factory=PendingMessages)
+    foreign_replies: dict[str, PendingMessages] = field(default_factory=dict)
     delivered_topics: set[RobotTopics] = field(default_factory=set)
     delivered_s: float | None = None
     is_over: bool = False
@@ -53,12 +53,12 @@ class StopRequest:
     @property
     def has_all_replies(self) -> bool:
         """True if all programs have replied."""
-        return bool(self.serving) and None not in self.serving.values()
+        return bool(self.replies) and None not in self.replies.values()
 
     @property
-    def is_proven(self) -> bool:
+    def is_confirmed(self) -> bool:
         """True if all programs have confirmed that the robot has stopped."""
-        return bool(self.serving) and all(each and each.is_confirmed for each in self.serving.values())
+        return bool(self.replies) and all(each and each.is_confirmed for each in self.replies.values())
 
     def record_sent(self, way: RobotTopics, now: float) -> None:
         """Record that the command was sent on a topic while the robot was connected."""
@@ -72,7 +72,7 @@ class StopRequest:
         Args:
             told: Pairs of Stop id and node whose replies have already been reported.
         """
-        found, waits = self.serving.items(), None in self.serving.values()
+        found, waits = self.replies.items(), None in self.replies.values()
         said = [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
         return [(node, replace(each, is_waiting=waits)) for node, each in said]
 
@@ -82,11 +82,11 @@ class StopRequest:
         silent = RobotStop(
             self.line.name, False, None, error=self.error or unconnected, is_pending=bool(unconnected)
         )
-        if not self.serving:
+        if not self.replies:
             return [silent]
         return [
-            each or replace(silent, program=self.programs.get(node, ""))
-            for node, each in self.serving.items()
+            each or replace(silent, program=self.program_names.get(node, ""))
+            for node, each in self.replies.items()
         ]
 
     def accept(self, node: str, message: Message, now: float, words: Callable[[object], str]) -> bool:
@@ -100,21 +100,21 @@ class StopRequest:
             now: Monotonic seconds.
             words: Formats the robot's error as a sentence.
         """
-        reply = reply_in(message)
+        reply = parse_reply(message)
         state = None if reply is None else reply.get("state")
         if reply is None or reply.get("id") != self.id or state not in ("succeeded", "failed"):
             return False
-        before, is_still = self.serving[node], state == "succeeded"
+        before, is_still = self.replies[node], state == "succeeded"
         if before is not None and (before.is_confirmed or not is_still):
             return False
         waited_ms = 0.0 if self.delivered_s is None else (self.delivered_s - self.sent_s) * 1000
-        self.serving[node] = RobotStop(
+        self.replies[node] = RobotStop(
             self.line.name,
             is_still,
             (now - self.sent_s) * 1000,
             error="" if is_still else words(reply.get("error")),
-            is_refused=not is_still,
-            program=self.programs.get(node, ""),
+            has_failed=not is_still,
+            program=self.program_names.get(node, ""),
             node=node,
             waited_ms=waited_ms if waited_ms > MIN_DISPLAYED_WAIT_MS else 0.0,
         )
@@ -126,12 +126,13 @@ class StopRequest:
             node
             for node, held in self.foreign_replies.items()
             if any(
-                (told := reply_in(each)) is not None and told.get("id") == self.id for each in held.pop_all()
+                (told := parse_reply(each)) is not None and told.get("id") == self.id
+                for each in held.pop_all()
             )
         ]
 
 
-def reply_in(message: Message) -> Mapping[str, object] | None:
+def parse_reply(message: Message) -> Mapping[str, object] | None:
     """Return the content of a message that is a reply to a Stop; None for other messages."""
     if message.size_bytes > MAX_REPLY_BYTES:
         return None

@@ -20,7 +20,7 @@ from app.core.robots.stop.report import RobotStop, StopReport
 from app.core.robots.stop.request import StopRequest
 from app.robots import rize
 from app.robots.description.description import Robot, RobotTopics
-from app.robots.held_messages import HeldMessages
+from app.robots.held_messages import PendingMessages
 from app.robots.identity import (
     Senders,
     first_announcer,
@@ -37,16 +37,16 @@ from nep.protocol.graph_view import GraphView
 _log = logging.getLogger("studio")
 RIZE = "rize"
 NO_NETWORK = lazy("there is no connection to the network yet")
-LATE_REPLY_S = 120.0
+LATE_REPLY_TIMEOUT_S = 120.0
 """Time in seconds after a Stop during which late replies are accepted."""
 MAX_LATE_REQUESTS = 64
-MAX_SERVING = 32
+MAX_SERVING_PROGRAMS = 32
 """Maximum number of programs of one robot whose replies are awaited."""
 MAX_NAMED_LISTENERS = 4
 """Maximum number of programs that only subscribe to a robot's commands and are included in a report."""
-POLL_S = 0.02
+POLL_INTERVAL_S = 0.02
 """Interval in seconds at which the state of a connection is checked."""
-GRAPH_POLL_S = 0.1
+GRAPH_POLL_INTERVAL_S = 0.1
 """Minimum interval in seconds between graph queries while the publisher of a reply is unknown."""
 GRAPH_TIMEOUT_S = 0.3
 _UNKNOWN_PROGRAM = "nobody"
@@ -54,18 +54,18 @@ _UNKNOWN_PROGRAM = "nobody"
 
 STOP_TIMEOUT_S = 1.0
 """Default time limit of a Stop in seconds. A robot's description may require a longer time."""
-MARGIN_S = 0.5
-MAX_STOP_S = 10.0
+TIMEOUT_MARGIN_S = 0.5
+MAX_STOP_TIMEOUT_S = 10.0
 
 
-def stop_timeout_s(robots: Iterable[Robot], longest_s: float = MAX_STOP_S) -> float:
+def stop_timeout_s(robots: Iterable[Robot], longest_s: float = MAX_STOP_TIMEOUT_S) -> float:
     """Return the time limit in seconds for a Stop, which exceeds the time limits of the robots' drivers.
 
     Args:
         robots: Robots to stop.
         longest_s: Maximum of the result.
     """
-    needed_s = max((robot.safe_stop.within_s + MARGIN_S for robot in robots), default=0.0)
+    needed_s = max((robot.safe_stop.within_s + TIMEOUT_MARGIN_S for robot in robots), default=0.0)
     return min(longest_s, max(STOP_TIMEOUT_S, needed_s))
 
 
@@ -76,7 +76,7 @@ class RobotStopper:
         self,
         node: StopNode,
         clock: Callable[[], float] = time.monotonic,
-        longest_s: float = MAX_STOP_S,
+        longest_s: float = MAX_STOP_TIMEOUT_S,
     ) -> None:
         # `longest_s` limits the wait for replies. Robots are added by `set_robots`.
         self._longest_s = longest_s
@@ -98,7 +98,7 @@ class RobotStopper:
         with self._changed:
             self._view, self._hearers = view, {}
             targets = [line.target for line in self._lines.values()]
-            self._senders.update(view, {way.answer for target in targets for way in target.topic_sets})
+            self._senders.update(view, {way.reply for target in targets for way in target.topic_sets})
             late = [
                 reply for asked in self._asked.values() for reply in self._apply_held_replies_locked(asked)
             ]
@@ -165,7 +165,9 @@ class RobotStopper:
         with self._changed:
             now = self._clock()
             waiting = [
-                each for each in self._asked.values() if each.is_over and now - each.sent_s <= LATE_REPLY_S
+                each
+                for each in self._asked.values()
+                if each.is_over and now - each.sent_s <= LATE_REPLY_TIMEOUT_S
             ]
         for each in waiting:
             self._deliver(each)
@@ -236,7 +238,7 @@ class RobotStopper:
             self._add_new_programs(asked)
         reported = self._wait_for_replies(asked, began + timeout_s, on_answer)
         elapsed_ms = (self._clock() - began) * 1000
-        return self._report(asked, reported, elapsed_ms, on_answer).with_unreached(names or ())
+        return self._create_report(asked, reported, elapsed_ms, on_answer).with_unreached(names or ())
 
     def _wait_for_replies(
         self,
@@ -252,12 +254,12 @@ class RobotStopper:
             with self._changed:
                 remaining_s = deadline_s - self._clock()
                 pause_s = (
-                    min(remaining_s, GRAPH_POLL_S)
+                    min(remaining_s, GRAPH_POLL_INTERVAL_S)
                     if any(each.unknown_replies for each in asked)
                     else remaining_s
                 )
-                pause_s = min(pause_s, POLL_S) if undelivered else pause_s
-                self._changed.wait_for(lambda: self._has_news(asked, reported), max(0.0, pause_s))
+                pause_s = min(pause_s, POLL_INTERVAL_S) if undelivered else pause_s
+                self._changed.wait_for(lambda: self._has_new_replies(asked, reported), max(0.0, pause_s))
                 news = [(each, node, result) for each in asked for node, result in each.new_replies(reported)]
             for each, node, result in news:
                 reported.add((each.id, node))
@@ -303,7 +305,7 @@ class RobotStopper:
             return StopChannel(topics.command, self._node.new_pub(topics.command, "json", batch=False), None)
         publisher = self._node.new_pub(topics.command, "robot/command", batch=False)
         try:
-            subscriber = self._node.new_sub(topics.answer, "robot/answer", sink=self._on_replies)
+            subscriber = self._node.new_sub(topics.reply, "robot/answer", sink=self._on_replies)
             return StopChannel(topics.command, publisher, subscriber)
         except NepError:
             publisher.close()
@@ -315,7 +317,7 @@ class RobotStopper:
         if not missing:
             return
 
-        def make() -> None:
+        def open_channels() -> None:
             for each in missing:
                 before = set(each.line.channels)
                 with self._opening_lock:
@@ -329,7 +331,7 @@ class RobotStopper:
         for each in missing:
             each.error = "" if not each.line.channels else each.error
         self._openers = [thread for thread in self._openers if thread.is_alive()]
-        self._openers.append(threading.Thread(target=make, name="studio-stop-line", daemon=True))
+        self._openers.append(threading.Thread(target=open_channels, name="studio-stop-line", daemon=True))
         self._openers[-1].start()
 
     def _select_lines(self, names: Iterable[str] | None) -> list[StopLine]:
@@ -346,7 +348,7 @@ class RobotStopper:
             self._evict_expired()
             self._asked[asked.id] = asked
             if self._view is not None and line.target.robot.dialect != RIZE:
-                asked.serving |= self._serving_programs(asked)
+                asked.replies |= self._serving_programs(asked)
             for topics, way in line.channels.items():
                 if self._is_connected_locked(line, way):
                     asked.record_sent(topics, asked.sent_s)
@@ -407,12 +409,12 @@ class RobotStopper:
 
     # ---- replies
 
-    def _has_news(self, asked: Sequence[StopRequest], told: set[tuple[str, str]]) -> bool:
+    def _has_new_replies(self, asked: Sequence[StopRequest], told: set[tuple[str, str]]) -> bool:
         if any(each.new_replies(told) for each in asked) or all(each.is_settled for each in asked):
             return True
         return (
             any(each.unknown_replies for each in asked)
-            and self._clock() - self._graph_queried_s >= GRAPH_POLL_S
+            and self._clock() - self._graph_queried_s >= GRAPH_POLL_INTERVAL_S
         )
 
     def _query_graph_if_needed(self, asked: Sequence[StopRequest]) -> None:
@@ -420,15 +422,15 @@ class RobotStopper:
         with self._changed:
             waits = self._view is None or any(each.unknown_replies for each in asked)
             now = self._clock()
-            looks = waits and (self._view is None or now - self._graph_queried_s >= GRAPH_POLL_S)
+            looks = waits and (self._view is None or now - self._graph_queried_s >= GRAPH_POLL_INTERVAL_S)
             if looks:
                 self._graph_queried_s = now
         if looks:
             self._refresh_view()
         with self._changed:
             for each in asked:
-                if not each.serving:
-                    each.serving |= self._serving_programs(each)
+                if not each.replies:
+                    each.replies |= self._serving_programs(each)
                     self._apply_held_replies_locked(each)  # not late: the Stop was sent just now
 
     def _add_new_programs(self, asked: Sequence[StopRequest]) -> None:
@@ -436,8 +438,8 @@ class RobotStopper:
         self._refresh_view()
         with self._changed:
             for each in asked:
-                known = {node: reply for node, reply in each.serving.items() if node != _UNKNOWN_PROGRAM}
-                each.serving = self._serving_programs(each) | known
+                known = {node: reply for node, reply in each.replies.items() if node != _UNKNOWN_PROGRAM}
+                each.replies = self._serving_programs(each) | known
 
     def _refresh_view(self) -> None:
         # Without a reply of the master the previous graph stays valid.
@@ -454,13 +456,13 @@ class RobotStopper:
         identity = target.identity or first_announcer(view, target.robot.topics.description)
         own = identity.node_id if identity is not None else _UNKNOWN_PROGRAM
         found: dict[str, RobotStop | None] = {own: None}
-        answering = {node for way in target.topic_sets for node in publisher_nodes(view, way.answer)}
+        answering = {node for way in target.topic_sets for node in publisher_nodes(view, way.reply)}
         heard = dict.fromkeys(
             node for way in target.topic_sets for node in subscriber_nodes(view, way.command)
         )
         others = [node for node in heard if node not in (own, self._node.id)]
-        for node in [node for node in others if node in answering][:MAX_SERVING]:
-            asked.programs[node] = identity_of(view, node).node or node
+        for node in [node for node in others if node in answering][:MAX_SERVING_PROGRAMS]:
+            asked.program_names[node] = identity_of(view, node).node or node
             found[node] = None
         listening = [node for node in others if node not in answering]
         programs = [identity_of(view, node).node or node for node in listening[:MAX_NAMED_LISTENERS]]
@@ -472,7 +474,7 @@ class RobotStopper:
             found[node] = RobotStop(target.robot.name, False, None, can_confirm=False, program=program)
         for before in target.earlier_programs:
             if before.node_id not in found:
-                asked.programs[before.node_id] = before.node or before.node_id
+                asked.program_names[before.node_id] = before.node or before.node_id
                 found[before.node_id] = None
         return found
 
@@ -503,21 +505,21 @@ class RobotStopper:
         self, asked: StopRequest, node: str | None, message: Message
     ) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
         # Applies a reply of a program that must reply; returns the callback if it is late.
-        if node is None or not asked.serving:
+        if node is None or not asked.replies:
             asked.unknown_replies.add(message)
             return []
-        if node not in asked.serving:
-            if node in asked.foreign_replies or len(asked.foreign_replies) < MAX_SERVING:
-                asked.foreign_replies.setdefault(node, HeldMessages(publishers=1)).add(message)
+        if node not in asked.replies:
+            if node in asked.foreign_replies or len(asked.foreign_replies) < MAX_SERVING_PROGRAMS:
+                asked.foreign_replies.setdefault(node, PendingMessages(publishers=1)).add(message)
             return []
         name = asked.line.name
         is_news = asked.accept(node, message, self._clock(), partial(stop_error_text, name))
-        reply = asked.serving[node]
+        reply = asked.replies[node]
         if not is_news or reply is None or not asked.is_over or asked.on_late is None:
             return []
         return [(asked.on_late, reply)]
 
-    def _report(
+    def _create_report(
         self,
         asked: Sequence[StopRequest],
         told: set[tuple[str, str]],
@@ -531,7 +533,7 @@ class RobotStopper:
             untold = [
                 result
                 for each in asked
-                for node, result in zip(each.serving or {"": None}, each.results(), strict=True)
+                for node, result in zip(each.replies or {"": None}, each.results(), strict=True)
                 if (each.id, node) not in told
             ]
             view = self._view or GraphView(0, 0)
@@ -551,7 +553,11 @@ class RobotStopper:
         over = [id for id, each in self._asked.items() if each.is_over]
         for place, id in enumerate(over):
             each = self._asked[id]
-            if each.is_proven or place < len(over) - MAX_LATE_REQUESTS or now - each.sent_s > LATE_REPLY_S:
+            if (
+                each.is_confirmed
+                or place < len(over) - MAX_LATE_REQUESTS
+                or now - each.sent_s > LATE_REPLY_TIMEOUT_S
+            ):
                 del self._asked[id]
 
 

@@ -33,15 +33,15 @@ from app.core.run.acting.shelf import (
     new_message_id,
     parse_shelf,
 )
-from app.core.run.acting.templates import is_editable, is_plain
+from app.core.run.acting.templates import is_editable, is_plain_text
 from app.core.storage.atomic_file import write_atomically
 from app.core.storage.kept_file import read_stored
 from app.core.storage.settings import Settings
 from nep.errors import NepError
 from nep.i18n import _, format_list, ngettext
 
-FILE = "messages.json"
-_MOVED_BY: Mapping[SendOrigin, str] = {"publish": "shelf"}
+FILE_NAME = "messages.json"
+_SENDERS_BY_ORIGIN: Mapping[SendOrigin, str] = {"publish": "shelf"}
 
 
 class ActingSession(Protocol):
@@ -118,7 +118,7 @@ class SessionActing:
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-shelf")
         self._is_newer = False
         self._source_seen = session.source_revision
-        self.path: Path | None = session.settings.path.with_name(FILE)
+        self.path: Path | None = session.settings.path.with_name(FILE_NAME)
         self.shelf = self._read(self.path)
         self._written = self.shelf.revision
 
@@ -200,7 +200,7 @@ class SessionActing:
     def forbid(self, target: Target) -> None:
         """Deny sending to a target."""
         self.arming.forbid(target)
-        for each in self.outbox.all_repeated:
+        for each in self.outbox.repeated_messages:
             if each.order.target == target:
                 self.outbox.stop(each.order.id)
         self.revision += 1
@@ -217,7 +217,7 @@ class SessionActing:
         return self.question is not None or self._session.fleet.permission.question is not None
 
     def _moved_robots(self, target: Target) -> tuple[str, ...]:
-        return self.gate.moved_by(target.name) if target.kind == "topic" else ()
+        return self.gate.robots_moved_by(target.name) if target.kind == "topic" else ()
 
     def may_continue(self, target: Target) -> bool:
         """Return True if repeated sending to a target may continue.
@@ -236,7 +236,7 @@ class SessionActing:
         """
         moved = self._moved_robots(target)
         if moved:
-            self.on_moved(moved, _MOVED_BY.get(asker, asker))
+            self.on_moved(moved, _SENDERS_BY_ORIGIN.get(asker, asker))
 
     # ---- messages
 
@@ -251,7 +251,7 @@ class SessionActing:
         if not is_editable(message.msg_type):
             template = _("Messages of type {type} can't be edited by hand.")
             return template.format(type=message.msg_type)
-        read = None if is_plain(message.msg_type) else parse_json_text(message.text)
+        read = None if is_plain_text(message.msg_type) else parse_json_text(message.text)
         if read is not None and read.fault is not None:
             return read.fault.message  # checked before the topic, so that the invalid line is shown
         if not message.topic.strip():
@@ -397,13 +397,13 @@ class SessionActing:
         if self._session.source_revision != self._source_seen:
             self._source_seen = self._session.source_revision
             self.disarm()
-        if self.arming.is_over:
+        if self.arming.has_expired:
             self.disarm()
-        for each in self.outbox.all_repeated:  # a robot that this topic moves may have connected
+        for each in self.outbox.repeated_messages:  # a robot that this topic moves may have connected
             target = each.order.target
             if not self.may_continue(target):
                 self.outbox.stop(each.order.id)
-                self.ready(target, _ignore)
+                self.ready(target, _do_nothing)
         for result in self.outbox.pop_results():
             self._apply_result(result)
         for record in self.calls.tick():
@@ -437,7 +437,7 @@ class SessionActing:
     def _log_call(self, record: CallRecord) -> None:
         self._add_record(
             "service", record.service, call_text(record),
-            sent=1 if record.was_started else 0, is_bad=record.state != "answered",
+            sent=1 if record.was_sent else 0, is_bad=record.state != "answered",
             text=record.request, source=record.request,
             again=partial(self.call, record.service, record.request, record.timeout_s),
         )  # fmt: skip
@@ -469,7 +469,7 @@ class SessionActing:
         """Save the shelf if it has changed. Called once a second."""
         self._write()
         try:
-            if self._worker.pop_result(FILE):
+            if self._worker.pop_result(FILE_NAME):
                 self._session.alerts.resolve("messages:kept")
         except OSError as error:
             self._written = -1  # retried at the next check
@@ -483,7 +483,7 @@ class SessionActing:
         self.outbox.close()
         self.calls.close()
         self._write()
-        self._worker.finish(FILE)
+        self._worker.finish(FILE_NAME)
         self._worker.close()
 
     # ---- file
@@ -499,7 +499,7 @@ class SessionActing:
             write_atomically(path, encode_shelf(kept), durable=False, private=True)
             return True
 
-        self._worker.submit(FILE, write)
+        self._worker.submit(FILE_NAME, write)
 
     def _read(self, path: Path) -> Shelf:
         def parse(data: bytes) -> tuple[Shelf, str]:
@@ -515,7 +515,7 @@ class SessionActing:
         return kept.value if kept.value is not None else Shelf()
 
 
-def _ignore() -> None: ...
+def _do_nothing() -> None: ...
 
 
 def result_text(result: SendResult) -> str:
@@ -525,9 +525,11 @@ def result_text(result: SendResult) -> str:
     if result.kind == "began":
         return _("started")
     words = ngettext("{count} sent", "{count} sent", result.count).format(count=result.count)
-    if result.skipped:
-        left_out = ngettext("{count} late message skipped", "{count} late messages skipped", result.skipped)
-        words = f"{words}, {left_out.format(count=result.skipped)}"
+    if result.dropped_count:
+        left_out = ngettext(
+            "{count} late message skipped", "{count} late messages skipped", result.dropped_count
+        )
+        words = f"{words}, {left_out.format(count=result.dropped_count)}"
     parts = (words if result.count else "", result.message)
     return ", ".join(filter(None, parts)) or words
 

@@ -43,7 +43,7 @@ class Arming:
         return self._is_on and self._clock() < self._until_s
 
     @property
-    def is_over(self) -> bool:
+    def has_expired(self) -> bool:
         """True if the time has elapsed and `disarm` has not been called since then."""
         return self._is_on and self._clock() >= self._until_s
 

@@ -47,7 +47,7 @@ class CallRecord:
     number: int
     service: str
     request: str
-    at_s: float
+    started_s: float
     timeout_s: float
     state: State = "waiting"
     duration_s: float = 0.0
@@ -56,7 +56,7 @@ class CallRecord:
     text: str = ""
     is_truncated: bool = False
     is_retained: bool = True
-    was_started: bool = False
+    was_sent: bool = False
     """True if the request was sent."""
 
 
@@ -192,7 +192,7 @@ class ServiceCalls:
             reply=ended.reply,
             text=ended.text,
             is_truncated=ended.is_truncated,
-            was_started=self._in_flight is not None and self._in_flight.future is not None,
+            was_sent=self._in_flight is not None and self._in_flight.future is not None,
         )
         self._records[place] = updated
         self._done.append(updated)
@@ -214,16 +214,16 @@ class ServiceCalls:
         # Runs in the network thread.
         began_s = time.monotonic()
         try:
-            client = self._client(node, record.service)
+            client = self._open_client(node, record.service)
             target = Target("service", record.service)
 
-            def call_it() -> None:
+            def start_call() -> None:
                 with self._lock:
                     if now.is_over:
                         return
                     now.future = client.call_async(request, record.timeout_s)
 
-            if not self._arming.run_if_armed(now.turn, target, call_it):
+            if not self._arming.run_if_armed(now.turn, target, start_call):
                 raise NepError(_("not called: no longer armed"))
         except Exception as error:  # noqa: BLE001 - reported as the result of this call
             text = str(error) if isinstance(error, NepError) else error_text(error)
@@ -232,7 +232,7 @@ class ServiceCalls:
         if now.future is not None:
             now.future.add_done_callback(lambda future: self._on_reply(record, began_s, future))
 
-    def _client(self, node: Node, service: str) -> Client:
+    def _open_client(self, node: Node, service: str) -> Client:
         known = self._clients.get(service)
         if known is None or known.is_closed:
             if len(self._clients) >= MAX_CLIENTS:

@@ -22,7 +22,7 @@ from nep.messages.json_fault import JsonFault, find_json_fault
 MAX_LENGTH = 256 * 1024
 """Maximum length of an editable text in characters; a longer text is not parsed while typing."""
 NEW_ID, NOW = "new id", "now"
-AUTOMATIC: Mapping[str, Callable[[], object]] = {
+AUTOMATIC_PLACEHOLDERS: Mapping[str, Callable[[], object]] = {
     NEW_ID: lambda: uuid.uuid4().hex,
     NOW: lambda: round(time.time(), 6),
 }
@@ -61,12 +61,12 @@ class JsonText:
     @property
     def manual_placeholders(self) -> tuple[str, ...]:
         """Names of the placeholders that the user must fill in."""
-        return tuple(name for name in self.places if name not in AUTOMATIC)
+        return tuple(name for name in self.places if name not in AUTOMATIC_PLACEHOLDERS)
 
     @property
-    def has_automatic(self) -> bool:
+    def has_automatic_placeholders(self) -> bool:
         """True if the text contains automatic placeholders, so that each message has different values."""
-        return any(name in AUTOMATIC for name in self.places)
+        return any(name in AUTOMATIC_PLACEHOLDERS for name in self.places)
 
     def fill(self, values: Mapping[str, object]) -> object:
         """Return the value with all placeholders filled in.
@@ -83,7 +83,7 @@ class JsonText:
             raise NepError(_("Fill in “{name}” first.").format(name=missing[0]))
         parts, after = [], 0
         for start, end, name in self._spans:
-            value = AUTOMATIC[name]() if name in AUTOMATIC else values[name]
+            value = AUTOMATIC_PLACEHOLDERS[name]() if name in AUTOMATIC_PLACEHOLDERS else values[name]
             parts += [self.text[after:start], json.dumps(value, ensure_ascii=False, allow_nan=False)]
             after = end
         whole = "".join([*parts, self.text[after:]])

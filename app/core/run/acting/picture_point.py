@@ -7,7 +7,7 @@ from typing import Literal
 
 from nep.geometry import Header, Point, Time
 
-TYPES = ("json", Point.MSG_TYPE, "geometry_msgs/PointStamped")
+MESSAGE_TYPES = ("json", Point.MSG_TYPE, "geometry_msgs/PointStamped")
 """Supported message types for a point. "json" contains all fields."""
 Button = Literal["left", "middle"]
 

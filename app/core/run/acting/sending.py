@@ -26,7 +26,7 @@ from nep.nodes.publisher import Publisher
 MIN_HZ, MAX_HZ = 0.1, 50.0
 MAX_AGE_S = 10.0
 """Maximum age in seconds of a message that waits for a master; older messages are discarded."""
-MAX_CONCURRENT = 10
+MAX_REPEATED_MESSAGES = 10
 """Maximum number of messages that are sent repeatedly at the same time."""
 MAX_PUBLISHERS = 20
 MAX_RESULTS = 200
@@ -47,7 +47,7 @@ class SendOrder:
     name: str
     topic: str
     msg_type: str
-    make_payload: Callable[[], object]
+    create_payload: Callable[[], object]
     source: str = ""
     origin: SendOrigin = "publish"
     on_result: Callable[[SendResult], object] | None = None
@@ -76,7 +76,7 @@ class SendResult:
     message: str = ""
     subscriber_count: int = 0
     count: int = 0
-    skipped: int = 0
+    dropped_count: int = 0
     text: str = ""
 
 
@@ -91,10 +91,10 @@ class RepeatedMessage:
     publisher: Publisher
     due_s: float
     count: int = 0
-    skipped: int = 0
+    dropped_count: int = 0
     subscriber_count: int = 0
     since_s: float = 0.0
-    is_over: threading.Event = field(default_factory=threading.Event)
+    end_event: threading.Event = field(default_factory=threading.Event)
 
     @property
     def measured_hz(self) -> float:
@@ -141,7 +141,7 @@ class Outbox:
             return self._repeated.get(order_id)
 
     @property
-    def all_repeated(self) -> tuple[RepeatedMessage, ...]:
+    def repeated_messages(self) -> tuple[RepeatedMessage, ...]:
         """Messages that are being sent repeatedly."""
         with self._changed:
             return tuple(self._repeated.values())
@@ -157,9 +157,9 @@ class Outbox:
         """Send a message once."""
         turn, asked_s = self._arming.turn, self._clock()
 
-        def send_it(node: Node) -> None:
-            publisher = self._publisher(node, order)
-            value = order.make_payload()
+        def send_job(node: Node) -> None:
+            publisher = self._open_publisher(node, order)
+            value = order.create_payload()
             payload = codec_for(order.msg_type).encode(value)
             self._check(node, order, publisher)
             if self._arming.run_if_armed(turn, order.target, lambda: publisher.publish(payload)):
@@ -168,7 +168,7 @@ class Outbox:
             else:
                 self._add_result(SendResult(order, "failed", _("not sent: no longer armed")))
 
-        self._submit("", self._guard(order, asked_s, send_it))
+        self._submit("", self._guarded_job(order, asked_s, send_job))
 
     def start(self, order: SendOrder, rate_hz: float) -> bool:
         """Start sending a message repeatedly; return False if the limit `MAX_CONCURRENT` is reached.
@@ -180,15 +180,15 @@ class Outbox:
         rate_hz = min(MAX_HZ, max(MIN_HZ, rate_hz))
         turn, asked_s, token = self._arming.turn, self._clock(), object()
         with self._changed:
-            if len(self._repeated.keys() | self._starting.keys() | {order.id}) > MAX_CONCURRENT:
+            if len(self._repeated.keys() | self._starting.keys() | {order.id}) > MAX_REPEATED_MESSAGES:
                 return False
             self._starting[order.id] = token
 
         def start_job(node: Node) -> None:
             codec_for(order.msg_type).encode(
-                order.make_payload()
+                order.create_payload()
             )  # errors are reported before anything is sent
-            publisher = self._publisher(node, order)
+            publisher = self._open_publisher(node, order)
             now = time.monotonic()
             repeated = RepeatedMessage(order, rate_hz, turn, node, publisher, now, since_s=now)
             with self._changed:
@@ -209,7 +209,7 @@ class Outbox:
                     if self._starting.get(order.id) is token:
                         del self._starting[order.id]
 
-        self._submit("", self._guard(order, asked_s, run_start_job))
+        self._submit("", self._guarded_job(order, asked_s, run_start_job))
         return True
 
     def stop(self, order_id: str) -> None:
@@ -242,7 +242,7 @@ class Outbox:
 
     # ---- in the network thread
 
-    def _guard(self, order: SendOrder, asked_s: float, job: Job) -> Job:
+    def _guarded_job(self, order: SendOrder, asked_s: float, job: Job) -> Job:
         def run(node: Node) -> None:
             try:
                 if self._clock() - asked_s > MAX_AGE_S:
@@ -268,7 +268,7 @@ class Outbox:
             raise NepError(_("not sent: {reason}").format(reason=refusal))
         self._last_subscriber_counts[publisher] = heard
 
-    def _publisher(self, node: Node, order: SendOrder) -> Publisher:
+    def _open_publisher(self, node: Node, order: SendOrder) -> Publisher:
         key = (order.topic, order.msg_type)
         with self._changed:
             used = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}
@@ -276,7 +276,7 @@ class Outbox:
         if known is None or known.is_closed:
             unused = [each for each in self._publishers if each not in used]
             if len(self._publishers) >= MAX_PUBLISHERS and unused:
-                self._close(unused[0])
+                self._close_publisher(unused[0])
             known = self._publishers[key] = node.new_pub(order.topic, order.msg_type)
         return known
 
@@ -286,9 +286,9 @@ class Outbox:
         if self._arming.is_on:
             return  # armed again meanwhile
         for key in [each for each in self._publishers if each not in used]:
-            self._close(key)
+            self._close_publisher(key)
 
-    def _close(self, key: tuple[str, str]) -> None:
+    def _close_publisher(self, key: tuple[str, str]) -> None:
         publisher = self._publishers.pop(key)
         self._last_subscriber_counts.pop(publisher, None)
         publisher.close()
@@ -297,11 +297,13 @@ class Outbox:
         self._results.append(result)
 
     def _report_end(self, ended: RepeatedMessage, sentence: str = "") -> None:
-        if not ended.is_over.is_set():
-            ended.is_over.set()
+        if not ended.end_event.is_set():
+            ended.end_event.set()
             kind = "failed" if sentence else "ended"
             self._add_result(
-                SendResult(ended.order, kind, sentence, ended.subscriber_count, ended.count, ended.skipped)
+                SendResult(
+                    ended.order, kind, sentence, ended.subscriber_count, ended.count, ended.dropped_count
+                )
             )
 
     # ---- thread of repeated messages
@@ -323,7 +325,7 @@ class Outbox:
     def _send_repeated(self, each: RepeatedMessage) -> None:
         problem = ""
         try:
-            payload = codec_for(each.order.msg_type).encode(each.order.make_payload())
+            payload = codec_for(each.order.msg_type).encode(each.order.create_payload())
             self._check(each.node, each.order, each.publisher)
             is_done = self._arming.run_if_armed(
                 each.turn, each.order.target, lambda: self._publish(each, payload)
@@ -332,7 +334,7 @@ class Outbox:
             is_done, problem = False, str(error) if isinstance(error, NepError) else error_text(error)
         if is_done:
             each.subscriber_count = each.publisher.subscribers
-            each.skipped += self._schedule_next(each)
+            each.dropped_count += self._schedule_next(each)
             return
         with self._changed:
             if self._repeated.get(each.order.id) is each:

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 from app.core.run.acting.json_text import MAX_LENGTH, parse_json_text, parse_typed_value
 from app.core.run.acting.sending import MAX_HZ, MIN_HZ
-from app.core.run.acting.templates import is_plain
+from app.core.run.acting.templates import is_plain_text
 from nep.errors import NepError
 from nep.i18n import _
 
-FORMAT = 1
+FORMAT_VERSION = 1
 MAX_MESSAGES = 200
 MAX_REQUESTS = 100
 MAX_VALUES = 50
@@ -54,7 +54,7 @@ class SavedMessage:
 
         Raises `NepError` for invalid JSON or a missing value.
         """
-        if is_plain(self.msg_type):
+        if is_plain_text(self.msg_type):
             return self.text
         typed = {name: parse_typed_value(value) for name, value in self.values if value.strip()}
         return parse_json_text(self.text).fill(typed)
@@ -167,7 +167,7 @@ class Shelf:
 def encode_shelf(shelf: Shelf) -> bytes:
     """Return a shelf in the file format."""
     value = {
-        "format": FORMAT,
+        "format": FORMAT_VERSION,
         "messages": [
             {
                 "id": each.id,
@@ -202,7 +202,7 @@ def parse_shelf(data: bytes) -> tuple[Shelf, int]:
     listed = value.get("messages") if isinstance(value, dict) else None
     if not isinstance(value, dict) or not isinstance(listed, list):
         raise NepError(_("the file has no list of messages"))
-    if isinstance(number := value.get("format"), int) and number > FORMAT:
+    if isinstance(number := value.get("format"), int) and number > FORMAT_VERSION:
         raise NewerShelfError(_("the file was saved by a newer version of Studio"))
     messages = [_parse_message(each) for each in listed[:MAX_MESSAGES]]
     good = {each.id: each for each in messages if each is not None}

@@ -24,24 +24,24 @@ def is_editable(msg_type: str) -> bool:
     return codec_for(msg_type).name in TEXT_CODECS
 
 
-def is_plain(msg_type: str) -> bool:
+def is_plain_text(msg_type: str) -> bool:
     """Return True if messages of this type are plain text instead of JSON."""
     return codec_for(msg_type).name == "string"
 
 
-def text_of_message(message: Message) -> str:
+def format_message(message: Message) -> str:
     """Return a message as editable text. Raises `NepError` if it can't be written as text."""
     if message.size_bytes > MAX_LENGTH:
         raise NepError(_("The last message is too large to edit by hand."))
     if not is_editable(message.msg_type):
         raise NepError(_("Messages of type {type} can't be edited by hand.").format(type=message.msg_type))
     payload = message.payload
-    return payload if isinstance(payload, str) and is_plain(message.msg_type) else format_json(payload)
+    return payload if isinstance(payload, str) and is_plain_text(message.msg_type) else format_json(payload)
 
 
-def text_of_type(msg_type: str) -> str:
+def format_empty_message(msg_type: str) -> str:
     """Return an empty message of a type as editable text; an empty object if the type has no known fields."""
-    if is_plain(msg_type):
+    if is_plain_text(msg_type):
         return ""
     return format_json(_example(orjson.loads(schema_of(msg_type)), 0))
 

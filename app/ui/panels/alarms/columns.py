@@ -17,7 +17,7 @@ from nep.programs.alarms.history import AlarmRecord
 from nep.programs.alarms.rule import problem_of
 from nep.programs.alarms.sentences import current_value_text
 
-TROUBLE_TEXTS = {
+PROBLEM_TEXTS = {
     "missing": lazy("the newest message has no such field"),
     "no_number": lazy("the value isn't a number"),
     "unreadable": lazy("the newest message can't be decoded"),
@@ -56,7 +56,7 @@ def state_chip(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, s
         words = _("{seen}, snoozed until {clock}") if seen else _("snoozed until {clock}")
         return words.format(seen=seen, clock=until), "warn", "bell-off"
     if state.phase == "on":
-        lasts = _("active for {time}").format(time=seconds_text(state.on_for_s))
+        lasts = _("active for {time}").format(time=seconds_text(state.on_duration_s))
         is_told = bool(seen) and rule.condition.kind != "silent"
         words = _("{state}, {seen}").format(state=lasts, seen=seen) if is_told else lasts
         return words, severity_of(rule.condition), None
@@ -81,7 +81,7 @@ def note_text(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: dt
             )
         )
     if state.problem:
-        parts.append(_(TROUBLE_TEXTS[state.problem]))
+        parts.append(_(PROBLEM_TEXTS[state.problem]))
     midnight = now.replace(hour=0, minute=0, second=0, microsecond=0).timestamp()
     today = alarms.history.count_since(rule.id, midnight)
     if today:
@@ -115,7 +115,7 @@ def history_columns(
         words = then.strftime("%H:%M:%S").lstrip("0") if today else date_time_text(then, now())
         return Cell(words, role="textSecondary", mono=today)
 
-    def alarm(record: AlarmRecord) -> Cell:
+    def alarm_cell(record: AlarmRecord) -> Cell:
         icon = "check"
         if record.is_on:
             icon = "circle-x" if condition(record) == "error" else "triangle-alert"
@@ -129,7 +129,7 @@ def history_columns(
 
     return (
         Column("when", lazy("When"), 136, when_cell, key=lambda record: record.at_s, is_numeric=False),
-        Column("alarm", lazy("Alarm"), 180, alarm, stretch=True, tip=lambda record: record.cause),
+        Column("alarm", lazy("Alarm"), 180, alarm_cell, stretch=True, tip=lambda record: record.cause),
         Column("times", lazy("Count"), 56, lambda record: Cell(str(record.count) if record.count > 1 else ""),
                key=lambda record: record.count, is_numeric=True, hide_order=2),
         Column("lasted", lazy("Duration"), 84, duration_cell, key=lambda record: record.duration_s,

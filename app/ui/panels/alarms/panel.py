@@ -58,8 +58,8 @@ if TYPE_CHECKING:
 STATE_UPDATE_TICKS = 6  # refreshes at 30 Hz: states are updated five times a second
 SNOOZE_S = 600.0
 CALM_CHOICES_S = (0.5, 2.0, 10.0, 60.0)
-ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
-CSV = FileKind(lazy("Comma-separated values"), ".csv")
+TOPIC_ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
+CSV_KIND = FileKind(lazy("Comma-separated values"), ".csv")
 MAX_COMPLETIONS = 500
 
 
@@ -205,7 +205,7 @@ class AlarmsPanel(PanelWidget):
 
     def _icon(self, rule: AlarmRule) -> str:
         topic = self.session.live.topics.get(rule.condition.name)
-        return ICONS.get(topic.codec, "box") if topic is not None else "radio-tower"
+        return TOPIC_ICONS.get(topic.codec, "box") if topic is not None else "radio-tower"
 
     def _show_states(self) -> None:
         now_s, on = self.now_s(), 0
@@ -379,7 +379,7 @@ class AlarmsPanel(PanelWidget):
                 :MAX_COMPLETIONS
             ]
         titles = [self.session.documents.title(document) for document in self.session.documents]
-        return list(dict.fromkeys([*titles, *(file.name for file in self.session.settings.recent)]))
+        return list(dict.fromkeys([*titles, *(file.name for file in self.session.settings.recent_files)]))
 
     # -- menus --------------------------------------------------------------------------------------------
 
@@ -503,7 +503,7 @@ class AlarmsPanel(PanelWidget):
         rule = self.alarms.remove(rule_id)
         if rule is not None:
             said = _("Deleted the alarm “{condition}”").format(condition=condition_text(rule.condition))
-            self.context.toast(said, _("Undo"), self.alarms.restore)
+            self.context.show_toast(said, _("Undo"), self.alarms.restore)
             self.refresh()
             self.new.setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -533,7 +533,7 @@ class AlarmsPanel(PanelWidget):
 
     def _save(self) -> None:
         suggestion = Path.home() / _("alarms.csv")
-        self.context.files.save_as(_("Save the history"), suggestion, [CSV], self._write)
+        self.context.files.save_as(_("Save the history"), suggestion, [CSV_KIND], self._write)
 
     def _write(self, path: Path, _kind: FileKind) -> None:
         try:
@@ -545,13 +545,13 @@ class AlarmsPanel(PanelWidget):
             )
         else:
             self.session.alerts.resolve("alarms:csv")
-            self.context.toast(_("Saved {file}").format(file=path.name))
+            self.context.show_toast(_("Saved {file}").format(file=path.name))
 
     def _copy_command(self) -> None:
         path = self.alarms.path
         said = f'nep watch "{path}"' if path is not None else "nep watch"
         QGuiApplication.clipboard().setText(said)
-        self.context.toast(_("Copied {line}").format(line=said))
+        self.context.show_toast(_("Copied {line}").format(line=said))
 
     # -- overrides ----------------------------------------------------------------------------------------
 

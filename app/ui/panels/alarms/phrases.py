@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from string import Formatter
 from typing import Literal
 
-from app.robots.description.typed_number import AMBIGUOUS_SEPARATORS, TypedNumberError, parse_number
+from app.robots.description.typed_number import AMBIGUOUS_SEPARATORS_MESSAGE, TypedNumberError, parse_number
 from nep.i18n import _, lazy, pgettext, plazy
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
 from nep.programs.alarms.rule import DEFAULT_RECORDING_S, KINDS_WITH_LIMIT, NUMBER_KINDS, VALUE_KINDS, Scalar
@@ -83,7 +83,7 @@ SLOT_NAMES: Mapping[str, str] = {
 NEW_ACTIONS: Sequence[AlarmAction] = (
     AlarmAction("banner"),
     AlarmAction("sound"),
-    AlarmAction("keep", seconds=DEFAULT_RECORDING_S),
+    AlarmAction("keep", recording_s=DEFAULT_RECORDING_S),
     AlarmAction("run"),
     AlarmAction("call", payload={}),
     AlarmAction("send"),
@@ -115,7 +115,7 @@ _VERBS: Mapping[str, str] = {
     "call": plazy("alarm", "call"),
     "send": plazy("alarm", "send to"),
 }
-_DEFAULTS: Mapping[str, tuple[Scalar, float]] = {
+_DEFAULT_LIMITS: Mapping[str, tuple[Scalar, float]] = {
     "silent": (None, 2.0),
     "loses": (1.0, 30.0),
     "rate_below": (10.0, 2.0),
@@ -353,7 +353,7 @@ def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
     condition = rule.condition
     if kind == condition.kind:
         return rule
-    limit, for_s = _DEFAULTS.get(kind, (0 if kind in NUMBER_KINDS else None, 0.0))
+    limit, for_s = _DEFAULT_LIMITS.get(kind, (0 if kind in NUMBER_KINDS else None, 0.0))
     both_values = kind in VALUE_KINDS and condition.is_about_value
     if both_values and kind in KINDS_WITH_LIMIT:
         keeps = kind not in NUMBER_KINDS or not math.isnan(condition.number)
@@ -374,7 +374,7 @@ def rejection_text(part: PhrasePart, rule: AlarmRule) -> str:
     """
     match part.role:
         case "limit" if rule.condition.kind in NUMBER_KINDS:
-            return _(AMBIGUOUS_SEPARATORS)
+            return _(AMBIGUOUS_SEPARATORS_MESSAGE)
         case "time":
             return _("Enter a time such as 2 s, 1.5 min or 250 ms.")
         case "payload":

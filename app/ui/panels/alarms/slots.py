@@ -14,8 +14,8 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
-from app.ui.widgets.keyboard import is_plain, next_in_focus_chain
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.keyboard import has_no_modifiers, next_in_focus_chain
+from app.ui.widgets.menus import ContextMenuFilter
 
 HEIGHT, PADDING, ICON, GAP, MAX_WIDTH = 24, 7, 14, 5, 300
 FIELD_WIDTH = 240
@@ -127,7 +127,7 @@ class SlotField(QLineEdit):
         self.setAccessibleName(slot.accessibleName())
         self.setPlaceholderText(example)
         self.setProperty("focusRadius", theme.radius("small"))
-        EditMenu(theme, self)
+        ContextMenuFilter(theme, self)
         self._offered = QStringListModel(self)
         completer = QCompleter(self._offered, self)
         completer.setFilterMode(Qt.MatchFlag.MatchContains)
@@ -139,7 +139,7 @@ class SlotField(QLineEdit):
             popup.setProperty("offers", "true")
             popup.setItemDelegate(QStyledItemDelegate(popup))  # lets the style sheet set the padding of items
         self.setCompleter(completer)
-        self.textEdited.connect(lambda _text: self._mark(wrong=False))
+        self.textEdited.connect(lambda _text: self._set_invalid(wrong=False))
         self._position_over_slot(theme, row)
         self.selectAll()
         self.show()
@@ -161,9 +161,9 @@ class SlotField(QLineEdit):
             return
         self._offered.setStringList(list(words))
         if self.hasFocus() and words and self.text() == "":
-            self._show_all()
+            self._show_all_completions()
 
-    def _show_all(self) -> None:
+    def _show_all_completions(self) -> None:
         completer = self.completer()
         completer.setCompletionPrefix("")
         completer.complete()
@@ -181,10 +181,10 @@ class SlotField(QLineEdit):
         is_offering = popup is not None and popup.isVisible()
         if event.key() == Qt.Key.Key_Escape and not is_offering:
             self.dismiss()
-        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and has_no_modifiers(event):
             self._commit_and_dismiss()
         elif event.key() == Qt.Key.Key_Down and not is_offering:
-            self._show_all()
+            self._show_all_completions()
         else:
             super().keyPressEvent(event)
 
@@ -203,10 +203,10 @@ class SlotField(QLineEdit):
 
     def _commit(self) -> bool:
         well = self._take(self.text())
-        self._mark(wrong=not well)
+        self._set_invalid(wrong=not well)
         return well
 
-    def _mark(self, *, wrong: bool) -> None:
+    def _set_invalid(self, *, wrong: bool) -> None:
         if self.property("wrong") != ("true" if wrong else ""):
             self.setProperty("wrong", "true" if wrong else "")
             self.style().unpolish(self)

@@ -54,7 +54,7 @@ class BackpackController:
     def _show(self) -> None:
         trouble = self._backpack.take_problem()
         if trouble:
-            self._context.toast(_capitalize_first(trouble))
+            self._context.show_toast(_capitalize_first(trouble))
         if self._shown != self._backpack.revision:
             self._shown = self._backpack.revision
             self._editor.set_backpack([item.to_json() for item in self._backpack.items])
@@ -80,7 +80,7 @@ class BackpackController:
     def _add(self, blocks: Sequence[Mapping[str, object]], count: int, *, left: bool) -> None:
         # `left` is True if the selection contained notes, which the backpack doesn't store.
         made: list[BackpackStack] = []
-        if blocks and self._try(lambda: made.extend(self._backpack.add(blocks))):
+        if blocks and self._apply_change(lambda: made.extend(self._backpack.add(blocks))):
             words = ngettext(
                 "Added {count} block to the backpack", "Added {count} blocks to the backpack", count
             )
@@ -88,19 +88,23 @@ class BackpackController:
             said = words.format(count=count)
             if left:
                 said = _("{what}. Notes weren't added: the backpack can only hold blocks.").format(what=said)
-            self._context.toast(said, _("Undo"), lambda: self._try(lambda: self._backpack.remove(ids)))
+            self._context.show_toast(
+                said, _("Undo"), lambda: self._apply_change(lambda: self._backpack.remove(ids))
+            )
 
     def _remove(self, take: Callable[[], list[BackpackStack]], *, emptied: bool) -> None:
         gone: list[BackpackStack] = []
-        if self._try(lambda: gone.extend(take())) and gone:
+        if self._apply_change(lambda: gone.extend(take())) and gone:
             words = _("Emptied the backpack") if emptied else _("Removed from the backpack")
-            self._context.toast(words, _("Undo"), lambda: self._try(lambda: self._backpack.restore(gone)))
+            self._context.show_toast(
+                words, _("Undo"), lambda: self._apply_change(lambda: self._backpack.restore(gone))
+            )
 
-    def _try(self, change: Callable[[], object]) -> bool:
+    def _apply_change(self, change: Callable[[], object]) -> bool:
         try:
             change()
         except BackpackError as error:
-            self._context.toast(_capitalize_first(str(error)))
+            self._context.show_toast(_capitalize_first(str(error)))
             return False
         finally:
             self._show()

@@ -122,8 +122,8 @@ class BlockDrag:
         self._scrolling.timeout.connect(self._scroll)
         editor.blocks_dragged_outside.connect(self._drag_moved)
         editor.drag_picture_rendered.connect(self._set_image)
-        editor.blocks_dropped_outside.connect(self._dropped)
-        editor.blocks_transferred.connect(self._transferred)
+        editor.blocks_dropped_outside.connect(self._on_dropped)
+        editor.blocks_transferred.connect(self._on_transferred)
 
     def _target(self, place: QPoint) -> str:
         found = self._tabs.target_at(place)
@@ -176,7 +176,7 @@ class BlockDrag:
         if self._picture is not None:
             self._picture.move_to(place)
 
-    def _dropped(self, place: QPoint) -> None:
+    def _on_dropped(self, place: QPoint) -> None:
         target = self._target(place)
         self._held_at = None
         self._scrolling.stop()
@@ -196,7 +196,7 @@ class BlockDrag:
             self._show()
             self._editor.move_dragged_blocks()
 
-    def _transferred(self, count: int, how: str, home: str) -> None:
+    def _on_transferred(self, count: int, how: str, home: str) -> None:
         document = self._session.document
         words = transfer_text(count, how, self._session.documents.title(document))
 
@@ -204,7 +204,7 @@ class BlockDrag:
             self._context.run(f"tab:{home}")
             self._editor.undo_block_move()
 
-        self._context.toast(words, _("Undo"), undo)
+        self._context.show_toast(words, _("Undo"), undo)
 
 
 def transfer_text(count: int, how: str, name: str) -> str:

@@ -8,7 +8,7 @@ from typing import Protocol
 from app.robots.description.description import DataField, Robot, Sensor
 from app.ui.text.sensor_values import quantity_text, reading_text, yes_no_text
 
-SILENT = "silent"
+SILENT_TEXT = "silent"
 
 
 class SensorValues(Protocol):
@@ -51,7 +51,7 @@ def sensor_texts(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tupl
             continue
         told = _value_texts(f"{robot}/{name}", sensor, link.values.get(name))
         words |= told
-        if link.state == SILENT:
+        if link.state == SILENT_TEXT:
             old |= told.keys()
     return words, old
 

@@ -24,10 +24,10 @@ from app.ui.panels.behaviour.backpack_keeper import BackpackController
 from app.ui.panels.behaviour.carried_blocks import BlockDrag
 from app.ui.panels.behaviour.live_values import sensor_texts
 from app.ui.panels.behaviour.program_view import ProgramView
-from app.ui.panels.behaviour.tab import TabFacts
+from app.ui.panels.behaviour.tab import TabState
 from app.ui.panels.behaviour.tabs import BehaviourTitle
 from app.ui.widgets import EmptyAction, EmptyState, label
-from app.ui.widgets.indicators import ROBOT_STATUS
+from app.ui.widgets.indicators import STATUS_BY_ROBOT_STATE
 from nep.i18n import _, lazy, ngettext, pgettext
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ class BehaviourPanel(PanelWidget):
     def refresh(self) -> None:
         self._ticks += 1
         documents, document = self.session.documents, self.session.document
-        self._bar.tabs.show_tabs(tab_facts(documents, self.session.runs), document.key)
+        self._bar.tabs.show_tabs(tab_states(documents, self.session.runs), document.key)
         if self.editor is None and self._can_open:
             self.editor = self._open_editor()
         if self.editor is not None:
@@ -197,7 +197,7 @@ class BehaviourPanel(PanelWidget):
             values = runs.values if mine else {}
             editor.set_variable_values({id: values[id].to_json() for id in self._watched if id in values})
         if self._ticks % LIVE_UPDATE_TICKS == 0:
-            self._show_live()
+            self._show_live_values()
         if self._backpack is not None:
             self._backpack.tick()
         self.waiting.set_ready(ready=editor.is_ready)
@@ -208,7 +208,7 @@ class BehaviourPanel(PanelWidget):
         """Show the active behaviour at once instead of on the next tick."""
         if self.editor is not None and self.editor.is_ready:
             self._bar.tabs.show_tabs(
-                tab_facts(self.session.documents, self.session.runs), self.session.document.key
+                tab_states(self.session.documents, self.session.runs), self.session.document.key
             )
             self._show_blocks(self.editor)
 
@@ -245,9 +245,9 @@ class BehaviourPanel(PanelWidget):
             self._can_open = False
             self._show_missing_libraries(missing)
             return None
-        editor.changed.connect(self._edited)
+        editor.changed.connect(self._on_edited)
         editor.recovered.connect(
-            lambda: self.context.toast(_("The block editor was restarted. Undo history was cleared."))
+            lambda: self.context.show_toast(_("The block editor was restarted. Undo history was cleared."))
         )
         editor.history_changed.connect(self._history_changed)
         editor.key_pressed.connect(self._key_pressed)
@@ -284,14 +284,14 @@ class BehaviourPanel(PanelWidget):
 
     def _copy_command(self, command: str) -> None:
         QGuiApplication.clipboard().setText(command)
-        self.context.toast(_("Copied “{command}”").format(command=command))
+        self.context.show_toast(_("Copied “{command}”").format(command=command))
 
     def _program_changed(self, program: Program) -> None:
         # Connected to signals of the session; updates absent blocks, sensors and the program's text.
         if self.editor is not None:
             self.editor.set_absent(program.absent)
         self._sensors = tuple(program.sensors)
-        self._show_live()
+        self._show_live_values()
         if self.mode == "python":
             self.program.show_program(program.source)
 
@@ -304,7 +304,7 @@ class BehaviourPanel(PanelWidget):
 
     def _set_flyout_sensors(self, sensors: tuple[tuple[str, str], ...]) -> None:
         self._offered = sensors
-        self._show_live()
+        self._show_live_values()
 
     def _watch_variables(self, ids: tuple[str, ...]) -> None:
         self._watched = ids
@@ -332,9 +332,9 @@ class BehaviourPanel(PanelWidget):
 
     def _blocks_deleted(self, editor: Editor, count: int) -> None:
         words = ngettext("Deleted {count} block", "Deleted {count} blocks", count).format(count=count)
-        self.context.toast(words, _("Undo"), editor.undo_deletion)
+        self.context.show_toast(words, _("Undo"), editor.undo_deletion)
 
-    def _show_live(self) -> None:
+    def _show_live_values(self) -> None:
         sensors = dict.fromkeys((*self._sensors, *self._offered))
         self._watch_robots({robot for robot, _name in sensors})
         if self.editor is not None:
@@ -358,7 +358,7 @@ class BehaviourPanel(PanelWidget):
     def copy_program(self) -> None:
         """Copy the Python program to the clipboard."""
         QGuiApplication.clipboard().setText(self.program.toPlainText())
-        self.context.toast(_("Copied the program"))
+        self.context.show_toast(_("Copied the program"))
 
     def flush(self, done: Callable[[], None]) -> None:
         """Fetch pending edits, which the editor debounces by 150 ms, then call `done`."""
@@ -454,7 +454,7 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None:
             self.editor.show_block(block)
 
-    def _edited(self, key: str, workspace: WorkspaceJson) -> None:
+    def _on_edited(self, key: str, workspace: WorkspaceJson) -> None:
         document = self.session.documents.find_by_key(key)
         if document is not None:
             was_blank = document.is_blank
@@ -538,13 +538,13 @@ def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
         Status and text by robot name, for robots that may be moving or don't respond.
     """
     return {
-        link.name: (ROBOT_STATUS[link.state], link.state_label)
+        link.name: (STATUS_BY_ROBOT_STATE[link.state], link.state_label)
         for link in links
         if link.state in ALARM_STATES
     }
 
 
-def tab_facts(documents: Iterable[Document], runs: Runs) -> list[TabFacts]:
+def tab_states(documents: Iterable[Document], runs: Runs) -> list[TabState]:
     """Return the data of the tabs of all open behaviours."""
     shown = list(documents)
     found = []
@@ -552,7 +552,7 @@ def tab_facts(documents: Iterable[Document], runs: Runs) -> list[TabFacts]:
         running = runs.active and runs.document is document
         where = str(document.path) if document.path is not None else _("Not saved to a file yet")
         found.append(
-            TabFacts(
+            TabState(
                 document.key,
                 title,
                 document.dirty,

@@ -20,7 +20,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.i18n import _
 
 MAX_NAME_WIDTH = 220
@@ -32,7 +32,7 @@ SLOT_WIDTH = 18  # place of the unsaved dot or, on hover, the close button
 
 
 @dataclass(frozen=True)
-class TabFacts:
+class TabState:
     """Data that a tab displays.
 
     Attributes:
@@ -68,12 +68,12 @@ class BehaviourTab(PaintedButton):
 
     def __init__(self, theme: Theme, parent: QWidget) -> None:
         super().__init__(theme, checkable=True, parent=parent)
-        self.facts = TabFacts("", "")
+        self.facts = TabState("", "")
         self._from: QPointF | None = None
         self._over_close = self._close_down = False
         self.setMouseTracking(True)
 
-    def show_facts(self, facts: TabFacts, current: bool) -> bool:
+    def show_state(self, facts: TabState, current: bool) -> bool:
         """Update the tab. Return True if its width changed."""
         if facts == self.facts and current == self.isChecked():
             return False
@@ -243,7 +243,7 @@ class NameField(QLineEdit):
         self.setProperty("focusRadius", theme.radius("small"))
         self.setMaxLength(MAX_NAME_LENGTH)
         self.setFont(theme.font("label"))
-        EditMenu(theme, self)
+        ContextMenuFilter(theme, self)
         self.textEdited.connect(lambda _text: self._show_problem(""))
         self.selectAll()
 

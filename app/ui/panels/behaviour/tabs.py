@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, QSize, Qt, Signal
 from PySide6.QtGui import QContextMenuEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
-from app.ui.panels.behaviour.tab import BehaviourTab, NameField, TabFacts
+from app.ui.panels.behaviour.tab import BehaviourTab, NameField, TabState
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, Segments
@@ -17,7 +17,7 @@ from nep.i18n import _
 
 MIN_TAB_WIDTH = 76
 GAP = 4
-NAME_WIDTH = 180  # width of the name field
+NAME_FIELD_WIDTH = 180  # width of the name field
 SCROLL_MARGIN, SCROLL_STEP = 32, 8  # px
 NEW_TAB = "+"
 """Key of the "+" button, used in place of a tab's key."""
@@ -38,7 +38,7 @@ class BehaviourTabs(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._facts: tuple[TabFacts, ...] = ()
+        self._facts: tuple[TabState, ...] = ()
         self._current = ""
         self._left = 0.0
         self.why_not: Callable[[str, str], str] = lambda _key, _name: ""
@@ -56,7 +56,7 @@ class BehaviourTabs(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self._restyle)
 
-    def show_tabs(self, facts: Sequence[TabFacts], current: str) -> None:
+    def show_tabs(self, facts: Sequence[TabState], current: str) -> None:
         """Replace the tabs.
 
         Args:
@@ -75,14 +75,14 @@ class BehaviourTabs(QWidget):
             gone.deleteLater()
         moved = current != self._current
         self._facts, self._current = wanted, current
-        changed = [self._tab(each).show_facts(each, each.key == current) for each in wanted]
+        changed = [self._make_tab(each).show_state(each, each.key == current) for each in wanted]
         if had_focus and moved and current in self.tabs:
             self.tabs[current].setFocus(Qt.FocusReason.OtherFocusReason)
         self._update_layout(bring=moved)
         if any(changed):
             self.updateGeometry()
 
-    def _tab(self, facts: TabFacts) -> BehaviourTab:
+    def _make_tab(self, facts: TabState) -> BehaviourTab:
         key = facts.key
         if key not in self.tabs:
             tab = self.tabs[key] = BehaviourTab(self._theme, self._room)
@@ -175,7 +175,7 @@ class BehaviourTabs(QWidget):
         if self.field is None or self._edited not in self.tabs:
             return
         tab = self.tabs[self._edited].geometry()
-        width = min(max(tab.width(), round(self._theme.scaled(NAME_WIDTH))), self._room.width())
+        width = min(max(tab.width(), round(self._theme.scaled(NAME_FIELD_WIDTH))), self._room.width())
         height = max(tab.height(), self.field.sizeHint().height())
         left = max(0, min(tab.left(), self._room.width() - width))
         self.field.setGeometry(left, max(0, (self.height() - height) // 2), width, height)

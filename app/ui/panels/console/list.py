@@ -24,7 +24,7 @@ from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SearchField, paint
-from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.keyboard import has_no_modifiers
 from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 Index = QModelIndex | QPersistentModelIndex
 RECORD_ROLE = int(Qt.ItemDataRole.UserRole)
-LEVELS = {
+LEVEL_STYLES = {
     "debug": ("circle-dashed", "textTertiary"),
     "info": ("circle-check", "textTertiary"),
     "warn": ("triangle-alert", "warn"),
@@ -53,7 +53,7 @@ MIN_TEXT_CHARS = 24  # characters of the text that should stay visible
 _ROOT = QModelIndex()
 
 
-def line_of(record: ConsoleRecord, level: str = "") -> str:
+def format_line(record: ConsoleRecord, level: str = "") -> str:
     """Format a record as a line of text for the clipboard.
 
     Args:
@@ -66,7 +66,7 @@ def line_of(record: ConsoleRecord, level: str = "") -> str:
     return f"{clock} {level or record.level} {record.origin}{logger} {record.text}"
 
 
-def tip_of(record: ConsoleRecord) -> str:
+def tooltip_text(record: ConsoleRecord) -> str:
     """Return the tooltip of a record: the full text, time, level, origin, and location of the log call."""
     where = "  ".join(part for part in (record.logger, record.location) if part)
     clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
@@ -127,8 +127,8 @@ class ConsoleModel(QAbstractListModel):
         if role == RECORD_ROLE:
             return record
         if role in {Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole}:
-            return line_of(record, _level_name(record))
-        return plain.tip(tip_of(record)) if role == Qt.ItemDataRole.ToolTipRole else None
+            return format_line(record, _level_name(record))
+        return plain.tip(tooltip_text(record)) if role == Qt.ItemDataRole.ToolTipRole else None
 
     def reset_records(
         self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]
@@ -219,7 +219,7 @@ class LineDelegate(QStyledItemDelegate):
             clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
             paint.text_line(painter, rect, clock, small, theme.colour("textTertiary"))
             rect.setLeft(rect.left() + shown["time"])
-        icon, role = LEVELS.get(record.level, LEVELS["info"])
+        icon, role = LEVEL_STYLES.get(record.level, LEVEL_STYLES["info"])
         square = QRectF(rect.left(), rect.center().y() - ICON_SIZE / 2, ICON_SIZE, ICON_SIZE)
         paint_icon(painter, square, icon, theme.colour(role))
         rect.setLeft(rect.left() + shown["icon"])
@@ -308,7 +308,7 @@ class LogFindField(SearchField):
         if event.key() == Qt.Key.Key_Escape:
             self.clear()
             self.hide()
-        if event.key() in {Qt.Key.Key_Escape, Qt.Key.Key_Down} and is_plain(event):
+        if event.key() in {Qt.Key.Key_Escape, Qt.Key.Key_Down} and has_no_modifiers(event):
             self.exited.emit()
         else:
             super().keyPressEvent(event)

@@ -12,14 +12,14 @@ from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout
 
 from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget, filter_blocker
 from app.ui.panels.console.list import (
-    LEVELS,
+    LEVEL_STYLES,
     RECORD_ROLE,
     ConsoleModel,
     LineDelegate,
     LineList,
     LogFindField,
     RecordFilter,
-    line_of,
+    format_line,
 )
 from app.ui.text import plain
 from app.ui.text.numbers import group_digits
@@ -37,8 +37,8 @@ LEVEL_LABELS = {
     "error": lazy("Errors only"),
 }
 VISIBLE_LEVELS = {
-    "debug": frozenset(LEVELS),
-    "all": frozenset(LEVELS) - {"debug"},
+    "debug": frozenset(LEVEL_STYLES),
+    "all": frozenset(LEVEL_STYLES) - {"debug"},
     "warn": frozenset({"warn", "error", "critical"}),
     "error": frozenset({"error", "critical"}),
 }
@@ -69,7 +69,7 @@ class ConsolePanel(PanelWidget):
         self.newer.setParent(self.list)
         self.newer.hide()
         self.newer.clicked.connect(self.list.scrollToTop)
-        self.list.verticalScrollBar().valueChanged.connect(self._scrolled)
+        self.list.verticalScrollBar().valueChanged.connect(self._on_scrolled)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
         self.pages.addWidget(self.list)
@@ -140,7 +140,7 @@ class ConsolePanel(PanelWidget):
     def _current_filter(self) -> RecordFilter:
         return RecordFilter(VISIBLE_LEVELS[self.level], self.node, self.words.text())
 
-    def _scrolled(self, value: int) -> None:
+    def _on_scrolled(self, value: int) -> None:
         if value == 0:
             self._unseen = 0
         self._update_newer_button()
@@ -268,9 +268,9 @@ class ConsolePanel(PanelWidget):
     def _copy_rows(self, rows: Sequence[int]) -> None:
         if rows:
             records = [self.model.index(row, 0).data(RECORD_ROLE) for row in rows]
-            QGuiApplication.clipboard().setText("\n".join(line_of(record) for record in records))
+            QGuiApplication.clipboard().setText("\n".join(format_line(record) for record in records))
             said = ngettext("Copied {count} line", "Copied {count} lines", len(rows))
-            self.context.toast(said.format(count=group_digits(len(rows))))
+            self.context.show_toast(said.format(count=group_digits(len(rows))))
 
     # appearance and saved state
 

@@ -29,14 +29,14 @@ from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from nep.i18n import _, lazy, pgettext
 
 PROGRESS_SETTING = "first_steps"
-HINT_AFTER_S = 20.0
+HINT_DELAY_S = 20.0
 MARK_SIZE = 22
-ALL_DONE = lazy("First steps done")
-LOOSE_HINT = lazy("Drag it up until it snaps below “{start}”.")
-WHAT_NEXT = lazy("You can now build, run and stop a behaviour. Open an example to learn more.")
+ALL_DONE_TEXT = lazy("First steps done")
+DETACHED_HINT = lazy("Drag it up until it snaps below “{start}”.")
+WHAT_NEXT_TEXT = lazy("You can now build, run and stop a behaviour. Open an example to learn more.")
 
 
-class _Mark(QWidget):
+class _StepMark(QWidget):
     """Check mark of a completed step, or the step's number in a circle, filled for the next step."""
 
     def __init__(self, theme: Theme, number: int) -> None:
@@ -78,7 +78,7 @@ class StepRow(QWidget):
     ) -> None:
         super().__init__()
         self._theme, self.step = theme, step
-        self.mark = _Mark(theme, number)
+        self.mark = _StepMark(theme, number)
         self.words = label(with_block_names(step.text), "bodyLarge", wrap=True)
         self.hint = label(with_block_names(step.hint), "body", role="textSecondary", wrap=True)
         first = step.id == "robot"
@@ -113,7 +113,7 @@ class StepRow(QWidget):
 
     def show_hint(self, *, loose: bool) -> None:
         """Show where to find the block; if `loose` is True, that it must be attached to the script."""
-        self.hint.setText(with_block_names(LOOSE_HINT if loose else self.step.hint))
+        self.hint.setText(with_block_names(DETACHED_HINT if loose else self.step.hint))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         if self.mark.state == "next":
@@ -159,8 +159,8 @@ class FirstStepsPanel(PanelWidget):
         self.end = EmptyState(
             self.theme,
             "circle-check",
-            _(ALL_DONE),
-            _(WHAT_NEXT),
+            _(ALL_DONE_TEXT),
+            _(WHAT_NEXT_TEXT),
             [
                 EmptyAction(_("Open an example"), lambda: context.run("help.examples"), is_primary=True),
                 EmptyAction(_("Start over"), self.start_again),
@@ -191,7 +191,7 @@ class FirstStepsPanel(PanelWidget):
             self._save_progress()
             self._show()
             if self.next_step() is None:
-                paint.announce(self, _(ALL_DONE))
+                paint.announce(self, _(ALL_DONE_TEXT))
         self._show_delayed_hint()
 
     def _current_state(self) -> TutorialState:
@@ -224,7 +224,7 @@ class FirstStepsPanel(PanelWidget):
             if self._waits_since is not None and self._waits_since[0] != step.id and self._pointed_for:
                 self._clear_highlight()
             self._waits_since, self._edits = (step.id, now), seen
-        elif now - self._waits_since[1] >= HINT_AFTER_S and self._pointed_for != step.id:
+        elif now - self._waits_since[1] >= HINT_DELAY_S and self._pointed_for != step.id:
             if step.id != "robot" and not self.session.runs.active:
                 self.show_me(step)
             self._pointed_for = step.id

@@ -21,11 +21,11 @@ from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 from app.core.graph.walk import Arrow, GraphSelection, move_selection
 from app.ui.panels.graph.painting import paint_scene
-from app.ui.panels.graph.scene import GraphScene, LineItem, NodeItem, StatsOf
+from app.ui.panels.graph.scene import GraphScene, LineItem, NodeItem, StatsGetter
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.keyboard import is_keyboard_navigation, is_plain
+from app.ui.widgets.keyboard import has_no_modifiers, is_keyboard_navigation
 from nep.i18n import _
 
 MIN_SCALE, MAX_SCALE = 0.05, 3.0
@@ -38,7 +38,7 @@ MAX_UPDATES_PER_TICK = 250
 """Maximum number of nodes and lines updated per tick."""
 MAX_DIRTY_RECTS = 60
 """Number of changed areas above which the whole canvas is repainted instead."""
-_ARROWS: dict[int, Arrow] = {
+_ARROW_KEYS: dict[int, Arrow] = {
     Qt.Key.Key_Left: "left",
     Qt.Key.Key_Right: "right",
     Qt.Key.Key_Up: "up",
@@ -134,7 +134,7 @@ class GraphCanvas(QWidget):
         if self.scene is not None:
             self._waiting = self.scene.items_in(self.visible_rect())
 
-    def update_stats(self, figures: StatsOf) -> int:
+    def update_stats(self, figures: StatsGetter) -> int:
         """Update the rates and counts of the next visible items, at most `MAX_UPDATES_PER_TICK`.
 
         This is called on every tick; the work is divided, because each call must be short. Only changed
@@ -416,13 +416,13 @@ class GraphCanvas(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = event.key()
-        arrow = _ARROWS.get(key)
+        arrow = _ARROW_KEYS.get(key)
         if arrow is not None and event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
             across, down = _PAN_DIRECTIONS[arrow]
             self.move_by(across * PAN_STEP, down * PAN_STEP)
-        elif arrow is not None and is_plain(event):
+        elif arrow is not None and has_no_modifiers(event):
             self._select_neighbour(arrow)
-        elif key in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
+        elif key in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and has_no_modifiers(event):
             self._activate()
         elif key == Qt.Key.Key_Escape and self.choice is not None:
             self.select(None)
@@ -487,7 +487,7 @@ class GraphOverview(QWidget):
         self.setVisible(wanted)
         self.update()
 
-    def _fit(self, scene: GraphScene) -> tuple[float, QPointF]:
+    def _fit_transform(self, scene: GraphScene) -> tuple[float, QPointF]:
         bounds = scene.bounds.adjusted(-MARGIN, -MARGIN, MARGIN, MARGIN)
         scale = min((self.width() - 8) / bounds.width(), (self.height() - 8) / bounds.height())
         return scale, QPointF(self.width() / 2, self.height() / 2) - bounds.center() * scale
@@ -498,7 +498,7 @@ class GraphOverview(QWidget):
         rect = QRectF(self.rect())
         paint.box(painter, rect, theme.radius("panel"), theme.colour("panel"), theme.colour("borderStrong"))
         if scene is not None:
-            scale, offset = self._fit(scene)
+            scale, offset = self._fit_transform(scene)
             painter.save()
             painter.translate(offset)
             painter.scale(scale, scale)
@@ -519,5 +519,5 @@ class GraphOverview(QWidget):
     def mousePressEvent(self, event: QMouseEvent) -> None:
         scene = self._canvas.scene
         if scene is not None and event.button() == Qt.MouseButton.LeftButton:
-            scale, offset = self._fit(scene)
+            scale, offset = self._fit_transform(scene)
             self._canvas.center_on((event.position() - offset) / scale)

@@ -74,7 +74,7 @@ class CardStat:
     value: str
     note: str = ""
     curve: tuple[float, ...] = ()
-    is_bad: bool = False
+    is_problem: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,9 +93,9 @@ class CardContent:
     title: str
     kind: str
     stats: tuple[CardStat, ...] = ()
-    facts: tuple[str, ...] = ()
+    lines: tuple[str, ...] = ()
     tables: tuple[CardTable, ...] = ()
-    foot: str = ""
+    footer: str = ""
     topic: str = ""
     """Key of the topic for the buttons *Inspect*, *Plot a field* and *Record topic*; "" hides the buttons."""
     has_fields: bool = False
@@ -143,7 +143,7 @@ class GraphCard(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        column.addLayout(self._head())
+        column.addLayout(self._header_row())
         column.addWidget(scroll, 1)
         column.addWidget(self.steps)
         self._line = Separator(theme)
@@ -173,7 +173,7 @@ class GraphCard(QWidget):
         policy.setHeightForWidth(True)
         self.steps.setSizePolicy(policy)
 
-    def _head(self) -> QHBoxLayout:
+    def _header_row(self) -> QHBoxLayout:
         head = QHBoxLayout()
         head.setContentsMargins(14, 8, 8, 4)
         head.setSpacing(8)
@@ -219,9 +219,9 @@ class GraphCard(QWidget):
         self.alarm.setVisible(bool(content.alarm))
         self.steps.setVisible(bool(content.topic or content.alarm))
         self.record.setVisible(bool(content.topic) and not split_key(content.topic)[0])
-        self.foot.setText(content.foot)
-        self.foot.setVisible(bool(content.foot))
-        self._line.setVisible(bool(content.foot))
+        self.foot.setText(content.footer)
+        self.foot.setVisible(bool(content.footer))
+        self._line.setVisible(bool(content.footer))
         if before is None or _structure_key(before) != _structure_key(content):
             self._rebuild(content)
         for box, figure in zip(self._figures, content.stats, strict=True):
@@ -247,7 +247,7 @@ class GraphCard(QWidget):
             grid.setColumnStretch(0, 1)
             grid.setColumnStretch(1, 1)
             self._column.addWidget(card)
-        for fact in content.facts:
+        for fact in content.lines:
             self._column.addWidget(label(fact, "body", role="textSecondary", wrap=True))
         self._tables = [_Table(self._theme, table, self.select_requested.emit) for table in content.tables]
         for made in self._tables:
@@ -258,7 +258,7 @@ class GraphCard(QWidget):
 def _structure_key(content: CardContent) -> object:
     # Widgets are rebuilt only when this value changes.
     tables = [(table.title, table.columns, [row[:2] for row in table.rows]) for table in content.tables]
-    return content.title, len(content.stats), content.facts, tables
+    return content.title, len(content.stats), content.lines, tables
 
 
 class _StatBox(QWidget):
@@ -288,7 +288,7 @@ class _StatBox(QWidget):
         self._note.setText(figure.note)
         self._curve.set_values(figure.curve)
         self._curve.setVisible(len(figure.curve) > 1)
-        role = "warn" if figure.is_bad else "text"
+        role = "warn" if figure.is_problem else "text"
         if self._value.property("role") != role:
             self._value.setProperty("role", role)
             self._value.style().unpolish(self._value)
@@ -433,7 +433,7 @@ def _loss_stat(topic: Topic) -> CardStat:
     share = topic.loss_ratio
     value = "0" if not topic.lost else percent_text(share) if share is not None else group_digits(topic.lost)
     note = ngettext("{count} message", "{count} messages", topic.lost).format(count=group_digits(topic.lost))
-    return CardStat(_("Lost"), value, note if topic.lost else "", is_bad=bool(topic.lost))
+    return CardStat(_("Lost"), value, note if topic.lost else "", is_problem=bool(topic.lost))
 
 
 def _latency_stat(topic: Topic) -> CardStat:
@@ -449,7 +449,7 @@ def _service_content(service: ServiceInfo, facts: CardSources) -> CardContent:
     rate = facts.call_rates_hz.get(service.name)
     figures = (
         CardStat(_("Calls"), group_digits(service.calls), short_rate(rate) if rate is not None else ""),
-        CardStat(_("Errors"), group_digits(service.errors), is_bad=service.errors > 0),
+        CardStat(_("Errors"), group_digits(service.errors), is_problem=service.errors > 0),
     )
     servers = tuple(
         _row(facts, each.node_id, (group_digits(each.calls), group_digits(each.errors)))
@@ -495,8 +495,8 @@ def node_card(
         lines.append(_("gone"))
     figures = (CardStat(_("Processor"), cpu_text(entry.cpu_ratio), _("of one core")),)
     tables = (
-        _topics_table(_("Publishes"), entry.network, entry.publishes, facts),
-        _topics_table(_("Subscribes"), entry.network, entry.subscribes, facts),
+        _topics_table(_("Publishes"), entry.network, entry.published_topics, facts),
+        _topics_table(_("Subscribes"), entry.network, entry.subscribed_topics, facts),
         CardTable(_("Serves"), (), tuple((name, name, ()) for name, serves in services if serves), "topic"),
         CardTable(
             _("Calls"), (), tuple((name, name, ()) for name, serves in services if not serves), "topic"

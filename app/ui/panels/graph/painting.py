@@ -37,10 +37,10 @@ def paint_scene(
         rings: True to paint focus rings, for use by keyboard.
     """
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    _Painting(scene, painter, clip, scale, chosen, rings=rings).paint()
+    _ScenePainter(scene, painter, clip, scale, chosen, rings=rings).paint()
 
 
-class _Painting:
+class _ScenePainter:
     """Single pass that paints the visible part of a scene."""
 
     def __init__(

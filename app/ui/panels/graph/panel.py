@@ -14,13 +14,13 @@ from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 
 from app.core.graph.activity import CallRates, QuietNodes
-from app.core.graph.dot import dot_of
+from app.core.graph.dot import format_dot
 from app.core.graph.layout import GraphLayout, LayoutSizes
 from app.core.graph.layout_thread import LayoutThread
 from app.core.graph.node_graph import (
     MAX_EXPANDED_NODES,
     DrawnNode,
-    GraphFacts,
+    GraphInput,
     GraphLine,
     GraphOptions,
     GroupBy,
@@ -45,7 +45,7 @@ from app.ui.panels.graph.words import (
     group_name,
     line_name,
     line_stats,
-    node_line,
+    node_detail,
     node_name,
     short_rate,
 )
@@ -65,8 +65,8 @@ from app.ui.widgets.file_dialogs import FileKind
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy, ngettext
 
-SVG = FileKind(lazy("An image that stays sharp at any size"), ".svg")
-DOT = FileKind(lazy("Graph for other programs"), ".dot")
+SVG_KIND = FileKind(lazy("An image that stays sharp at any size"), ".svg")
+DOT_KIND = FileKind(lazy("Graph for other programs"), ".dot")
 MAX_LINES_PER_TICK = 500
 """Number of lines above which a scene is painted one tick after it was built, to keep each tick short."""
 MIN_SIDE_CARD_WIDTH = 700
@@ -100,7 +100,7 @@ class GraphPanel(PanelWidget):
         self.count = label("", "small", role="textSecondary")
         self.export = Button(theme, _("Export"), "download", size="small")
         self._menu = Menu(theme, self.export)
-        for words, kind in ((_("Image (SVG)"), SVG), (_("Graph (DOT)"), DOT)):
+        for words, kind in ((_("Image (SVG)"), SVG_KIND), (_("Graph (DOT)"), DOT_KIND)):
             self._menu.addAction(words).triggered.connect(
                 lambda _on=False, kind=kind: self._prompt_file(kind)
             )
@@ -134,7 +134,7 @@ class GraphPanel(PanelWidget):
 
     def _connect(self) -> None:
         tools, canvas = self.tools, self.canvas
-        tools.filter.textChanged.connect(self._filter)
+        tools.filter.textChanged.connect(self._apply_filter)
         tools.filter.exited.connect(lambda: canvas.setFocus(Qt.FocusReason.ShortcutFocusReason))
         tools.group.changed.connect(self._group_by)
         tools.quiet.clicked.connect(
@@ -152,7 +152,7 @@ class GraphPanel(PanelWidget):
         canvas.selected.connect(self._selection_changed)
         canvas.opened.connect(self._open)
         canvas.entered.connect(lambda: self.card.first_focus_widget().setFocus(Qt.FocusReason.TabFocusReason))
-        canvas.toggled.connect(self._toggle)
+        canvas.toggled.connect(self._toggle_group)
         canvas.quiet_nodes_requested.connect(self._show_quiet)
         canvas.key_pressed.connect(self._handle_key)
         canvas.menu_requested.connect(self._show_menu)
@@ -210,9 +210,9 @@ class GraphPanel(PanelWidget):
         pages = session.web_pages.revision
         return (graph, counts, pages, session.fleet.revision, session.master.kind, self._choices)
 
-    def _graph_facts(self) -> GraphFacts:
+    def _graph_facts(self) -> GraphInput:
         session = self.session
-        return GraphFacts(
+        return GraphInput(
             [*session.nodes, *session.networks.nodes],
             [*session.topics, *session.networks.topics],
             session.graph.services if session.graph is not None else {},
@@ -308,7 +308,7 @@ class GraphPanel(PanelWidget):
                 layout.omitted_routes,
             )
             words.append(left.format(count=group_digits(layout.omitted_routes)))
-        if layout.is_plain:
+        if layout.is_fallback:
             words.append(_("The nodes are shown in rows: no better layout was found"))
         self.note.setText(". ".join(words))
         self.note.setVisible(bool(words))
@@ -325,19 +325,19 @@ class GraphPanel(PanelWidget):
                 self._layout = None
                 self._update_choices(group_by=group_by, toggled=frozenset(), quiet_visible_groups=frozenset())
 
-    def _toggle(self, group: str) -> None:
+    def _toggle_group(self, group: str) -> None:
         self._layout = None
         self._update_choices(toggled=self._choices.toggled ^ {group})
 
     def _show_quiet(self, group: str) -> None:
-        self._update_choices(quiet_visible_groups=self._choices.quiet_visible_groups | {group})
+        self._update_choices(quiet_visible_groups=self._choices.groups_with_visible_quiet_nodes | {group})
 
     def _reset_layout(self) -> None:
         self._layout = self._asked = self._coming = None
         self._seen = ()
         self.canvas.show_all()
 
-    def _filter(self) -> None:
+    def _apply_filter(self) -> None:
         if self.canvas.scene is not None:
             self.canvas.scene.dim_unmatched(self.tools.filter_words())
             self.canvas.update()
@@ -409,7 +409,7 @@ class GraphPanel(PanelWidget):
 
     # -- card and texts -----------------------------------------------------------------------------------
 
-    def _card_facts(self) -> CardSources:
+    def _card_sources(self) -> CardSources:
         scene = self.canvas.scene
         nodes = scene.graph.nodes if scene is not None else ()
         names = {entry.key: entry.name for entry in (*self.session.nodes, *self.session.networks.nodes)}
@@ -428,11 +428,11 @@ class GraphPanel(PanelWidget):
         content = None
         if choice is not None and scene is not None:
             if choice.kind == "topic":
-                content = topic_card(choice.key, self._card_facts())
+                content = topic_card(choice.key, self._card_sources())
             else:
                 node = scene.graph.node(choice.key)
                 if node is not None:
-                    content = node_card(node, self._services_of(node.entry_key), self._card_facts())
+                    content = node_card(node, self._services_of(node.entry_key), self._card_sources())
         self.card.show_content(content)
         self._line.setVisible(content is not None)
 
@@ -458,7 +458,7 @@ class GraphPanel(PanelWidget):
         incoming = [line for line in scene.graph.lines if node.key in line.targets]
         said = _("{node}, {facts}. Outgoing lines: {out}. Incoming lines: {into}.")
         return said.format(
-            node=node_name(node, self._host), facts=node_line(node), out=len(outgoing), into=len(incoming)
+            node=node_name(node, self._host), facts=node_detail(node), out=len(outgoing), into=len(incoming)
         )
 
     def _topic_description(self, key: str) -> str:
@@ -468,14 +468,14 @@ class GraphPanel(PanelWidget):
         ends = ""
         if line is not None:
             said = _("from {sources} to {targets}")
-            ends = said.format(sources=self._names(line.sources), targets=self._names(line.targets))
+            ends = said.format(sources=self._names_text(line.sources), targets=self._names_text(line.targets))
         figures = [split_key(key)[1]]
         rate = finite_or_none(topic.rate_hz) if topic is not None else None
         if topic is not None and rate is not None:
             figures += [short_rate(rate), bandwidth_text(finite_or_none(topic.bandwidth_Bps))]
         return ", ".join(filter(None, (*figures, ends)))
 
-    def _names(self, keys: tuple[str, ...]) -> str:
+    def _names_text(self, keys: tuple[str, ...]) -> str:
         scene = self.canvas.scene
         nodes = [scene.graph.node(key) for key in keys[:5]] if scene is not None else []
         names = [node_name(node, self._host) for node in nodes if node is not None]
@@ -497,14 +497,14 @@ class GraphPanel(PanelWidget):
         scene = self.canvas.scene
         if scene is None or not scene.nodes:
             return
-        data = self.picture() if kind is SVG else self.dot().encode("utf-8")
+        data = self.picture() if kind is SVG_KIND else self.to_dot().encode("utf-8")
         try:
             write_atomically(path, data)
         except OSError as error:
             said = _("Can't save the graph: {why}")
-            self.context.toast(said.format(why=error.strerror or str(error)))
+            self.context.show_toast(said.format(why=error.strerror or str(error)))
         else:
-            self.context.toast(_("Saved {name}").format(name=path.name))
+            self.context.show_toast(_("Saved {name}").format(name=path.name))
 
     def picture(self) -> bytes:
         """Return the whole graph as SVG in the colours of the theme; b"" if the graph is empty."""
@@ -527,11 +527,11 @@ class GraphPanel(PanelWidget):
         painter.end()
         return bytes(buffer.data().data())
 
-    def dot(self) -> str:
+    def to_dot(self) -> str:
         """Return the graph in the DOT language of Graphviz."""
         graph = self.canvas.scene.graph if self.canvas.scene is not None else NodeGraph()
         names = {group.key: group_name(group.key, self._host) for group in graph.groups}
-        return dot_of(graph, names, lambda line: self._stats_of(line).label)
+        return format_dot(graph, names, lambda line: self._stats_of(line).label)
 
     # -- overrides ----------------------------------------------------------------------------------------
 
@@ -549,9 +549,9 @@ class GraphPanel(PanelWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._fit()
+        self._fit_card()
 
-    def _fit(self) -> None:
+    def _fit_card(self) -> None:
         is_wide = self.width() >= self.theme.scaled(MIN_SIDE_CARD_WIDTH)
         ways = QBoxLayout.Direction
         self._beside.setDirection(ways.LeftToRight if is_wide else ways.TopToBottom)
@@ -564,7 +564,7 @@ class GraphPanel(PanelWidget):
 
     def theme_changed(self) -> None:
         super().theme_changed()
-        self._fit()
+        self._fit_card()
         if self._asked is not None and self._sizes() != self._sizes_asked:
             self._reset_layout()
 

@@ -20,7 +20,7 @@ from app.ui.panels.graph.words import (
     LineStats,
     group_name,
     line_name,
-    node_line,
+    node_detail,
     node_name,
     quiet_text,
 )
@@ -44,7 +44,7 @@ BRIDGE_END_WIDTH = 48.0
 """Width in px of the right part of a bridge's box, which contains the name of the other network."""
 
 
-StatsOf = Callable[[GraphLine], LineStats]
+StatsGetter = Callable[[GraphLine], LineStats]
 
 
 @dataclass(slots=True)
@@ -151,13 +151,13 @@ class GraphScene:
     ) -> None:
         self.theme = theme
         self.graph, self.layout, self.sizes, self._host = graph, layout, sizes, host
-        self._fonts()
+        self._update_fonts()
         wide, high = sizes.node
         self.nodes = {
             node.key: NodeItem(
                 node,
                 QRectF(x - wide / 2, y - high / 2, wide, high),
-                self._elided(self.name_font, node_name(node, host), self._text_width(node)),
+                self._elide(self.name_font, node_name(node, host), self._text_width(node)),
             )
             for node in graph.nodes
             if (place := layout.positions.get(node.key)) is not None
@@ -177,7 +177,7 @@ class GraphScene:
         self._crossed = _OccupiedAreas(_segment_rect(*part) for item in led for part in _segments(item))
         self._taken = _OccupiedAreas([*(item.rect for item in self.nodes.values()), *heads])
 
-    def _fonts(self) -> None:
+    def _update_fonts(self) -> None:
         theme = self.theme
         self.name_font, self.small_font = theme.font("body"), theme.font("caption")
         self.small_font.setWeight(QFont.Weight.Normal)
@@ -189,7 +189,7 @@ class GraphScene:
         return self.sizes.node[0] - 46 - (BRIDGE_END_WIDTH if node.bridged_network else 0)
 
     @staticmethod
-    def _elided(font: QFont, text: str, width: float) -> str:
+    def _elide(font: QFont, text: str, width: float) -> str:
         return QFontMetricsF(font).elidedText(text, Qt.TextElideMode.ElideMiddle, width)
 
     def _group_item(self, group: GraphGroup) -> GroupItem:
@@ -202,7 +202,7 @@ class GraphScene:
             chip = QRectF(rect.right() - 10 - width, rect.bottom() - 8 - high, width, high)
         room = rect.width() - 48
         return GroupItem(
-            group, rect, self._elided(self.title_font, group_name(group.key, self._host), room), chip
+            group, rect, self._elide(self.title_font, group_name(group.key, self._host), room), chip
         )
 
     # -- figures ------------------------------------------------------------------------------------------
@@ -212,7 +212,9 @@ class GraphScene:
         nodes = [item for item in self.nodes.values() if item.rect.intersects(area)]
         return [*nodes, *(item for item in self.lines if item.bounds.intersects(area))]
 
-    def update_stats(self, item: NodeItem | LineItem, figures: StatsOf, *, with_words: bool) -> QRectF | None:
+    def update_stats(
+        self, item: NodeItem | LineItem, figures: StatsGetter, *, with_words: bool
+    ) -> QRectF | None:
         """Update the rates and counts of one item.
 
         Args:
@@ -224,11 +226,11 @@ class GraphScene:
             The area to repaint, or None if nothing changed.
         """
         if isinstance(item, NodeItem):
-            said = node_line(item.node) if with_words else item.detail
+            said = node_detail(item.node) if with_words else item.detail
             if said == item.detail:
                 return None
             item.detail = said
-            item.line = self._elided(self.small_font, said, self._text_width(item.node))
+            item.line = self._elide(self.small_font, said, self._text_width(item.node))
             return item.rect
         now, before = figures(item.line), item.stats
         item.stats = now
@@ -242,7 +244,7 @@ class GraphScene:
             area = area or item.label
         return area
 
-    def complete(self, figures: StatsOf) -> None:
+    def complete(self, figures: StatsGetter) -> None:
         """Update the rates and counts of all items at once, for the export of an image."""
         every: list[NodeItem | LineItem] = [*self.nodes.values(), *self.lines]
         for item in every:
@@ -357,13 +359,13 @@ def _add_rounded(path: QPainterPath, points: Sequence[Position]) -> None:
     path.moveTo(*points[0])
     for before, at, after in zip(points, points[1:], points[2:], strict=False):
         radius = min(CORNER_RADIUS, math.dist(before, at) / 2, math.dist(at, after) / 2)
-        into, out = _towards(at, before, radius), _towards(at, after, radius)
+        into, out = _point_towards(at, before, radius), _point_towards(at, after, radius)
         path.lineTo(*into)
         path.quadTo(*at, *out)
     path.lineTo(*points[-1])
 
 
-def _towards(at: Position, other: Position, length: float) -> Position:
+def _point_towards(at: Position, other: Position, length: float) -> Position:
     whole = math.dist(at, other) or 1.0
     return at[0] + (other[0] - at[0]) * length / whole, at[1] + (other[1] - at[1]) * length / whole
 
@@ -371,7 +373,7 @@ def _towards(at: Position, other: Position, length: float) -> Position:
 def _arrow(points: Sequence[Position]) -> QPolygonF:
     tip = points[-1]
     before = next((each for each in reversed(points[:-1]) if each != tip), (tip[0] - 1, tip[1]))
-    base = _towards(tip, before, ARROW_LENGTH)
+    base = _point_towards(tip, before, ARROW_LENGTH)
     across = (
         (tip[1] - base[1]) * ARROW_WIDTH / ARROW_LENGTH / 2,
         (base[0] - tip[0]) * ARROW_WIDTH / ARROW_LENGTH / 2,
@@ -389,13 +391,13 @@ def _label_candidates(item: LineItem, wide: float, high: float) -> Iterator[QRec
     # Best candidates first: horizontal segments, then vertical ones.
     parts = _segments(item)
     level = [each for each in parts if abs(each[1][1] - each[0][1]) < 1]
-    for begin, end in sorted(level, key=_length, reverse=True)[:6]:
+    for begin, end in sorted(level, key=_segment_length, reverse=True)[:6]:
         left, room = min(begin[0], end[0]), abs(end[0] - begin[0]) - wide
         for share in (0.5, 0.25, 0.75) if room >= 0 else ():
             yield QRectF(left + room * share, begin[1] - high - 2, wide, high)
             yield QRectF(left + room * share, begin[1] + 3, wide, high)
     upright = [each for each in parts if abs(each[1][0] - each[0][0]) < 1]
-    for begin, end in sorted(upright, key=_length, reverse=True)[:4]:
+    for begin, end in sorted(upright, key=_segment_length, reverse=True)[:4]:
         top, room = min(begin[1], end[1]), abs(end[1] - begin[1]) - high
         for share in (0.5, 0.2, 0.8) if room >= 0 else ():
             yield QRectF(begin[0] + 5, top + room * share, wide, high)
@@ -411,7 +413,7 @@ def _segment_rect(begin: Position, end: Position) -> QRectF:
     return QRectF(left, top, abs(end[0] - begin[0]) + 0.5, abs(end[1] - begin[1]) + 0.5)
 
 
-def _length(part: tuple[Position, Position]) -> float:
+def _segment_length(part: tuple[Position, Position]) -> float:
     return math.dist(*part)
 
 
@@ -433,7 +435,7 @@ def _haystack(node: DrawnNode) -> str:
     entry = node.entry
     if entry is None:
         return node.name.casefold()
-    topics = " ".join((*entry.publishes, *entry.subscribes))
+    topics = " ".join((*entry.published_topics, *entry.subscribed_topics))
     return f"{node.name} {entry.host} {entry.language} {entry.generation} {topics}".casefold()
 
 

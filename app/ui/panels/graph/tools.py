@@ -90,13 +90,13 @@ class GraphLegend(QWidget):
             ("chosen", _("selected topic")),
             ("gone", _("gone or quiet")),
         ):
-            flow.addWidget(_Entry(theme, kind, words))
+            flow.addWidget(_LegendEntry(theme, kind, words))
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
 
 
-class _Entry(QWidget):
+class _LegendEntry(QWidget):
     """Legend entry: a sample with its text."""
 
     SAMPLE_WIDTH = 36.0

@@ -19,7 +19,7 @@ MAX_NAMED_TOPICS = 2
 MIN_WIDTH, MAX_WIDTH, WIDTH_STEPS = 1.25, 3.0, 7
 MIN_WIDTH_BPS, WIDTH_DECADES = 100.0, 5.0
 """Bandwidth of the thinnest lines, and the decades up to the thickest: 100 B/s to 10 MB/s."""
-ICONS = {
+NODE_ICONS = {
     "studio": "app-window",
     "behaviour": "blocks",
     "robot": "bot",
@@ -52,7 +52,7 @@ def node_icon(node: DrawnNode) -> str:
     """Return the name of the icon for a node's kind."""
     if node.page is not None:
         return node.page.icon
-    return "camera" if node.has_pictures and node.kind == "program" else ICONS[node.kind]
+    return "camera" if node.has_pictures and node.kind == "program" else NODE_ICONS[node.kind]
 
 
 def node_name(node: DrawnNode, host: str) -> str:
@@ -64,14 +64,14 @@ def node_name(node: DrawnNode, host: str) -> str:
     return node.name
 
 
-def node_line(node: DrawnNode) -> str:
+def node_detail(node: DrawnNode) -> str:
     """Return the second line in the box of a node.
 
     Examples are "Python, 4.1 %", "this window", "gone for 4 s" and "41 nodes".
     """
     entry = node.entry
     if entry is None:
-        return _members(node.member_count, node.quiet_count)
+        return _members_text(node.member_count, node.quiet_count)
     if entry.gone_s is not None:
         return _("gone for {seconds} s").format(seconds=int(entry.gone_s))
     if node.kind == "page":
@@ -92,7 +92,7 @@ def _network_text(node: DrawnNode) -> str:
     return generation_text(entry) if entry is not None and entry.network else ""
 
 
-def _members(members: int, quiet: int) -> str:
+def _members_text(members: int, quiet: int) -> str:
     words = ngettext("{count} node", "{count} nodes", members).format(count=group_digits(members))
     if quiet < members:
         return words

@@ -34,7 +34,7 @@ class ImageActionSpec:
     is_checkable: bool = False
 
 
-ROWS: tuple[ImageActionSpec, ...] = (
+ACTION_SPECS: tuple[ImageActionSpec, ...] = (
     ImageActionSpec("larger", lazy("Zoom in"), ("+", "Ctrl++"), "zoom-in"),
     ImageActionSpec("smaller", lazy("Zoom out"), ("-", "Ctrl+-"), "zoom-out"),
     ImageActionSpec("fit", lazy("Fit image"), ("0", "Ctrl+0"), "maximize"),
@@ -84,7 +84,7 @@ class PictureActions(QObject):
         self._by_name: dict[str, QAction] = {}
         self._by_key: dict[str, QAction] = {}
         self._listed: list[QAction] = []  # with separators
-        for row in ROWS:
+        for row in ACTION_SPECS:
             action = QAction(f"{_(row.text)}\t{row.keys[0]}", view)
             if row.icon is not None:
                 action.setIcon(theme.icon(row.icon))

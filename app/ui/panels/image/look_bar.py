@@ -15,12 +15,12 @@ from app.robots.description.typed_number import parse_number
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, NumberEdit, ToggleButton, label
 from app.ui.widgets.flow_layout import Flow
-from app.ui.widgets.inputs.slider import Track
+from app.ui.widgets.inputs.slider import SliderTrack
 from nep.i18n import _, lazy
 
 SLIDER_STEPS = 100
 """Number of slider steps on each side of the neutral middle."""
-MAP_NAMES = {
+COLOUR_MAP_NAMES = {
     "grey": lazy("Grey"),
     "viridis": lazy("Viridis"),
     "turbo": lazy("Turbo"),
@@ -51,9 +51,9 @@ class LookBar(QWidget):
         self._picture = picture
         self._of_numbers = True
         self.look = PLAIN
-        self.brightness = self._slider(theme, _("Brightness"), self._set_brightness)
-        self.contrast = self._slider(theme, _("Contrast"), self._set_contrast)
-        maps = [(name, _(MAP_NAMES[name])) for name in COLOUR_MAPS]
+        self.brightness = self._make_slider(theme, _("Brightness"), self._set_brightness)
+        self.contrast = self._make_slider(theme, _("Contrast"), self._set_contrast)
+        maps = [(name, _(COLOUR_MAP_NAMES[name])) for name in COLOUR_MAPS]
         names = [("", _("Default colours")), *maps]
         self.colours = ComboBox(theme, names, name=_("Colour map"))
         self.colours.activated.connect(
@@ -68,7 +68,7 @@ class LookBar(QWidget):
         ):
             field.setAccessibleName(name)
             field.setFixedWidth(92)
-            field.number.connect(lambda _value: self._read_range())
+            field.number.connect(lambda _value: self._apply_range())
         self.again = Button(theme, _("Original"), "undo-2", size="small")
         self.again.clicked.connect(lambda: self._apply(PLAIN, show=True))
         flow = Flow(self, gap=8, row_gap=4)
@@ -82,8 +82,8 @@ class LookBar(QWidget):
             flow.addWidget(part)
         self.show_look(PLAIN)
 
-    def _slider(self, theme: Theme, name: str, does: Callable[[int], None]) -> Track:
-        made = Track(theme, 2 * SLIDER_STEPS)
+    def _make_slider(self, theme: Theme, name: str, does: Callable[[int], None]) -> SliderTrack:
+        made = SliderTrack(theme, 2 * SLIDER_STEPS)
         made.setAccessibleName(name)
         made.setMaximumWidth(120)
         made.valueChanged.connect(does)
@@ -141,7 +141,7 @@ class LookBar(QWidget):
         low, high = (low, high) if low < high else (low, low + 1)
         self._apply(replace(self.look, low=low if on else None, high=high if on else None), show=True)
 
-    def _read_range(self) -> None:
+    def _apply_range(self) -> None:
         try:
             low, high = (parse_number(field.text()) for field in (self.low, self.high))
         except ValueError:  # a field is incomplete; it marks itself

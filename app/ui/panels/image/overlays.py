@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from app.core.messages.annotations import AnnotationShape, shapes_in
+from app.core.messages.annotations import AnnotationShape, parse_shapes
 from app.core.messages.reader import LARGE_BYTES
 from app.core.network.topics import Topic
 from app.core.network.watches import Suspendable, Watch
@@ -13,7 +13,7 @@ from nep.errors import NepError
 from nep.messages.message import Message
 
 ANNOTATION_TYPES = ("foxglove.ImageAnnotations", "ImageAnnotations", "image_annotations")
-FACES_NAME = "face_positions"
+FACES_TOPIC_NAME = "face_positions"
 MAX_OVERLAYS = 8
 
 
@@ -22,7 +22,8 @@ def may_contain_annotations(topic: Topic) -> bool:
     if topic.codec not in {"json", "msgpack"}:
         return False
     return (
-        topic.msg_type.rpartition("/")[2] in ANNOTATION_TYPES or topic.name.rpartition("/")[2] == FACES_NAME
+        topic.msg_type.rpartition("/")[2] in ANNOTATION_TYPES
+        or topic.name.rpartition("/")[2] == FACES_TOPIC_NAME
     )
 
 
@@ -98,6 +99,6 @@ def _decode_annotations(message: Message | None, width: int, height: int) -> tup
     if message is None or message.size_bytes > LARGE_BYTES:
         return ()
     try:
-        return shapes_in(message.payload, width, height)
+        return parse_shapes(message.payload, width, height)
     except (NepError, ValueError):
         return ()

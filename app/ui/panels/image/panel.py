@@ -106,9 +106,9 @@ class ImagePanel(PanelWidget):
         self._line = QAction(self)
         self._line.setSeparator(True)
         self.job = SnapshotJob(self, lambda: snapshots.folder(self.session.settings))
-        self.job.saved.connect(self._saved)
-        self.job.copied.connect(self._copied)
-        self.job.failed.connect(self._failed)
+        self.job.saved.connect(self._on_saved)
+        self.job.copied.connect(self._on_copied)
+        self.job.failed.connect(self._on_failed)
         self.fit = IconButton(self.theme, "maximize", _("Fit image"), "0", size=26)
         self.freeze = IconButton(
             self.theme, "snowflake", _("Freeze this image"), "Space", checkable=True, size=26
@@ -279,17 +279,17 @@ class ImagePanel(PanelWidget):
     def _message(self) -> Message | None:
         return self.view.picture.message if self.view.picture is not None else None
 
-    def _saved(self, path: str) -> None:
+    def _on_saved(self, path: str) -> None:
         folder = QUrl.fromLocalFile(str(Path(path).parent))
         said = _("Saved {file}").format(file=Path(path).name)
-        self.context.toast(said, _("Open folder"), lambda: open_externally(folder))
+        self.context.show_toast(said, _("Open folder"), lambda: open_externally(folder))
 
-    def _copied(self, image: QImage) -> None:
+    def _on_copied(self, image: QImage) -> None:
         QGuiApplication.clipboard().setImage(image)
         size = f"{image.width()}\u00d7{image.height()}"
-        self.context.toast(_("Copied the image, {size}").format(size=size))
+        self.context.show_toast(_("Copied the image, {size}").format(size=size))
 
-    def _failed(self, sentence: str) -> None:
+    def _on_failed(self, sentence: str) -> None:
         said = _("can't save the image: {reason}").format(reason=sentence)
         self.session.console.add("error", "image", said)
         self.session.alerts.raise_alert(

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
 from app.core.network.topics import split_key
 from app.core.run.acting.acting import subscribers_text
 from app.core.run.acting.arming import Target
-from app.core.run.acting.picture_point import TYPES, PicturePoint, default_topic
+from app.core.run.acting.picture_point import MESSAGE_TYPES, PicturePoint, default_topic
 from app.core.run.acting.sending import SendOrder, SendResult
 from app.ui.panels.armed_strip import ArmedStrip
 from app.ui.panels.base import PanelContext
@@ -19,7 +19,7 @@ from app.ui.pictures.clicks import KEYBOARD_HINT, ClickablePicture
 from app.ui.text import plain
 from app.ui.widgets import Button, ComboBox, IconButton, label
 from app.ui.widgets.flow_layout import Flow
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.errors import BadTopicError
 from nep.i18n import _, ngettext
 from nep.protocol.wire import check_topic
@@ -77,8 +77,8 @@ class PointBar(QWidget):
         self.topic.setMinimumWidth(round(theme.scaled(TOPIC_WIDTH_PX)))
         self.topic.setProperty("focusRadius", theme.radius("control"))
         self.topic.textEdited.connect(lambda _text: self._target_changed())
-        EditMenu(theme, self.topic)
-        self.kind = ComboBox(theme, [(each, each) for each in TYPES], name=_("Point type"))
+        ContextMenuFilter(theme, self.topic)
+        self.kind = ComboBox(theme, [(each, each) for each in MESSAGE_TYPES], name=_("Point type"))
         self.close_button = IconButton(theme, "x", _("Stop publishing points"), size=26)
         self.close_button.clicked.connect(self.exited)
         self.problem = label("", "small", role="error", wrap=True)
@@ -199,7 +199,7 @@ class PointBar(QWidget):
     def _arm_clicked(self) -> None:
         why_not = self.arm()
         if why_not:
-            self._context.toast(why_not)
+            self._context.show_toast(why_not)
 
     def _disarm(self) -> None:
         # Disarms this panel's target only.
@@ -224,14 +224,14 @@ class PointBar(QWidget):
         )  # fmt: skip
         why_not = self._acting.send_order(order)
         if why_not:
-            self._context.toast(why_not)
+            self._context.show_toast(why_not)
 
     def _handle_result(self, point: PicturePoint, result: SendResult) -> None:
         if result.kind != "sent":
-            self._context.toast(result.message)
+            self._context.show_toast(result.message)
         elif result.order.target == self.target:
             self.count, self.heard = self.count + 1, result.subscriber_count
-            self._view.mark(point)
+            self._view.show_mark(point)
 
     # -- saved state --------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QImage
 
 from app.core.messages import snapshots
-from app.core.messages.picture import png_of
+from app.core.messages.picture import encode_png
 from nep.errors import NepError
 from nep.i18n import _
 
@@ -63,7 +63,7 @@ class SnapshotJob(QObject):
 
     def copy(self, message: Message) -> None:
         """Emit the image of a message at its original size as `copied`; ignored while `is_busy`."""
-        self._start(lambda: QImage.fromData(png_of(message)))
+        self._start(lambda: QImage.fromData(encode_png(message)))
 
     def wait(self) -> None:
         """Wait up to 2 s for the thread and discard its result; called on close."""

@@ -83,7 +83,7 @@ class InspectorBody(QWidget):
         self.tree.setAccessibleName(_("Newest message"))
         self.tree.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.finder = FindBar(theme, looked_through)
-        self.finder.found.connect(self.reveal)
+        self.finder.match_selected.connect(self.reveal)
         self.finder.field.exited.connect(lambda: self.tree.setFocus(Qt.FocusReason.ShortcutFocusReason))
         modes = [("tree", _("Tree"), None), ("table", _("Table"), None), ("raw", _("Raw"), None)]
         self.mode = Segments(theme, modes, size="small", name=_("Show as"))

@@ -15,8 +15,8 @@ from nep.i18n import _, lazy, ngettext
 Mark = Literal["", "changed", "added", "removed"]
 Key = str | int
 MAX_CHILDREN = 5000  # maximum number of a value's children that are checked for changes
-MAX_VALUES = 20_000  # maximum number of a message's values that are counted
-Part = tuple[Key, object, object, Mark]
+MAX_COUNTED_VALUES = 20_000  # maximum number of a message's values that are counted
+ChildDiff = tuple[Key, object, object, Mark]
 Counts = dict[Mark, int]
 MARK_TEXTS: Mapping[Mark, str] = {
     "changed": lazy("changed"),
@@ -69,9 +69,9 @@ def mark_of(value: object, base: object) -> Mark:
     return "changed" if differs(base, value) else ""
 
 
-def parts_of(
+def child_diffs(
     value: object, base: object, mark: Mark, count: int, *, changes_only: bool
-) -> tuple[list[Part], int]:
+) -> tuple[list[ChildDiff], int]:
     """Return the first children of a value with their differences.
 
     Removed children follow the present ones, with their old values. All children of an added value count as
@@ -94,10 +94,10 @@ def parts_of(
     if changes_only:
         found = [part for part in islice(_compare_children(value, base), MAX_CHILDREN) if part[3]]
         return found[:count], len(found)
-    return list(islice(_compare_children(value, base), count)), _total(value, base)
+    return list(islice(_compare_children(value, base), count)), _child_count(value, base)
 
 
-def count_changes(value: object, base: object, most: int = MAX_VALUES) -> tuple[Counts, bool]:
+def count_changes(value: object, base: object, most: int = MAX_COUNTED_VALUES) -> tuple[Counts, bool]:
     """Count the changed, added and removed values of a message.
 
     An added or removed object or list counts as one value.
@@ -120,7 +120,7 @@ def count_changes(value: object, base: object, most: int = MAX_VALUES) -> tuple[
         here, before, mark = waiting.pop()
         looked += 1
         if mark == "changed" and is_container(here) and is_container(before):
-            parts, _total = parts_of(here, before, mark, most, changes_only=True)
+            parts, _total = child_diffs(here, before, mark, most, changes_only=True)
             whole = whole and max(size_of(here), size_of(before)) <= MAX_CHILDREN
             waiting += [(below, was, how) for _key, below, was, how in parts]
         elif mark:
@@ -149,7 +149,7 @@ def _count_text(mark: Mark, count: int) -> str:
     return ngettext("{count} changed", "{count} changed", count).format(count=count)
 
 
-def _compare_children(value: object, base: object) -> Iterator[Part]:
+def _compare_children(value: object, base: object) -> Iterator[ChildDiff]:
     # Lazy, because callers may need only the first children.
     if isinstance(value, Mapping) and isinstance(base, Mapping):
         before = {str(key): key for key in base}
@@ -167,7 +167,7 @@ def _compare_children(value: object, base: object) -> Iterator[Part]:
             yield row, base[row], MISSING, "removed"
 
 
-def _total(value: object, base: object) -> int:
+def _child_count(value: object, base: object) -> int:
     if isinstance(value, Mapping) and isinstance(base, Mapping):
         return len({str(key) for key in value} | {str(key) for key in base})
     return max(size_of(value), size_of(base))

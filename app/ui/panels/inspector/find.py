@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from app.ui.panels.inspector.values import search
 from app.ui.theme.theme import Theme
 from app.ui.widgets import IconButton, SearchField, paint
-from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.keyboard import has_no_modifiers
 from nep.i18n import _, pgettext
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class FindField(SearchField):
             self.step_requested.emit(-1 if back else 1)
         elif event.key() == Qt.Key.Key_Escape and self.text():
             self.clear()
-        elif event.key() == Qt.Key.Key_Down and is_plain(event):
+        elif event.key() == Qt.Key.Key_Down and has_no_modifiers(event):
             self.exited.emit()
         else:
             super().keyPressEvent(event)
@@ -101,7 +101,7 @@ class FindBar(QWidget):
         found: Path of the selected match.
     """
 
-    found = Signal(object)
+    match_selected = Signal(object)
     query_changed = Signal(str)
     """Emitted with the query when the user typed one (a text that begins with ``$``), else with ""."""
 
@@ -142,7 +142,7 @@ class FindBar(QWidget):
             button.setVisible(bool(words) and not is_query)
         if is_query:
             self.field.show_count("")
-            self.mark(wrong=False)
+            self.set_invalid(wrong=False)
         self.query_changed.emit(words if is_query else "")
         if is_query:
             return
@@ -173,7 +173,7 @@ class FindBar(QWidget):
             self._place = (self._place + by) % len(self.matches)
             found = self.matches[self._place]
             place = isinstance(found, int) and self._index is not None
-            self.found.emit(self._index.path_to(found) if place else found)  # type: ignore[union-attr, arg-type]
+            self.match_selected.emit(self._index.path_to(found) if place else found)  # type: ignore[union-attr, arg-type]
         self._update_count(wrong=not self.matches)
 
     def _search(self, words: str) -> None:
@@ -194,9 +194,9 @@ class FindBar(QWidget):
         words = _("{place} of {total}") if self.matches else pgettext("found", "none")
         words = words.format(place=self._place + 1, total=total)
         self.field.show_count(words if self.field.text() else "")
-        self.mark(wrong=wrong)
+        self.set_invalid(wrong=wrong)
 
-    def mark(self, *, wrong: bool) -> None:
+    def set_invalid(self, *, wrong: bool) -> None:
         """Show or remove the error style of the field.
 
         Args:

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from app.core.networks.kinds import NetworkKind
     from nep.messages.message import Message
 
-_MIN_SHOWN_LATENCY_S = 0.0001
+_MIN_DISPLAYED_LATENCY_S = 0.0001
 """Minimum uncertainty in s to show, because a smaller one would be displayed as zero."""
 
 
-def message_facts(
+def message_info(
     message: Message, since_ns: int = 0, network: NetworkKind | None = None, *, recorded: bool = False
 ) -> str:
     """Format the properties of a message, such as ``seq 18 204   412 B   latency 0.6 ms``.
@@ -51,13 +51,13 @@ def message_facts(
             age_s = (time.time_ns() - message.stamp_ns) / 1e9
             facts.append(_("latched, sent {age} ago").format(age=age_text(age_s)))
         else:
-            facts += _latency_facts(message)
+            facts += _latency_info(message)
     if network is not None:
         facts += _unreported_info(message, network.product_name)
     return "   ".join(facts)
 
 
-def _latency_facts(message: Message) -> list[str]:
+def _latency_info(message: Message) -> list[str]:
     latency_s, uncertainty_s = message.latency_s or 0.0, message.latency_uncertainty_s
     if uncertainty_s and -uncertainty_s <= latency_s < 0:
         return [_("latency under {latency}").format(latency=latency_text(uncertainty_s))]
@@ -66,7 +66,7 @@ def _latency_facts(message: Message) -> list[str]:
     words = latency_text(latency_s)
     if uncertainty_s:
         words = _("{latency} ± {uncertainty}").format(
-            latency=words, uncertainty=latency_text(max(uncertainty_s, _MIN_SHOWN_LATENCY_S))
+            latency=words, uncertainty=latency_text(max(uncertainty_s, _MIN_DISPLAYED_LATENCY_S))
         )
     return [_("latency {latency}").format(latency=words)]
 
@@ -142,6 +142,6 @@ class Footer(QWidget):
         """Remove the path; called before another topic is shown."""
         self.show_path("")
 
-    def show_facts(self, facts: str) -> None:
+    def show_info(self, facts: str) -> None:
         """Show the properties of a message."""
         self.facts.setText(facts)

@@ -10,7 +10,7 @@ from app.core.recording.replay.scale import clock_text
 from app.core.series.feed import SeriesFeed
 from app.ui.theme.theme import Theme
 from app.ui.widgets import FixedWidthLabel, IconButton
-from app.ui.widgets.inputs.slider import Track
+from app.ui.widgets.inputs.slider import SliderTrack
 from app.ui.widgets.paint import show_when
 from nep.i18n import _
 from nep.messages.message import Message
@@ -41,7 +41,7 @@ class HistoryStrip(QWidget):
         self._said: tuple[int, int, int | None] = (0, 0, None)
         self._ticks = 0
         self.back = IconButton(theme, "step-back", _("Previous message"), size=24)
-        self.track = Track(theme, 0)
+        self.track = SliderTrack(theme, 0)
         self.track.setAccessibleName(_("Messages of this topic"))
         self.on = IconButton(theme, "step-forward", _("Next message"), size=24)
         self.newest = IconButton(theme, "chevron-last", _("Follow the newest message"), size=24)
@@ -69,7 +69,7 @@ class HistoryStrip(QWidget):
         """
         self.pause()
         if topic != self._topic:
-            self.kept.rewind()
+            self.kept.reset()
             self.at = None
         self._feed, self._topic = feed, topic
         if topic:
@@ -85,7 +85,7 @@ class HistoryStrip(QWidget):
         """Stop collecting messages and clear the history; called when the source changes."""
         self.pause()
         self._topic = ""
-        self.kept.rewind()
+        self.kept.reset()
         self.at = None
         self.refresh(at_once=True)
 

@@ -16,12 +16,12 @@ from app.core.messages.object_table import (
     Steps,
     column_name,
     columns_of,
+    format_table_csv,
     is_list_of_objects,
     lists_of_objects,
-    rows_found,
+    query_rows,
     rows_of,
     sort_key,
-    table_csv,
     value_at,
 )
 from app.ui.panels.inspector.values import size_of, value_text
@@ -101,7 +101,7 @@ class ObjectsView(QWidget):
     def reset(self) -> None:
         """Reset the table for another topic."""
         self._wanted, self._steps, self._value = (), None, None
-        self._drop_table()
+        self._remove_table()
 
     def select_list(self, steps: Steps) -> None:
         """Select the list to show in this message and in later ones.
@@ -119,7 +119,7 @@ class ObjectsView(QWidget):
             now: Monotonic time in s.
         """
         self._value = value
-        steps = self._find(value)
+        steps = self._find_list(value)
         if steps != self._steps:
             self._steps = steps
             self._sorted_at = 0.0
@@ -127,7 +127,7 @@ class ObjectsView(QWidget):
         self._show(rows_of(shown), size_of(shown), path_text(steps) if steps else "", now)
         self.choose.setVisible(True)
 
-    def show_found(self, found: Iterable[tuple[str, object]], now: float) -> None:
+    def show_query_objects(self, found: Iterable[tuple[str, object]], now: float) -> None:
         """Show the objects found by a query.
 
         Args:
@@ -135,11 +135,11 @@ class ObjectsView(QWidget):
             now: Monotonic time in s.
         """
         self._value, self._steps = None, None
-        rows = rows_found(found)
+        rows = query_rows(found)
         self._show(rows, len(rows), "", now)
         self.choose.setVisible(False)
 
-    def _find(self, value: object) -> Steps | None:
+    def _find_list(self, value: object) -> Steps | None:
         for length in range(len(self._wanted), -1, -1):
             if is_list_of_objects(value_at(value, self._wanted[:length])):
                 return self._wanted[:length]
@@ -150,7 +150,7 @@ class ObjectsView(QWidget):
         columns = columns_of(rows)
         self.copy.setEnabled(bool(columns))
         if not columns:
-            self._drop_table()
+            self._remove_table()
             self.words.setText("")
             return
         if columns != self._columns or self.table is None:
@@ -190,7 +190,7 @@ class ObjectsView(QWidget):
 
     def _make_table(self, columns: tuple[Steps, ...], rows: Sequence[ObjectRow]) -> None:
         before = self.table.saved_state() if self.table is not None else None
-        self._drop_table()
+        self._remove_table()
         self._columns = columns
         made = [_index_column(rows)]
         made += [_column(column, rows) for column in columns]
@@ -206,7 +206,7 @@ class ObjectsView(QWidget):
         self.pages.setCurrentWidget(table)
         self.setFocusProxy(table)
 
-    def _drop_table(self) -> None:
+    def _remove_table(self) -> None:
         if self.table is not None:
             self.setFocusProxy(None)  # type: ignore[arg-type]
             self.pages.setCurrentWidget(self.empty)
@@ -217,7 +217,7 @@ class ObjectsView(QWidget):
     def copy_csv(self) -> None:
         """Copy the table to the clipboard as CSV, in display order."""
         if self.table is not None:
-            QGuiApplication.clipboard().setText(table_csv("#", self._columns, self._model.rows()))
+            QGuiApplication.clipboard().setText(format_table_csv("#", self._columns, self._model.rows()))
             count = len(self._model.rows())
             said = ngettext("Copied {count} row as CSV", "Copied {count} rows as CSV", count)
             self._toast(said.format(count=group_digits(count)))
@@ -259,8 +259,8 @@ class _ObjectModel(TableModel[ObjectRow]):
 
 def _index_column(rows: Sequence[ObjectRow]) -> Column[ObjectRow]:
     # Index of the object in the list.
-    width = _width("#", [row.name for row in rows])
-    return Column("#", "#", width, _name_cell, lambda row: row.index, verbatim=True)
+    width = _column_width("#", [row.name for row in rows])
+    return Column("#", "#", width, _name_cell, lambda row: row.index, is_verbatim=True)
 
 
 def _name_cell(row: ObjectRow) -> Cell:
@@ -274,12 +274,12 @@ def _column(steps: Steps, rows: Sequence[ObjectRow]) -> Column[ObjectRow]:
     return Column(
         name,
         name,
-        _width(name, [_cell_text(value) for value in first]),
+        _column_width(name, [_cell_text(value) for value in first]),
         lambda row: Cell(_cell_text(value := row.at(steps)), role=_role(value), mono=True),
         lambda row: sort_key(row.at(steps)),
         is_numeric=figures,
         tip=lambda row: _cell_text(row.at(steps)),
-        verbatim=True,
+        is_verbatim=True,
     )
 
 
@@ -295,7 +295,7 @@ def _role(value: object) -> str:
     return "textTertiary" if value is None else "text"
 
 
-def _width(head: str, words: Sequence[str]) -> int:
+def _column_width(head: str, words: Sequence[str]) -> int:
     # Computed from the header with its sort arrow and the first rows.
     letters = max([len(head) + 2, *(len(each) for each in words[:20])])
     return min(MAX_COLUMN_WIDTH, max(MIN_COLUMN_WIDTH, letters * CHAR_WIDTH + COLUMN_PADDING))

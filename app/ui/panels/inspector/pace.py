@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-BURST = 3
+MAX_BURST = 3
 """Number of updates allowed at once after a pause, so that single messages appear immediately."""
 MAX_UPDATE_HZ = 10.0
 """Maximum number of updates per second after the burst.
@@ -19,7 +19,7 @@ class UpdateLimiter:
         hz: Number of updates allowed per second after the burst.
     """
 
-    def __init__(self, burst: int = BURST, hz: float = MAX_UPDATE_HZ) -> None:
+    def __init__(self, burst: int = MAX_BURST, hz: float = MAX_UPDATE_HZ) -> None:
         self._most, self._hz = float(burst), hz
         self.reset()
 

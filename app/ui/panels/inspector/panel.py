@@ -10,7 +10,7 @@ from PySide6.QtCore import QModelIndex, QPoint, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QVBoxLayout
 
-from app.core.messages.reader import LARGE_BYTES, Reader, Reading
+from app.core.messages.reader import LARGE_BYTES, MessageReader, ReadResult
 from app.core.network.topics import split_key
 from app.core.networks.kinds import find_kind
 from app.core.networks.networks import topic_label
@@ -19,10 +19,10 @@ from app.ui.panels.base import ANY_TYPE, Blocker, Panel, PanelContext, PanelWidg
 from app.ui.panels.inspector.actions import InspectorActions
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TABLE, TREE, InspectorBody
 from app.ui.panels.inspector.diff import NO_BASE, count_changes
-from app.ui.panels.inspector.footer import message_facts
+from app.ui.panels.inspector.footer import message_info
 from app.ui.panels.inspector.pace import UpdateLimiter
 from app.ui.panels.inspector.tree_model import TreeNode, field_of, steps_of
-from app.ui.panels.inspector.values import decode_now, payload_or
+from app.ui.panels.inspector.values import decode_now, payload_or_default
 from app.ui.widgets import Chip, IconButton
 from app.ui.widgets.field_drag import drag_field
 from app.ui.widgets.menus import Menu
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 MAX_EXPANDED_ROWS = 24
-FADE_HZ = 7.0  # lower than the rate of message updates, which paint the marks too
+FADE_REPAINT_HZ = 7.0  # lower than the rate of message updates, which paint the marks too
 BEFORE, PINNED = lazy("Previous message"), lazy("Pinned message")
 
 
@@ -51,17 +51,17 @@ class InspectorPanel(PanelWidget):
         self._watch: Watch | None = None
         self._shown: Message | None = None
         self._allowed: Message | None = None  # large message that the user asked to decode
-        self._reading: Reading | None = None  # decoded message in the tree
+        self._reading: ReadResult | None = None  # decoded message in the tree
         self._raw_wanted = self._table_wanted = False
         self._since_ns = 0  # start of the subscription
-        self._pace, self._fades = UpdateLimiter(), UpdateLimiter(burst=1, hz=FADE_HZ)
+        self._pace, self._fades = UpdateLimiter(), UpdateLimiter(burst=1, hz=FADE_REPAINT_HZ)
         self._facts_of: tuple[Message | None, str] = (None, "")
         self._value: object = None
         self._before: object = NO_BASE  # previous value of the topic, for comparison
         self._pinned: object = NO_BASE
         self._pinned_words = ""
-        self.reader = Reader()
-        self.body = InspectorBody(self.theme, self._search_source, context.toast)
+        self.reader = MessageReader()
+        self.body = InspectorBody(self.theme, self._search_source, context.show_toast)
         self._make_header()
         self._make_body()
         self._show_empty()
@@ -87,7 +87,7 @@ class InspectorPanel(PanelWidget):
         self.finder.query_changed.connect(self._query_changed)
         self.own = InspectorActions(
             self.theme, self, body, lambda: self._shown, self._full_value,
-            find=self.focus_filter, toast=self.context.toast,
+            find=self.focus_filter, toast=self.context.show_toast,
             plot=lambda path: self.context.plot(self._topic, path),
         )  # fmt: skip
         self.foot.copy_value.clicked.connect(self.own.copy_value)
@@ -145,11 +145,16 @@ class InspectorPanel(PanelWidget):
         earlier = self.history.at is not None
         self.live.set(*chip_state(topic, self.is_frozen, recorded=recorded, earlier=earlier))
         newest, taken = topic.newest if topic is not None and topic.gone_s is None else None, False
-        if topic is not None and newest is not None and newest is not self._shown and not self.is_held:
+        if (
+            topic is not None
+            and newest is not None
+            and newest is not self._shown
+            and not self.is_display_fixed
+        ):
             taken = self._pace.try_acquire(self.clock())
             if taken:
                 self._show_message(newest)
-        elif recorded and newest is None and self._shown is not None and not self.is_held:
+        elif recorded and newest is None and self._shown is not None and not self.is_display_fixed:
             self._show_no_message()
         if self.body.page == NOTHING:
             self._show_waiting(topic)
@@ -212,7 +217,7 @@ class InspectorPanel(PanelWidget):
             self.body.show_large(message.size_bytes, _("Reading the message."))
             self._show_page(LARGE)
 
-    def _show_decoded(self, done: Reading) -> None:
+    def _show_decoded(self, done: ReadResult) -> None:
         message = done.message
         if done.error is not None:
             self._show_raw(message, done.error)
@@ -226,19 +231,19 @@ class InspectorPanel(PanelWidget):
             if self.history.at is not None:
                 previous = self.history.before()
             if message.size_bytes <= LARGE_BYTES and previous is not None:
-                self._before = payload_or(previous, self._before)
+                self._before = payload_or_default(previous, self._before)
             self.finder.invalidate_matches()
         self._value = done.value
         self._show_value()
-        self.foot.show_facts(self._facts(message))
+        self.foot.show_info(self._message_info(message))
         self._show_page(TABLE if self._table_wanted else TREE)
 
-    def _facts(self, message: Message) -> str:
+    def _message_info(self, message: Message) -> str:
         # Cached per message, because latency and age are those at its arrival.
         if message is not self._facts_of[0]:
             kind = find_kind(split_key(self._topic)[0])
             recorded = self.session.replay is not None
-            self._facts_of = (message, message_facts(message, self._since_ns, kind, recorded=recorded))
+            self._facts_of = (message, message_info(message, self._since_ns, kind, recorded=recorded))
         return self._facts_of[1]
 
     def _show_value(self) -> None:
@@ -266,16 +271,16 @@ class InspectorPanel(PanelWidget):
 
     def _show_query_result(self, answer: QueryResult) -> None:
         if self._table_wanted:
-            self.body.objects.show_found(answer.found.items(), self.clock())
+            self.body.objects.show_query_objects(answer.values.items(), self.clock())
             return
         first = not self.model.rowCount()
-        self.model.set_value(answer.found, self.clock())
+        self.model.set_value(answer.values, self.clock())
         if first:
             self.tree.expand_small(MAX_EXPANDED_ROWS)
 
     def _show_raw(self, message: Message, sentence: str) -> None:
         self._shown = message
-        self.foot.show_facts(self._facts(message))
+        self.foot.show_info(self._message_info(message))
         self.bytes.show_bytes(message.data)
         said = _("Can't decode the message as {codec}: {reason}.").format(
             codec=message.codec, reason=sentence
@@ -320,7 +325,7 @@ class InspectorPanel(PanelWidget):
         return self.freeze.isChecked()
 
     @property
-    def is_held(self) -> bool:
+    def is_display_fixed(self) -> bool:
         """True if new messages don't change the display: it is frozen, or an earlier message is selected."""
         return self.is_frozen or self.history.at is not None
 
@@ -333,7 +338,7 @@ class InspectorPanel(PanelWidget):
         return self._topic if self._shown is None else ""
 
     def blockers(self) -> list[Blocker]:
-        return [paused_blocker(self.title(), self._resume_updates)] if self.is_held else []
+        return [paused_blocker(self.title(), self._resume_updates)] if self.is_display_fixed else []
 
     def _resume_updates(self) -> None:
         self.history.select(None)
@@ -361,7 +366,7 @@ class InspectorPanel(PanelWidget):
         # "" ends the query.
         if not text and not self.query.has_query:
             return
-        self.finder.mark(wrong=not self.query.set_query(text))
+        self.finder.set_invalid(wrong=not self.query.set_query(text))
         self.compare.setVisible(not text)  # parts of messages can't be compared, and the query needs the room
         self.model.clear()
         self._show_value()

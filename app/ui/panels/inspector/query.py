@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from app.core.messages.newest_only import NewestOnly
+from app.core.messages.newest_only import NewestJobWorker
 from app.core.messages.query import JsonQuery, QueryResult
 from app.errors import QueryError
 from app.ui.widgets import label
@@ -42,7 +42,7 @@ class QueryStrip(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._worker = NewestOnly(_evaluate, "studio-query")
+        self._worker = NewestJobWorker(_evaluate, "studio-query")
         self._query: JsonQuery | None = None
         self._typed = ""
         self._value: object = None
@@ -122,6 +122,6 @@ class QueryStrip(QWidget):
 
 def result_text(answer: QueryResult) -> str:
     """Format the number of results, such as ``12 found``, and the reason if the results are incomplete."""
-    count = len(answer.found)
+    count = len(answer.values)
     said = ngettext("{count} found.", "{count} found.", count).format(count=count)
     return f"{said} {answer.cut}".rstrip()

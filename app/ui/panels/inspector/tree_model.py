@@ -14,7 +14,7 @@ from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelInde
 
 from app.core.messages.query import FoundPath
 from app.core.series.field_path import ALL, FieldPath, Step, kind_of_value
-from app.ui.panels.inspector.diff import MARK_TEXTS, MISSING, NO_BASE, Mark, Part, differs, parts_of
+from app.ui.panels.inspector.diff import MARK_TEXTS, MISSING, NO_BASE, ChildDiff, Mark, child_diffs, differs
 from app.ui.panels.inspector.values import is_container, keys_of, size_of, value_text, values_of
 from app.ui.text import plain
 from nep.i18n import _
@@ -203,15 +203,15 @@ class TreeModel(QAbstractItemModel):
             return size_of(node.value)
         return node.total if node.children is not None else size_of(node.value) or size_of(node.base)
 
-    def _parts(self, node: TreeNode, count: int) -> list[Part]:
+    def _parts(self, node: TreeNode, count: int) -> list[ChildDiff]:
         if node.base is NO_BASE:
             pairs = zip(keys_of(node.value, count), values_of(node.value, count), strict=False)
             return [(key, value, NO_BASE, "") for key, value in pairs]
         only = self._changes_only
-        parts, node.total = parts_of(node.value, node.base, node.mark, count, changes_only=only)
+        parts, node.total = child_diffs(node.value, node.base, node.mark, count, changes_only=only)
         return parts
 
-    def _update(self, node: TreeNode, part: Part, now: float | None) -> None:
+    def _update(self, node: TreeNode, part: ChildDiff, now: float | None) -> None:
         _key, value, base, mark = part
         before, node.value = node.value, value
         marked, node.mark, node.base = node.mark != mark, mark, base
@@ -256,7 +256,7 @@ class TreeModel(QAbstractItemModel):
         self._changing = before
         self.endInsertRows()
 
-    def _sync_children(self, node: TreeNode, loaded: list[TreeNode], parts: Sequence[Part]) -> None:
+    def _sync_children(self, node: TreeNode, loaded: list[TreeNode], parts: Sequence[ChildDiff]) -> None:
         # Nodes that still exist keep their expanded state.
         wanted = [part[0] for part in parts]
         keep = set(wanted)
@@ -304,7 +304,7 @@ class TreeModel(QAbstractItemModel):
         return self.index_of(node)
 
 
-def _make_node(parent: TreeNode, row: int, part: Part) -> TreeNode:
+def _make_node(parent: TreeNode, row: int, part: ChildDiff) -> TreeNode:
     key, value, base, mark = part
     return TreeNode(key, value, parent, row, parent.depth + 1, base=base, mark=mark)
 

@@ -29,7 +29,7 @@ Index = QModelIndex | QPersistentModelIndex
 INDENT, LEFT_EDGE, CHEVRON, VALUE_EDGE = 14, 8, 14, 10
 BAR_WIDTH = 3
 BAR_ROLES = {"": "changed", "changed": "changed", "added": "ok", "removed": "error"}
-SIGNS = {"added": "+ ", "removed": "\u2212 "}
+MARK_SIGNS = {"added": "+ ", "removed": "\u2212 "}
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
@@ -164,10 +164,10 @@ class TreeView(QTreeView):
         metrics = QFontMetricsF(font)
         x = float(left + CHEVRON + 4)
         room = rect.width() - x - VALUE_EDGE
-        said = SIGNS.get(node.mark, "") + str(node.key)
+        said = MARK_SIGNS.get(node.mark, "") + str(node.key)
         key = metrics.elidedText(said, Qt.TextElideMode.ElideRight, max(40.0, room * 0.6))
         painter.setFont(font)
-        role = BAR_ROLES[node.mark] if node.mark in SIGNS else "selectedText" if chosen else "text"
+        role = BAR_ROLES[node.mark] if node.mark in MARK_SIGNS else "selectedText" if chosen else "text"
         painter.setPen(theme.colour(role))
         width = metrics.horizontalAdvance(key)
         painter.drawText(QRectF(x, rect.top(), width + 2, rect.height()), LEFT, key)
@@ -188,14 +188,14 @@ class TreeView(QTreeView):
         text = metrics.elidedText(value_text(node.value), Qt.TextElideMode.ElideRight, room)
         width = metrics.horizontalAdvance(text)
         colour = theme.colour(_role(node.value))
-        if share > 0 and node.mark not in SIGNS:
+        if share > 0 and node.mark not in MARK_SIGNS:
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(blend(ground, theme.colour("changedTint"), share))
             painter.drawRoundedRect(
                 QRectF(right - width - 5, rect.top() + 3, width + 10, rect.height() - 6), 4, 4
             )
             colour = blend(colour, theme.colour("changed"), share)
-        if node.mark in SIGNS:
+        if node.mark in MARK_SIGNS:
             colour = theme.colour(BAR_ROLES[node.mark])
         painter.setFont(theme.font("code"))
         painter.setPen(colour)
@@ -221,7 +221,7 @@ class TreeView(QTreeView):
             self.setCurrentIndex(index)
             self.setFocus(Qt.FocusReason.MouseFocusReason)
             self._pressed_at = (event.position().toPoint(), node)
-            if node.is_container and _on_chevron(event.position(), node):
+            if node.is_container and _is_on_chevron(event.position(), node):
                 self.setExpanded(index, not self.isExpanded(index))
             return
         super().mousePressEvent(event)
@@ -244,7 +244,7 @@ class TreeView(QTreeView):
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         index = self.indexAt(event.position().toPoint())
         node = index.data(NODE_ROLE) if index.isValid() else None
-        if isinstance(node, TreeNode) and node.is_container and not _on_chevron(event.position(), node):
+        if isinstance(node, TreeNode) and node.is_container and not _is_on_chevron(event.position(), node):
             self.setExpanded(index, not self.isExpanded(index))
 
     def focusInEvent(self, event: QFocusEvent) -> None:
@@ -252,7 +252,7 @@ class TreeView(QTreeView):
         super().focusInEvent(event)
 
 
-def _on_chevron(position: QPointF, node: TreeNode) -> bool:
+def _is_on_chevron(position: QPointF, node: TreeNode) -> bool:
     left = LEFT_EDGE + node.depth * INDENT
     return left - 4 <= position.x() <= left + CHEVRON + 4
 

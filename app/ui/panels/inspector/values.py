@@ -8,7 +8,7 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from app.core.messages.lazy_json import LazyList, LazyObject
-from app.core.messages.reader import LARGE_BYTES, Reading, read
+from app.core.messages.reader import LARGE_BYTES, ReadResult, read
 from app.ui.text.numbers import size_text
 from nep.errors import NepError
 from nep.i18n import _, ngettext
@@ -16,8 +16,8 @@ from nep.i18n import _, ngettext
 if TYPE_CHECKING:
     from nep.messages.message import Message
 
-TEXT_LIMIT = 400
-SEARCH_LIMIT = 20_000
+MAX_TEXT_LENGTH = 400
+MAX_SEARCHED_VALUES = 20_000
 
 
 def is_container(value: object) -> bool:
@@ -64,14 +64,14 @@ def value_text(value: object) -> str:
         size = ngettext("({count} byte)", "({count} bytes)", len(value)).format(count=len(value))
         return f"{start}{' …' if len(value) > 16 else ''}  {size}"
     if isinstance(value, str):
-        text = value if len(value) <= TEXT_LIMIT else f"{value[:TEXT_LIMIT]}…"
+        text = value if len(value) <= MAX_TEXT_LENGTH else f"{value[:MAX_TEXT_LENGTH]}…"
         return '"' + text.replace("\n", "⏎").replace("\r", "").replace("\t", "⇥") + '"'
     if is_container(value):
         return f"[{size_of(value)}]" if size_of(value) else "[]"
     return repr(value) if isinstance(value, float) else str(value)
 
 
-def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tuple[str | int, ...]]:
+def search(value: object, words: str, limit: int = MAX_SEARCHED_VALUES) -> Iterator[tuple[str | int, ...]]:
     """Yield the paths of keys and values that contain a text, in tree order.
 
     Args:
@@ -105,7 +105,7 @@ def clipboard_text(value: object) -> str:
     return json.dumps(value, indent=2, ensure_ascii=False, default=str)
 
 
-def decode_now(message: Message) -> Reading:
+def decode_now(message: Message) -> ReadResult:
     """Decode a small message, or summarize an image, on the calling thread.
 
     Errors are not raised, but returned in the `Reading`.
@@ -113,12 +113,12 @@ def decode_now(message: Message) -> Reading:
     if message.codec != "image":
         return read(message)
     try:
-        return Reading(message, image_summary(message))
+        return ReadResult(message, image_summary(message))
     except NepError as error:
-        return Reading(message, error=str(error))
+        return ReadResult(message, error=str(error))
 
 
-def payload_or(message: Message, otherwise: object) -> object:
+def payload_or_default(message: Message, otherwise: object) -> object:
     """Decode a small message on the calling thread.
 
     Args:

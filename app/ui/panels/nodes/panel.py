@@ -14,7 +14,14 @@ from app.core.networks.parameters import NodeParameters
 from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.network_table import NetworkTable, are_own_nodes
 from app.ui.panels.nodes.parameters import ParametersView
-from app.ui.panels.nodes.rows import NodeRow, columns, facts_of, limits_of, no_parameters_reason, rows_of
+from app.ui.panels.nodes.rows import (
+    NodeRow,
+    columns,
+    details_text,
+    limits_text,
+    no_parameters_reason,
+    rows_of,
+)
 from app.ui.panels.row_actions import RowAction, copy_action, node_actions, show_messages, topic_actions
 from app.ui.panels.table_panel import TableTexts
 from app.ui.text.numbers import rate_text
@@ -133,8 +140,8 @@ class NodesPanel(NetworkTable[NodeRow]):
     def _show_details(self) -> None:
         row = self.model.row_at(self.table.currentIndex())
         shown = self.pages.currentIndex() == 0
-        words = _("Expand a node to see its topics") if row is None else facts_of(row.node)
-        limits = limits_of(row.node) if row is not None else ""
+        words = _("Expand a node to see its topics") if row is None else details_text(row.node)
+        limits = limits_text(row.node) if row is not None else ""
         if row is not None:
             limits = "\n".join(filter(None, (limits, no_parameters_reason(row.node))))
         self._parameters.show(row.node if row is not None and shown else None)
@@ -149,7 +156,7 @@ class NodesPanel(NetworkTable[NodeRow]):
             return
         if row.is_pattern and self.session.topic(row.topic_key) is None:
             said = _("{pattern} has wildcards and matches several topics")
-            self.context.toast(said.format(pattern=row.topic))
+            self.context.show_toast(said.format(pattern=row.topic))
         elif row.topic:
             show_messages(self.context, row.topic_key)
         else:
@@ -206,7 +213,7 @@ class _NodeTable(TableView[NodeRow]):
 
 
 def _haystack(node: NodeEntry) -> str:
-    topics = " ".join((*node.publishes, *node.subscribes))
+    topics = " ".join((*node.published_topics, *node.subscribed_topics))
     network = network_label(node.network)
     facts = f"{node.name} {node.host} {node.pid} {node.language} {node.generation} {network}"
     return f"{facts} {topics}".casefold()

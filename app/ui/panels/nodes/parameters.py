@@ -12,43 +12,45 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QSizePolicy, QStackedWidge
 from app.core.networks.parameters import (
     MAX_TEXT_LENGTH,
     NodeParameters,
-    ShownParameter,
+    ReportedParameter,
+    format_value,
     read_only_reason,
-    text_of,
 )
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, ElidedLabel, Separator, label, paint, set_role
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _, format_list, lazy
 from nep.text import shortened
 
 CHANGE_HIGHLIGHT_S = 0.8
-MAX_SHOWN_CHARS = 200
-MAX_SHOWN_CHOICES = 6
+MAX_DISPLAYED_CHARS = 200
+MAX_DISPLAYED_CHOICES = 6
 LINE, CHOICE = range(2)
 
 
-def allowed_values_text(parameter: ShownParameter) -> str:
+def allowed_values_text(parameter: ReportedParameter) -> str:
     """Describe the allowed values of a parameter, such as "0 to 2", "walk, run or crawl" or "read only".
 
     Return "" if every value is allowed.
     """
-    if parameter.read_only:
+    if parameter.is_read_only:
         return _("read only")
     if parameter.choices:
-        some = [shortened(text_of(each), 40) for each in parameter.choices[:MAX_SHOWN_CHOICES]]
+        some = [shortened(format_value(each), 40) for each in parameter.choices[:MAX_DISPLAYED_CHOICES]]
         return (
-            ", ".join(some) + " …" if len(parameter.choices) > MAX_SHOWN_CHOICES else format_list(some, "or")
+            ", ".join(some) + " …"
+            if len(parameter.choices) > MAX_DISPLAYED_CHOICES
+            else format_list(some, "or")
         )
     least, most = parameter.minimum, parameter.maximum
     if least is not None and most is not None:
-        return _("{least} to {most}").format(least=text_of(least), most=text_of(most))
+        return _("{least} to {most}").format(least=format_value(least), most=format_value(most))
     if least is not None:
-        return _("{least} or more").format(least=text_of(least))
-    return _("{most} or less").format(most=text_of(most)) if most is not None else ""
+        return _("{least} or more").format(least=format_value(least))
+    return _("{most} or less").format(most=format_value(most)) if most is not None else ""
 
 
 class ParametersView(QWidget):
@@ -106,7 +108,7 @@ class ParametersView(QWidget):
         ):  # fmt: skip
             column.addWidget(widget, stretch)
 
-    def _columns(self) -> tuple[Column[ShownParameter], ...]:
+    def _columns(self) -> tuple[Column[ReportedParameter], ...]:
         return (
             Column("parameter", lazy("Parameter"), 96, self._name_cell, stretch=True, tip=_tooltip),
             Column("value", lazy("Value"), 130, self._value_cell, tip=lambda p: p.text[:2000]),
@@ -118,11 +120,11 @@ class ParametersView(QWidget):
         is_here = node is not None and node.gone_s is None and not node.is_stale
         return role if is_here else "textDisabled"
 
-    def _name_cell(self, parameter: ShownParameter) -> Cell:
+    def _name_cell(self, parameter: ReportedParameter) -> Cell:
         return Cell(parameter.name, role=self._text_role("text"), mono=True, elide_middle=True)
 
-    def _value_cell(self, parameter: ShownParameter) -> Cell:
-        words = shortened(parameter.text, MAX_SHOWN_CHARS)
+    def _value_cell(self, parameter: ReportedParameter) -> Cell:
+        words = shortened(parameter.text, MAX_DISPLAYED_CHARS)
         changed = self.parameters.changed.get(parameter.name)
         if changed is not None and self.clock() - changed < CHANGE_HIGHLIGHT_S:
             return Cell(words, role="changed", mono=True, tint="changedTint")
@@ -160,7 +162,7 @@ class ParametersView(QWidget):
         return said.format(node=name)
 
     @property
-    def selected(self) -> ShownParameter | None:
+    def selected(self) -> ReportedParameter | None:
         """Selected parameter, or None."""
         row = self.model.row_at(self.table.currentIndex())
         return self.parameters.find(row.name) if row is not None else None
@@ -181,7 +183,7 @@ class ParametersView(QWidget):
         self.name.setText(parameter.name)
         self.name.setToolTip(plain.tip(_tooltip(parameter)))
         why_not = read_only_reason(node, parameter)
-        options = [text_of(each) for each in parameter.choices]
+        options = [format_value(each) for each in parameter.choices]
         if parameter.kind == "bool" and not options:
             options = ["false", "true"]
         waits = self.parameters.setting == parameter.name
@@ -195,7 +197,7 @@ class ParametersView(QWidget):
         paint.show_when(self.button, not options)
         self._update_status(parameter, why_not, waits=waits)
 
-    def _show_editor(self, parameter: ShownParameter, options: list[str]) -> None:
+    def _show_editor(self, parameter: ReportedParameter, options: list[str]) -> None:
         now = parameter.text
         self.editors.setCurrentIndex(CHOICE if options else LINE)
         for widget in (self.field, self.choice):
@@ -204,14 +206,14 @@ class ParametersView(QWidget):
             if [self.choice.itemData(place) for place in range(self.choice.count())] != options:
                 self.choice.clear()
                 for each in options:
-                    self.choice.addItem(shortened(each, MAX_SHOWN_CHARS), each)
+                    self.choice.addItem(shortened(each, MAX_DISPLAYED_CHARS), each)
             self.choice.set_value(now)
         elif not self._edited and self.field.text() != now:
             self.field.setText(now[:MAX_TEXT_LENGTH])
 
-    def _update_status(self, parameter: ShownParameter, why_not: str, *, waits: bool) -> None:
+    def _update_status(self, parameter: ReportedParameter, why_not: str, *, waits: bool) -> None:
         refusal = self.parameters.refusal
-        self.field.mark(wrong=bool(refusal))
+        self.field.set_invalid(wrong=bool(refusal))
         if refusal:
             self._set_status(_as_sentence(refusal), "error")
         elif waits:
@@ -264,9 +266,9 @@ class ValueField(QLineEdit):
         self._take, self._leave = take, leave
         self.setProperty("focusRadius", theme.radius("control"))
         self.setMinimumWidth(60)
-        EditMenu(theme, self)
+        ContextMenuFilter(theme, self)
 
-    def mark(self, *, wrong: bool) -> None:
+    def set_invalid(self, *, wrong: bool) -> None:
         """Show or remove the red outline.
 
         Args:
@@ -286,11 +288,11 @@ class ValueField(QLineEdit):
             super().keyPressEvent(event)
 
 
-def _tooltip(parameter: ShownParameter) -> str:
+def _tooltip(parameter: ReportedParameter) -> str:
     return "\n".join(filter(None, (parameter.name, shortened(parameter.description, 1000))))
 
 
-def _allowed_cell(parameter: ShownParameter) -> Cell:
+def _allowed_cell(parameter: ReportedParameter) -> Cell:
     return Cell(allowed_values_text(parameter), role="textTertiary")
 
 

@@ -23,19 +23,19 @@ UNSUPPORTED_VERSIONS = frozenset({"0.5.4.6", "0.5.4.7"})
 UNSUPPORTED_TEXT = lazy(
     "NEP {version} isn't supported: other versions can't decode its messages. Install 0.5.4.8 or 0.5.4.5."
 )
-ORIGINAL_LIMITS = lazy(
+ORIGINAL_LIMITS_TEXT = lazy(
     "A program that uses {nep}. It sends no sequence numbers or time stamps, so losses and "
     "message ages are unknown."
 )
-NETWORK_LIMITS = lazy(
+NETWORK_LIMITS_TEXT = lazy(
     "A node of {network}. This network doesn't report its process, start time or processor load."
 )
-ORIGINAL = lazy("original NEP")
-BRIDGE = lazy(
+ORIGINAL_TEXT = lazy("original NEP")
+BRIDGE_TEXT = lazy(
     "A bridge that forwards topics between this network and others. {topic} reports how many "
     "messages were forwarded and lost."
 )
-VERSIONS = {"A": lazy("original NEP up to 0.5.4.5"), "B": lazy("original NEP 0.5.4.8")}
+VERSION_TEXTS = {"A": lazy("original NEP up to 0.5.4.5"), "B": lazy("original NEP 0.5.4.8")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,26 +91,31 @@ def rows_of(
         rows.append(head)
         if head.is_expanded:
             node = head.node
-            rows += [NodeRow(node, direction=PUBLISHES, topic=topic, rate=rate) for topic in node.publishes]
-            rows += [NodeRow(node, direction=SUBSCRIBES, topic=topic, rate=rate) for topic in node.subscribes]
+            rows += [
+                NodeRow(node, direction=PUBLISHES, topic=topic, rate=rate) for topic in node.published_topics
+            ]
+            rows += [
+                NodeRow(node, direction=SUBSCRIBES, topic=topic, rate=rate)
+                for topic in node.subscribed_topics
+            ]
     return rows
 
 
-def limits_of(node: NodeEntry) -> str:
+def limits_text(node: NodeEntry) -> str:
     """Describe the limitations of an original program or foreign network, or the purpose of a bridge.
 
     Return "" for native nodes.
     """
     kind = find_kind(node.network)
     if kind is not None:
-        return "" if kind.reports_stats else _(NETWORK_LIMITS).format(network=kind.product_name)
+        return "" if kind.reports_stats else _(NETWORK_LIMITS_TEXT).format(network=kind.product_name)
     if node.is_bridge:
-        return _(BRIDGE).format(topic=BRIDGES_TOPIC)
+        return _(BRIDGE_TEXT).format(topic=BRIDGES_TOPIC)
     if node.generation in UNSUPPORTED_VERSIONS:
         return _(UNSUPPORTED_TEXT).format(version=node.generation)
     if not node.is_original:
         return ""
-    return _(ORIGINAL_LIMITS).format(nep=_(VERSIONS.get(node.generation, ORIGINAL)))
+    return _(ORIGINAL_LIMITS_TEXT).format(nep=_(VERSION_TEXTS.get(node.generation, ORIGINAL_TEXT)))
 
 
 def no_parameters_reason(node: NodeEntry) -> str:
@@ -125,7 +130,7 @@ def no_parameters_reason(node: NodeEntry) -> str:
     )
 
 
-def facts_of(node: NodeEntry) -> str:
+def details_text(node: NodeEntry) -> str:
     """Format name, computer, process and start time of a node in one line.
 
     The line replaces columns that don't fit into a narrow table.
@@ -153,11 +158,16 @@ def name_cell(row: NodeRow) -> Cell:
     gone = row.node.gone_s is not None
     if row.topic:
         return Cell(
-            row.topic, role=_text_role(row, "text"), mono=True, struck=gone, indent=INDENT, elide_middle=True
+            row.topic,
+            role=_text_role(row, "text"),
+            mono=True,
+            is_struck_out=gone,
+            indent=INDENT,
+            elide_middle=True,
         )
     chip = pgettext("node", "new") if row.node.is_new and not gone else None
     icon = "chevron-down" if row.is_expanded else "chevron-right"
-    return Cell(row.node.name, icon, _text_role(row, "text"), bold=bool(chip), struck=gone, chip=chip)
+    return Cell(row.node.name, icon, _text_role(row, "text"), bold=bool(chip), is_struck_out=gone, chip=chip)
 
 
 def generation_cell(row: NodeRow) -> Cell:
@@ -180,9 +190,9 @@ def cpu_cell(row: NodeRow) -> Cell:
     """Return the cell with the CPU load of a node, the time since it left, or "not reported"."""
     kind = find_kind(row.node.network)
     if row.topic or row.node.gone_s is not None or kind is None or kind.reports_stats:
-        return _node_cell(_cpu)(row)
+        return _node_cell(_cpu_text)(row)
     if row.node.cpu_ratio is not None:
-        return _node_cell(_cpu)(row)
+        return _node_cell(_cpu_text)(row)
     return Cell(pgettext("figure", "not reported"), role=_text_role(row, "textTertiary"))
 
 
@@ -190,7 +200,7 @@ def _node_cell(cell: Callable[[NodeEntry], str], role: str = "text") -> Callable
     return lambda row: Cell() if row.topic else Cell(cell(row.node), role=_text_role(row, role))
 
 
-def _cpu(node: NodeEntry) -> str:
+def _cpu_text(node: NodeEntry) -> str:
     return (
         cpu_text(node.cpu_ratio)
         if node.gone_s is None
@@ -198,7 +208,7 @@ def _cpu(node: NodeEntry) -> str:
     )
 
 
-def _since(node: NodeEntry) -> str:
+def _since_text(node: NodeEntry) -> str:
     if not node.since_ns or node.gone_s is not None:
         return ""
     return age_text(max(0.0, time.time() - node.since_ns / 1e9))
@@ -206,7 +216,7 @@ def _since(node: NodeEntry) -> str:
 
 def _name_tip(row: NodeRow) -> str:
     if not row.topic:
-        return facts_of(row.node)
+        return details_text(row.node)
     if row.is_pattern:
         said = _("{node} subscribes to all topics that match {pattern}")
         return said.format(node=row.node.name, pattern=row.topic)
@@ -218,15 +228,15 @@ def _generation_tip(row: NodeRow) -> str:
     if row.topic:
         return _name_tip(row)
     if row.node.network:
-        return limits_of(row.node) or _("On {network}").format(network=generation_text(row.node))
+        return limits_text(row.node) or _("On {network}").format(network=generation_text(row.node))
     said = _("Uses nep: messages have sequence numbers and time stamps, and losses are counted")
-    return limits_of(row.node) or said
+    return limits_text(row.node) or said
 
 
 def _cpu_tip(row: NodeRow) -> str:
     kind = find_kind(row.node.network)
     if kind is not None and row.node.cpu_ratio is None:
-        return limits_of(row.node)
+        return limits_text(row.node)
     return _("Share of one processor core used by the process in the last second")
 
 
@@ -254,15 +264,15 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
     ),
     Column("cpu", lazy("CPU"), 66, cpu_cell, lambda r: r.node.cpu_ratio, is_numeric=True, tip=_cpu_tip),
     Column(
-        "publishes", lazy("Publishes"), 80, _node_cell(lambda n: str(len(n.publishes))),
-        lambda r: len(r.node.publishes), is_numeric=True, hide_order=1,
+        "publishes", lazy("Publishes"), 80, _node_cell(lambda n: str(len(n.published_topics))),
+        lambda r: len(r.node.published_topics), is_numeric=True, hide_order=1,
     ),
     Column(
-        "subscribes", lazy("Subscribes"), 86, _node_cell(lambda n: str(len(n.subscribes))),
-        lambda r: len(r.node.subscribes), is_numeric=True, hide_order=2,
+        "subscribes", lazy("Subscribes"), 86, _node_cell(lambda n: str(len(n.subscribed_topics))),
+        lambda r: len(r.node.subscribed_topics), is_numeric=True, hide_order=2,
     ),
     Column(
-        "since", lazy("Uptime"), 62, _node_cell(_since),
+        "since", lazy("Uptime"), 62, _node_cell(_since_text),
         lambda r: r.node.since_ns, is_numeric=True, hide_order=6,
     ),
 )  # fmt: skip

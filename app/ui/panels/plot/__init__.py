@@ -11,10 +11,10 @@ from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from nep.i18n import lazy
 
 
-def _make(context: PanelContext) -> PanelWidget:
+def _make_panel(context: PanelContext) -> PanelWidget:
     from app.ui.panels.plot.panel import PlotPanel  # noqa: PLC0415  imports pyqtgraph and numpy
 
     return PlotPanel(context)
 
 
-PANEL = Panel("plot", lazy("Plot"), "chart-line", (), _make, allows_multiple=True)
+PANEL = Panel("plot", lazy("Plot"), "chart-line", (), _make_panel, allows_multiple=True)

@@ -50,7 +50,7 @@ class PlotAdvice(QWidget):
             shown: The same curves with their display settings.
         """
         said = next(filter(None, (curves.no_values_reason(each.curve) for each in shown)), "")
-        empty = [each for each in shown if not said and not _has_any(each)]
+        empty = [each for each in shown if not said and not _has_data(each)]
         topics = sorted(topics_of(empty[0].curve.source)) if shown and len(empty) == len(shown) else []
         self.topic = topics[0] if topics else ""
         if self.topic:
@@ -60,6 +60,6 @@ class PlotAdvice(QWidget):
         show_when(self, bool(said))
 
 
-def _has_any(shown: PlotCurve) -> bool:
+def _has_data(shown: PlotCurve) -> bool:
     curve = shown.curve
     return bool(len(curve.samples) or (curve.states is not None and len(curve.states)))

@@ -32,7 +32,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QGraphicsView
 
-from app.core.series.samples import Line
+from app.core.series.samples import Polyline
 from app.ui.panels.plot.shown_curve import MINUS, PlotCurve
 from app.ui.text.numbers import seconds_text
 from app.ui.theme.theme import Theme
@@ -302,7 +302,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         area, shown = area or self.area, self.ranges["right" if right else "left"]
         return area.bottom() - (value - shown.low) / (shown.high - shown.low) * area.height()
 
-    def show_lines(self, lines: Sequence[tuple[PlotCurve, Line]], clock_s: float) -> None:
+    def show_lines(self, lines: Sequence[tuple[PlotCurve, Polyline]], clock_s: float) -> None:
         """Draw curves in place of the previous ones.
 
         Args:
@@ -324,7 +324,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.view.setXRange(self.begin_s - self.anchor_s, self.end_s - self.anchor_s, padding=0)
         self.viewport().update()
 
-    def _show_line(self, curve: PlotCurve, line: Line) -> None:
+    def _show_line(self, curve: PlotCurve, line: Polyline) -> None:
         item = self._lines.get(curve.name)
         view = self.right_view if curve.right else self.view
         if item is None:
@@ -342,7 +342,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             antialias=not dense,
         )
 
-    def _is_dense(self, line: Line, *, right: bool) -> bool:
+    def _is_dense(self, line: Polyline, *, right: bool) -> bool:
         # True for many points, and for steep oscillations.
         if len(line.times) > MAX_ANTIALIASED_POINTS or not line.is_complete:
             return True
@@ -365,11 +365,15 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         for name, right in (("left", False), ("right", True)):
             there = [curve for curve in curves if curve.right is right]
             axis = self.plot.getAxis(name)
-            ink = there[0].look.ink(self.theme) if len(there) == 1 else self.theme.colour("textSecondary")
+            ink = (
+                there[0].look.line_colour(self.theme)
+                if len(there) == 1
+                else self.theme.colour("textSecondary")
+            )
             axis.setTextPen(ink)
             axis.setStyle(showValues=bool(there))
 
-    def _fit_values(self, lines: Sequence[tuple[PlotCurve, Line]]) -> None:
+    def _fit_values(self, lines: Sequence[tuple[PlotCurve, Polyline]]) -> None:
         for name, right, view in (("left", False, self.view), ("right", True, self.right_view)):
             shown = self.ranges[name]
             found = [line.values for curve, line in lines if curve.right is right and len(line.values)]
@@ -441,13 +445,13 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
                 curve.look.paint_mark(painter, theme, QPointF(x, y), 9)
         self._paint_distance(painter, places)
         for name, x in inside.items():
-            flag = self._flag(x)
+            flag = self._flag_rect(x)
             paint.box(painter, flag, theme.radius("key"), theme.colour("tooltip"))
             font = theme.font("small")
             font.setWeight(QFont.Weight.DemiBold)
             paint.text_line(painter, flag, name, font, theme.colour("tooltipText"), paint.CENTRE)
 
-    def _flag(self, x: float) -> QRectF:
+    def _flag_rect(self, x: float) -> QRectF:
         wide, high = (
             self.theme.scaled(FLAG_SIZE.width()),
             min(FLAG_SPACE - 2.0, self.theme.scaled(FLAG_SIZE.height())),
@@ -464,7 +468,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         font.setWeight(QFont.Weight.DemiBold)
         wide, edge = paint.width_of(font, words), self.theme.scaled(FLAG_SIZE.width()) / 2
         if right - left > wide + 2 * edge + 12:
-            place = self._flag((left + right) / 2)
+            place = self._flag_rect((left + right) / 2)
             box = QRectF(place.center().x() - wide / 2 - 1, place.top(), wide + 3, place.height())
             paint.text_line(painter, box, words, font, self.theme.colour("text"), paint.CENTRE)
 
@@ -472,7 +476,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         # Hit test of the cursors' flags and lines.
         for name, time_s in reversed(self.cursors.items()):
             x = self.x_of(time_s)
-            if self._flag(x).adjusted(-4, -4, 4, 4).contains(place):
+            if self._flag_rect(x).adjusted(-4, -4, 4, 4).contains(place):
                 return name
             if abs(place.x() - x) <= HIT_WIDTH_PX / 2 and self.area.contains(place):
                 return name

@@ -13,7 +13,7 @@ from PySide6.QtGui import QImage, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QWidget
 
-from app.core.series.csv_export import CsvColumn, columns_of, csv_lines
+from app.core.series.csv_export import CsvColumn, columns_of, csv_chunks
 from app.core.storage.atomic_file import write_atomically
 from app.ui.panels.base import PanelContext
 from app.ui.panels.plot.look import Stroke
@@ -24,12 +24,12 @@ from app.ui.widgets.file_dialogs import FileKind
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy
 
-CSV = FileKind(lazy("Data (CSV)"), ".csv")
-PNG = FileKind(lazy("Image (PNG)"), ".png")
-SVG = FileKind(lazy("Vector image (SVG)"), ".svg")
+CSV_KIND = FileKind(lazy("Data (CSV)"), ".csv")
+PNG_KIND = FileKind(lazy("Image (PNG)"), ".png")
+SVG_KIND = FileKind(lazy("Vector image (SVG)"), ".svg")
 PNG_SCALE = 2
 CLOSE_TIMEOUT_S = 3.0
-Part = tuple[QSize, Callable[[QPainter, QRectF], object]]
+PicturePart = tuple[QSize, Callable[[QPainter, QRectF], object]]
 LEGEND_ROW_HEIGHT = 22
 
 
@@ -53,7 +53,7 @@ class CsvWriter:
 
     def _run(self, columns: Sequence[CsvColumn], origin_ns: int) -> None:
         try:
-            write_atomically(self.path, self._parts(columns, origin_ns))
+            write_atomically(self.path, self._encoded_lines(columns, origin_ns))
         except OSError as error:
             self._done = error.strerror or type(error).__name__
         except MemoryError:
@@ -61,8 +61,8 @@ class CsvWriter:
         else:
             self._done = ""
 
-    def _parts(self, columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[bytes]:
-        for lines in csv_lines(columns, origin_ns):
+    def _encoded_lines(self, columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[bytes]:
+        for lines in csv_chunks(columns, origin_ns):
             if self._given_up.is_set():
                 raise OSError(errno.ECANCELED, os.strerror(errno.ECANCELED))
             yield lines.encode()
@@ -90,7 +90,7 @@ class PlotPicture:
     def __init__(
         self,
         theme: Theme,
-        parts: Iterable[Part],
+        parts: Iterable[PicturePart],
         curves: Sequence[PlotCurve],
     ) -> None:
         self._theme, self._parts, self._curves = (
@@ -124,7 +124,7 @@ class PlotPicture:
             paint.text_line(painter, box.adjusted(46, 0, 0, 0), curve.name, font, self._theme.colour("text"))
             top += row
 
-    def png(self) -> bytes:
+    def encode_png(self) -> bytes:
         """Return the image as PNG in double resolution."""
         image = QImage(self.size * PNG_SCALE, QImage.Format.Format_RGB32)
         if image.isNull():
@@ -140,7 +140,7 @@ class PlotPicture:
             raise OSError(errno.ENOMEM, _("not enough memory"))
         return bytes(buffer.data().data())
 
-    def svg(self) -> bytes:
+    def encode_svg(self) -> bytes:
         """Return the image as SVG."""
         buffer = QBuffer()
         buffer.open(QIODevice.OpenModeFlag.WriteOnly)
@@ -167,7 +167,7 @@ class PlotExport:
     def __init__(
         self,
         context: PanelContext,
-        parts: Callable[[], Iterable[Part]],
+        parts: Callable[[], Iterable[PicturePart]],
         curves: Callable[[], Sequence[PlotCurve]],
         shown: Callable[[], tuple[float, float]],
     ) -> None:
@@ -178,7 +178,7 @@ class PlotExport:
         """Return the menu of export formats."""
         menu = Menu(self._context.theme, parent)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        for kind in (CSV, PNG, SVG):
+        for kind in (CSV_KIND, PNG_KIND, SVG_KIND):
             action = menu.addAction(_(kind.label))
             action.triggered.connect(lambda _on=False, kind=kind: self.prompt_file(kind))
         return menu
@@ -186,7 +186,7 @@ class PlotExport:
     def prompt_file(self, kind: FileKind) -> None:
         """Ask for a file name, then export the plot. The dialog suggests the format `kind`."""
         suggestion = Path.home() / f"{_('Plot')}{kind.suffix}"
-        kinds = [kind, *(each for each in (CSV, PNG, SVG) if each is not kind)]
+        kinds = [kind, *(each for each in (CSV_KIND, PNG_KIND, SVG_KIND) if each is not kind)]
         self._context.files.save_as(_("Export the plot"), suggestion, kinds, self.write)
 
     def write(self, path: Path, kind: FileKind) -> None:
@@ -198,17 +198,17 @@ class PlotExport:
             path: File to write.
             kind: Format of the file.
         """
-        if kind != CSV:
+        if kind != CSV_KIND:
             picture = PlotPicture(self._context.theme, self._parts(), self._curves())
             try:
-                write_atomically(path, picture.png() if kind == PNG else picture.svg())
+                write_atomically(path, picture.encode_png() if kind == PNG_KIND else picture.encode_svg())
             except OSError as error:
                 self._report(path, error.strerror or type(error).__name__)
             else:
                 self._report(path, "")
             return
         if self._writer is not None and self._writer.pop_result() is None:
-            self._context.toast(_("The previous export is still running"))
+            self._context.show_toast(_("The previous export is still running"))
             return
         curves = [each.curve for each in self._curves() if not each.is_hidden]
         origin_ns = self._context.session.series.origin_ns
@@ -225,7 +225,7 @@ class PlotExport:
             said = _("can't write {file}: {reason}").format(file=path.name, reason=reason)
         else:
             said = _("Exported {file}").format(file=path.name)
-        self._context.toast(said)
+        self._context.show_toast(said)
 
     def close(self) -> None:
         """Wait for a running export to finish."""

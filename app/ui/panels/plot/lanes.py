@@ -42,11 +42,11 @@ class StateLanes(QWidget):
         paint.show_when(self, bool(self.curves))
         self.update()
 
-    def _lane(self) -> float:
+    def _lane_height(self) -> float:
         return max(float(LANE_HEIGHT), self._theme.scaled(LANE_HEIGHT))
 
     def sizeHint(self) -> QSize:
-        return QSize(200, round(self._lane() * len(self.curves)))
+        return QSize(200, round(self._lane_height() * len(self.curves)))
 
     def minimumSizeHint(self) -> QSize:
         return QSize(60, self.sizeHint().height())
@@ -62,20 +62,20 @@ class StateLanes(QWidget):
             states = curve.curve.states
             if states is None or curve.is_hidden:
                 continue
-            top = row * self._lane()
+            top = row * self._lane_height()
             is_yes_or_no = states.values_in(canvas.begin_s, canvas.end_s) <= {"true", "false"}
             without = ("false",) if is_yes_or_no else ()
             pixel_s = (canvas.end_s - canvas.begin_s) / canvas.columns
             painted = -1.0  # right edge of the last box: one box per pixel is enough
             for run in states.runs(canvas.begin_s, canvas.end_s, step_s=pixel_s / 2, without=without):
-                left = max(area.left(), canvas.x_of(run.begin_s))
+                left = max(area.left(), canvas.x_of(run.start_s))
                 right = min(area.right(), canvas.x_of(run.end_s))
                 if right >= left and max(right, left + MIN_BOX_WIDTH) > painted + 0.5:
                     painted = max(right, left + MIN_BOX_WIDTH)
                     yield (
                         curve,
                         run,
-                        QRectF(left, top + 2, max(MIN_BOX_WIDTH, right - left), self._lane() - 3),
+                        QRectF(left, top + 2, max(MIN_BOX_WIDTH, right - left), self._lane_height() - 3),
                     )
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -89,7 +89,7 @@ class StateLanes(QWidget):
         font = theme.font("code")
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for row, curve in enumerate(self.curves):
-            ground = QRectF(area.left(), row * self._lane() + 1, area.width(), self._lane() - 1)
+            ground = QRectF(area.left(), row * self._lane_height() + 1, area.width(), self._lane_height() - 1)
             painter.fillRect(ground, theme.colour("sunken"))
             name = QRectF(4, ground.top(), area.left() - 10, ground.height())
             role = "textDisabled" if curve.is_hidden else "textSecondary"
@@ -106,7 +106,7 @@ class StateLanes(QWidget):
         pen = QPen(self._theme.colour("text"), 1.25)
         pen.setDashPattern([1.5, 2.5])
         painter.setPen(pen)
-        high = self._lane() * len(self.curves)
+        high = self._lane_height() * len(self.curves)
         for time_s in self._canvas.cursors.values():
             x = self._canvas.x_of(time_s)
             if area.left() <= x <= area.right():
@@ -117,7 +117,7 @@ class StateLanes(QWidget):
             place = QPointF(event.pos())
             found = (run.value for _curve, run, box in self.boxes() if box.contains(place))
             word = next(found, None)
-            row = int(place.y() // self._lane())
+            row = int(place.y() // self._lane_height())
             name = self.curves[row].name if row < len(self.curves) else ""
             QToolTip.showText(event.globalPos(), plain.tip(word or name), self)
             return True

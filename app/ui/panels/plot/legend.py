@@ -10,7 +10,7 @@ from PySide6.QtGui import QKeyEvent
 from app.core.series.curves import Curves
 from app.core.series.formula import FieldSource
 from app.core.series.samples import RangeStats
-from app.ui.panels.plot.look import COLOURS, CurveLook, Stroke
+from app.ui.panels.plot.look import COLOUR_NAMES, CurveLook, Stroke
 from app.ui.panels.plot.shown_curve import MINUS, PlotCurve, number_text, value_text
 from app.ui.text.numbers import group_digits, seconds_text
 from app.ui.theme.theme import Theme
@@ -46,7 +46,7 @@ class LegendStats:
             found = self._kept[shown.name] = shown.curve.samples.stats(self.begin_s, self.end_s)
         return found
 
-    def at_cursor(self, shown: PlotCurve, which: int) -> float | str | None:
+    def value_at_cursor(self, shown: PlotCurve, which: int) -> float | str | None:
         """Return the value of a curve at a cursor, or None if there is no value or no cursor.
 
         Args:
@@ -62,7 +62,7 @@ class LegendStats:
         return found[1] if found is not None else None
 
 
-class _Cells:
+class _CellFactory:
     """Functions that create the cells of the columns."""
 
     def __init__(self, figures: LegendStats, is_gone: Callable[[PlotCurve], bool]) -> None:
@@ -85,14 +85,14 @@ class _Cells:
         look = shown.look
         return Cell(
             mark=Stroke(look, shown.curve.is_state, shown.is_hidden),
-            accessible_text=_(COLOURS[look.colour % len(COLOURS)]),
+            accessible_text=_(COLOUR_NAMES[look.colour % len(COLOUR_NAMES)]),
         )
 
     def name(self, shown: PlotCurve) -> Cell:
         is_field = isinstance(shown.curve.source, FieldSource)
         icon = None if is_field else "square-function"
         gone = self._is_gone(shown)
-        return Cell(shown.name, icon, self._role(shown), mono=True, elide_middle=True, struck=gone)
+        return Cell(shown.name, icon, self._role(shown), mono=True, elide_middle=True, is_struck_out=gone)
 
     def axis(self, shown: PlotCurve) -> Cell:
         if shown.curve.is_state:
@@ -105,10 +105,10 @@ class _Cells:
         return Cell(value_text(shown.curve.last), role=self._role(shown))
 
     def at_a(self, shown: PlotCurve) -> Cell:
-        return Cell(value_text(self.figures.at_cursor(shown, 0)), role=self._role(shown))
+        return Cell(value_text(self.figures.value_at_cursor(shown, 0)), role=self._role(shown))
 
     def at_b(self, shown: PlotCurve) -> Cell:
-        return Cell(value_text(self.figures.at_cursor(shown, 1)), role=self._role(shown))
+        return Cell(value_text(self.figures.value_at_cursor(shown, 1)), role=self._role(shown))
 
     def difference(self, shown: PlotCurve) -> Cell:
         figures = self.figures
@@ -123,7 +123,7 @@ class _Cells:
                 count = shown.curve.states.change_count(begin_s, end_s)
                 words = ngettext("{count} change", "{count} changes", count).format(count=count)
             return Cell(words, role=self._role(shown), bold=True)
-        first, second = figures.at_cursor(shown, 0), figures.at_cursor(shown, 1)
+        first, second = figures.value_at_cursor(shown, 0), figures.value_at_cursor(shown, 1)
         if not (isinstance(first, float) and isinstance(second, float)):
             return Cell()
         return Cell(number_text(second - first), role=self._role(shown), bold=True)
@@ -146,7 +146,7 @@ def columns(
         has_cursors: Returns True if there are cursors; the columns about A and B are hidden otherwise.
         is_gone: Returns True for a curve whose topic no longer exists.
     """
-    cells = _Cells(figures, is_gone)
+    cells = _CellFactory(figures, is_gone)
     between = {"is_numeric": True, "is_available": has_cursors}
     return (
         Column("eye", "", 34, cells.eye, label=lazy("Shown")),
@@ -182,7 +182,7 @@ class LegendTable(TableView[PlotCurve]):
         self.clicked.connect(self._press)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.customContextMenuRequested.connect(self._show_menu)
-        self.opened.connect(self._enter)
+        self.opened.connect(self._handle_enter)
 
     def _press(self, index: QModelIndex) -> None:
         shown = self._model.row_at(index)
@@ -192,15 +192,15 @@ class LegendTable(TableView[PlotCurve]):
         if column == "eye":
             self.toggle_visibility(shown)
         elif column == "stroke":
-            self._popup(shown, self.visualRect(index).bottomLeft())
+            self._open_curve_menu(shown, self.visualRect(index).bottomLeft())
 
-    def _enter(self, key: str) -> None:
+    def _handle_enter(self, key: str) -> None:
         # Enter opens the menu; a click does so only on the sample of the line.
         if self.keyboard:
             index = self._model.index_of(key)
             shown = self._model.row_at(index)
             if shown is not None:
-                self._popup(shown, self.visualRect(index).bottomLeft())
+                self._open_curve_menu(shown, self.visualRect(index).bottomLeft())
 
     def toggle_visibility(self, shown: PlotCurve) -> None:
         """Toggle the visibility of a curve."""
@@ -222,9 +222,9 @@ class LegendTable(TableView[PlotCurve]):
         index = self.indexAt(at)
         shown = self._model.row_at(index)
         if shown is not None:
-            self._popup(shown, at)
+            self._open_curve_menu(shown, at)
 
-    def _popup(self, shown: PlotCurve, at: QPoint) -> None:
+    def _open_curve_menu(self, shown: PlotCurve, at: QPoint) -> None:
         menu = self.menu_of(shown)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(self.viewport().mapToGlobal(at))
@@ -239,10 +239,10 @@ class LegendTable(TableView[PlotCurve]):
                 action.setChecked(shown.right is right)
                 action.triggered.connect(lambda _on=False, right=right: self._set_axis(shown, right=right))
             menu.addSeparator()
-        for number, words in enumerate(COLOURS):
+        for number, words in enumerate(COLOUR_NAMES):
             action = menu.addAction(_(words))
             action.setCheckable(True)
-            action.setChecked(shown.look.colour % len(COLOURS) == number)
+            action.setChecked(shown.look.colour % len(COLOUR_NAMES) == number)
             action.triggered.connect(lambda _on=False, number=number: self._set_colour(shown, number))
         menu.addSeparator()
         hide = menu.addAction(
@@ -267,9 +267,9 @@ class LegendTable(TableView[PlotCurve]):
 
 def next_look(there: Sequence[PlotCurve]) -> CurveLook:
     """Return a style for a new curve, with the colour and the pattern that the fewest curves have."""
-    colours = [shown.look.colour % len(COLOURS) for shown in there]
+    colours = [shown.look.colour % len(COLOUR_NAMES) for shown in there]
     patterns = [shown.look.pattern % 4 for shown in there]
-    colour = min(range(len(COLOURS)), key=lambda each: (colours.count(each), each))
+    colour = min(range(len(COLOUR_NAMES)), key=lambda each: (colours.count(each), each))
     pattern = min(range(4), key=lambda each: (patterns.count(each), each))
     return CurveLook(colour, pattern)
 

@@ -12,9 +12,9 @@ from app.ui.widgets import paint
 from nep.i18n import lazy
 
 LINE_WIDTH = 1.75
-COLOURS = (lazy("Blue"), lazy("Orange"), lazy("Green"), lazy("Pink"), lazy("Yellow"), lazy("Violet"))
+COLOUR_NAMES = (lazy("Blue"), lazy("Orange"), lazy("Green"), lazy("Pink"), lazy("Yellow"), lazy("Violet"))
 """Displayed names of the theme's curve colours, in the order of the theme."""
-DASHES: tuple[tuple[float, ...], ...] = ((), (6, 4), (2, 4), (12, 4))
+DASH_PATTERNS: tuple[tuple[float, ...], ...] = ((), (6, 4), (2, 4), (12, 4))
 """Dash patterns in px; the first one is solid."""
 LANE_FILL_ALPHA, LANE_EDGE_ALPHA = 0.20, 0.55
 
@@ -31,7 +31,7 @@ class CurveLook:
     colour: int
     pattern: int
 
-    def ink(self, theme: Theme) -> QColor:
+    def line_colour(self, theme: Theme) -> QColor:
         """Return the colour of the line."""
         return theme.series(self.colour)
 
@@ -43,9 +43,9 @@ class CurveLook:
             is_dense: True for a line with many points, which is painted thin and solid because that is
                 faster.
         """
-        pen = QPen(self.ink(theme), 1.0 if is_dense else LINE_WIDTH)
+        pen = QPen(self.line_colour(theme), 1.0 if is_dense else LINE_WIDTH)
         pen.setCosmetic(True)
-        dash = DASHES[self.pattern % len(DASHES)]
+        dash = DASH_PATTERNS[self.pattern % len(DASH_PATTERNS)]
         if dash and not is_dense:
             pen.setDashPattern([pixels / LINE_WIDTH for pixels in dash])
             pen.setCapStyle(Qt.PenCapStyle.FlatCap)
@@ -62,7 +62,7 @@ class CurveLook:
         """
         half = size / 2
         painter.setPen(QPen(theme.colour("panel"), 1))
-        painter.setBrush(self.ink(theme))
+        painter.setBrush(self.line_colour(theme))
         match self.pattern % 4:
             case 0:
                 painter.drawEllipse(centre, half, half)
@@ -116,7 +116,7 @@ def paint_state(painter: QPainter, theme: Theme, box: QRectF, look: CurveLook) -
         box: Rectangle of the state.
         look: Style of the curve.
     """
-    fill, edge = look.ink(theme), look.ink(theme)
+    fill, edge = look.line_colour(theme), look.line_colour(theme)
     fill.setAlphaF(LANE_FILL_ALPHA)
     edge.setAlphaF(1.0 if theme.high_contrast else LANE_EDGE_ALPHA)
     paint.box(painter, box, theme.radius("key"), fill, edge)

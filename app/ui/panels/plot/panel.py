@@ -22,11 +22,11 @@ from app.errors import CurveError
 from app.ui.panels.base import Blocker, PanelContext, PanelWidget, paused_blocker
 from app.ui.panels.plot.advice import PlotAdvice
 from app.ui.panels.plot.canvas import PlotCanvas
-from app.ui.panels.plot.export import CSV, PNG, SVG, PlotExport
+from app.ui.panels.plot.export import CSV_KIND, PNG_KIND, SVG_KIND, PlotExport
 from app.ui.panels.plot.lanes import StateLanes
 from app.ui.panels.plot.legend import LegendStats, LegendTable, caption_text, columns, next_look
 from app.ui.panels.plot.pace import DrawThrottle
-from app.ui.panels.plot.shown_curve import PlotCurve, look_of
+from app.ui.panels.plot.shown_curve import PlotCurve, parse_look
 from app.ui.panels.plot.time_view import SPANS, TimeView
 from app.ui.panels.plot.tools import PlotTools
 from app.ui.panels.plot.xy_canvas import XYCanvas
@@ -85,7 +85,7 @@ class PlotPanel(PanelWidget):
         self.paused = Chip(self.theme, "", "off", "pause")
         self.freeze = Button(self.theme, _("Pause"), "pause", size="small")
         self.freeze.setCheckable(True)
-        self.freeze.toggled.connect(self._pause)
+        self.freeze.toggled.connect(self._set_paused)
         self.chips, self.header = [self.paused], [self.freeze]
 
     def _make_tools(self) -> None:
@@ -111,7 +111,7 @@ class PlotPanel(PanelWidget):
         self.table = LegendTable(theme, self.model)
         self.table.changed.connect(self._curves_changed)
         self.table.removed.connect(self.remove)
-        self.table.copy_requested.connect(self._copy)
+        self.table.copy_requested.connect(self._copy_path)
         self._connect_canvas()
         body = self._make_lower()
         self.empty = EmptyState(
@@ -192,7 +192,7 @@ class PlotPanel(PanelWidget):
         try:
             self._add_curves(self.curves.add_field(topic, FieldPath.parse(path)), right=False)
         except CurveError as error:
-            self.context.toast(_as_sentence(error))
+            self.context.show_toast(_as_sentence(error))
 
     def show_topic(self, name: str) -> None:
         """Ask the user which field of a topic to plot."""
@@ -227,7 +227,7 @@ class PlotPanel(PanelWidget):
         self.curves.remove(found.curve)
         self._curves_changed()
         said = _("Removed {field}").format(field=name)
-        self.context.toast(said, _("Undo"), lambda: self._restore_removed(found, place))
+        self.context.show_toast(said, _("Undo"), lambda: self._restore_removed(found, place))
 
     def _restore_removed(self, before: PlotCurve, place: int) -> None:
         self._restore_curve(before.to_json())
@@ -235,9 +235,9 @@ class PlotPanel(PanelWidget):
             self.shown.insert(place, self.shown.pop())
         self._curves_changed()
 
-    def _copy(self, name: str) -> None:
+    def _copy_path(self, name: str) -> None:
         QGuiApplication.clipboard().setText(name)
-        self.context.toast(_("Copied {path}").format(path=name))
+        self.context.show_toast(_("Copied {path}").format(path=name))
 
     def _is_gone(self, shown: PlotCurve) -> bool:
         for name in topics_of(shown.curve.source):
@@ -272,14 +272,14 @@ class PlotPanel(PanelWidget):
         # Called to redraw while paused, too.
         self._due = True
 
-    def _range(self) -> tuple[float, float]:
+    def _visible_range(self) -> tuple[float, float]:
         newest = self.curves.newest_s
         newest = self.session.series.now_s() if newest is None else newest
         starts = [float(each.curve.samples.times[0]) for each in self.shown if len(each.curve.samples)]
         return self.view.visible_range(min(starts, default=newest - self.view.span_s), newest)
 
     def _draw(self) -> None:
-        begin_s, end_s = self._range()
+        begin_s, end_s = self._visible_range()
         canvas = self.canvas
         canvas.begin_s, canvas.end_s, canvas.anchor_s = begin_s, end_s, end_s
         if self.cursors.isChecked() and not canvas.cursors:
@@ -358,7 +358,7 @@ class PlotPanel(PanelWidget):
 
     # -- time range ---------------------------------------------------------------------------------------
 
-    def _pause(self, paused: bool) -> None:
+    def _set_paused(self, paused: bool) -> None:
         if paused:
             self.view.pause((self.canvas.begin_s, self.canvas.end_s))
         else:
@@ -505,9 +505,9 @@ class PlotPanel(PanelWidget):
         rows: tuple[tuple[str, str, Callable[[], object]], ...] = (
             (_("Add a curve"), "plus", self.focus_filter),
             (_("Show everything"), "maximize", self._show_all),
-            (_("Export data (CSV)"), "download", lambda: self.exporter.prompt_file(CSV)),
-            (_("Export image (PNG)"), "image", lambda: self.exporter.prompt_file(PNG)),
-            (_("Export vector image (SVG)"), "spline", lambda: self.exporter.prompt_file(SVG)),
+            (_("Export data (CSV)"), "download", lambda: self.exporter.prompt_file(CSV_KIND)),
+            (_("Export image (PNG)"), "image", lambda: self.exporter.prompt_file(PNG_KIND)),
+            (_("Export vector image (SVG)"), "spline", lambda: self.exporter.prompt_file(SVG_KIND)),
         )
         for words, icon, does in rows:
             action = QAction(self.theme.icon(icon), words, self)
@@ -577,7 +577,7 @@ class PlotPanel(PanelWidget):
         except CurveError:
             return
         for curve in made:
-            shown = PlotCurve(curve, look_of(saved, next_look(self.shown)))
+            shown = PlotCurve(curve, parse_look(saved, next_look(self.shown)))
             shown.right, shown.is_hidden = saved.get("right") is True, saved.get("hidden") is True
             self.shown.append(shown)
 

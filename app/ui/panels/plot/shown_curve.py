@@ -52,7 +52,7 @@ class PlotCurve:
         return kept
 
 
-def look_of(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
+def parse_look(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
     """Return the style from a saved state.
 
     Args:
@@ -75,7 +75,7 @@ def value_text(value: object) -> str:
     if isinstance(value, int):
         if abs(value) < 10**15:
             return group_digits(value).replace("-", MINUS)
-        return str(value).replace("-", MINUS) if abs(value) < 10**21 else number_text(_float(value))
+        return str(value).replace("-", MINUS) if abs(value) < 10**21 else number_text(_to_float(value))
     if isinstance(value, float):
         return number_text(value)
     return value[:60] if isinstance(value, str) else ""
@@ -93,7 +93,7 @@ def number_text(value: float) -> str:
     return words.replace("-", MINUS)
 
 
-def _float(value: int) -> float:
+def _to_float(value: int) -> float:
     try:
         return float(value)
     except OverflowError:

@@ -46,7 +46,7 @@ class TimeView:
         Args:
             shown: Start and end of the range in s.
         """
-        self.span_s, self.is_all, self.paused_end_s = _bounded(shown[1] - shown[0]), False, shown[1]
+        self.span_s, self.is_all, self.paused_end_s = _clamp_span(shown[1] - shown[0]), False, shown[1]
 
     def resume(self) -> None:
         """Follow new data again. The length of the range stays the same."""
@@ -71,7 +71,7 @@ class TimeView:
                 instead.
             shown: Start and end of the visible range in s.
         """
-        span_s = _bounded((shown[1] - shown[0]) * factor)
+        span_s = _clamp_span((shown[1] - shown[0]) * factor)
         share = (shown[1] - at_s) / max(MIN_SPAN_S, shown[1] - shown[0])
         self.span_s, self.is_all = span_s, False
         if self.paused_end_s is not None:
@@ -93,5 +93,5 @@ class TimeView:
         return next((value for value, span_s in SPANS if span_s == self.span_s), "")
 
 
-def _bounded(span_s: float) -> float:
+def _clamp_span(span_s: float) -> float:
     return min(MAX_SPAN_S, max(MIN_SPAN_S, span_s))

@@ -37,7 +37,7 @@ MAX_TOPICS, MAX_BYTES_PER_S = 40, 2e6
 MAX_SHOWN, MAX_FIELDS = 60, 4000
 REFRESH_MS = 250
 ICONS = {"number": "hash", "state": "toggle-left", "list": "brackets"}
-EXAMPLES = ("difference({})", "derivative({})", "integral({})", "mean({}, 2 s)")
+EXAMPLE_EXPRESSIONS = ("difference({})", "derivative({})", "integral({})", "mean({}, 2 s)")
 
 
 class FieldCatalog:
@@ -93,7 +93,7 @@ class FieldCatalog:
                     return
 
 
-class _Matches(QWidget):
+class _MatchPopup(QWidget):
     """Popup list of matches below the field, as an overlay of the window."""
 
     def __init__(self, theme: Theme, parent: QWidget) -> None:
@@ -116,7 +116,7 @@ class _Matches(QWidget):
         painter.end()
 
 
-class AddCurve(SearchField):
+class AddCurveField(SearchField):
     """Field for adding a curve.
 
     Args:
@@ -138,7 +138,7 @@ class AddCurve(SearchField):
         self._plotted = plotted
         self.offers = FieldCatalog(session)
         self.sentence = ""
-        self._matches: _Matches | None = None
+        self._matches: _MatchPopup | None = None
         self._known: dict[str, PlottableField] = {}
         self._timer = QTimer(self)
         self._timer.setInterval(REFRESH_MS)
@@ -148,12 +148,12 @@ class AddCurve(SearchField):
     # -- opening and closing ------------------------------------------------------------------------------
 
     @property
-    def matches(self) -> _Matches:
+    def matches(self) -> _MatchPopup:
         """Popup list, created on first use."""
         window = self.window()
         if self._matches is None or self._matches.parentWidget() is not window:
             self._close_matches()
-            self._matches = _Matches(self._theme, window)
+            self._matches = _MatchPopup(self._theme, window)
             self._matches.list.row_activated.connect(lambda: self._commit(right=False))
         return self._matches
 
@@ -249,11 +249,11 @@ class AddCurve(SearchField):
         else:
             found, count = [Match(entry) for entry in fields[:MAX_SHOWN]], len(fields)
         lines: list[Line] = [Heading(_("Fields")), *found] if found else []
-        names = [example.split("(")[0] for example in EXAMPLES]
+        names = [example.split("(")[0] for example in EXAMPLE_EXPRESSIONS]
         of = next(iter(self._plotted()), None) or (found[0].entry.text if found else "/odom.speed")
         calculated = [
             Entry(f"topic:{example.format(of)}", example.format(of), "square-function")
-            for name, example in zip(names, EXAMPLES, strict=True)
+            for name, example in zip(names, EXAMPLE_EXPRESSIONS, strict=True)
             if not typed or name.startswith(typed.partition("(")[0])
         ]
         if calculated:
@@ -367,7 +367,7 @@ class PlotTools(QWidget):
 
     def __init__(self, theme: Theme, session: Session, plotted: Callable[[], Iterable[str]]) -> None:
         super().__init__()
-        self.add = AddCurve(theme, session, plotted)
+        self.add = AddCurveField(theme, session, plotted)
         self.span = Segments(
             theme,
             [(value, _(SPAN_LABELS[value]), None) for value, _s in SPANS],

@@ -19,7 +19,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import _
 
-SHADES = 8
+SHADE_COUNT = 8
 MIN_ALPHA = 0.25
 MAX_POINTS = 4000
 ARROW_SIZE = 7.0
@@ -103,11 +103,11 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
         self._paths = [(across, up, *path_of(across, up, begin_s, end_s)) for across, up in pairs]
         used = 0
         for _across, up, times, xs, ys in self._paths:
-            for shade in range(SHADES):
-                first = shade * len(times) // SHADES
-                last = (shade + 1) * len(times) // SHADES + 1
-                ink = up.look.ink(self.theme)
-                ink.setAlphaF(MIN_ALPHA + (1 - MIN_ALPHA) * (shade + 1) / SHADES)
+            for shade in range(SHADE_COUNT):
+                first = shade * len(times) // SHADE_COUNT
+                last = (shade + 1) * len(times) // SHADE_COUNT + 1
+                ink = up.look.line_colour(self.theme)
+                ink.setAlphaF(MIN_ALPHA + (1 - MIN_ALPHA) * (shade + 1) / SHADE_COUNT)
                 self._line(used).setData(xs[first:last], ys[first:last], pen=pg.mkPen(ink, width=1.75))
                 used += 1
         for line in self._lines[used:]:
@@ -200,7 +200,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
             )
         ]
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(up.look.ink(self.theme))
+        painter.setBrush(up.look.line_colour(self.theme))
         painter.drawPolygon(QPolygonF(corners))
 
 

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 from app.core.run.acting.json_text import MAX_LENGTH, format_json, parse_json_text
 from app.core.run.acting.sending import MAX_HZ, MIN_HZ
 from app.core.run.acting.shelf import MAX_NAME_LENGTH, SavedMessage
-from app.core.run.acting.templates import is_plain
+from app.core.run.acting.templates import is_plain_text
 from app.ui.panels.publish.value_fields import ValueFields
 from app.ui.text import plain
 from app.ui.text.numbers import tip_with_key
@@ -29,7 +29,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ElidedLabel, NumberEdit, Separator, label
 from app.ui.widgets.indicators import StatusIcon
 from app.ui.widgets.inputs.json_edit import JsonEdit
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.json_fault import JsonFault
@@ -47,7 +47,7 @@ class TopicEdit(QLineEdit):
         self.setAccessibleName(_("Topic"))
         self.setPlaceholderText("/topic")
         self.setProperty("focusRadius", theme.radius("control"))
-        EditMenu(theme, self)
+        ContextMenuFilter(theme, self)
         self._offered = QStringListModel(self)
         completer = QCompleter(self._offered, self)
         completer.setFilterMode(Qt.MatchFlag.MatchContains)
@@ -98,12 +98,12 @@ class MessageForm(QWidget):
         self.name = QLineEdit()
         self.name.setAccessibleName(_("Message name"))
         self.name.setMaxLength(MAX_NAME_LENGTH)
-        EditMenu(theme, self.name)
+        ContextMenuFilter(theme, self.name)
         self.topic = TopicEdit(theme)
         self.kind = QLineEdit()
         self.kind.setAccessibleName(_("Message type"))
         self.kind.setPlaceholderText("json")
-        EditMenu(theme, self.kind)
+        ContextMenuFilter(theme, self.kind)
         for field in (self.name, self.kind):
             field.setProperty("focusRadius", theme.radius("control"))
         self.values = ValueFields(theme)
@@ -159,8 +159,12 @@ class MessageForm(QWidget):
         fields.setVerticalSpacing(8)
         fields.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDTH_PX)))
         fields.setColumnStretch(1, 1)
-        self._value_words = _name(_("Values"))
-        rows = ((_name(_("Name")), self.name), (_name(_("Topic")), self.topic), (_name(_("Type")), self.kind))
+        self._value_words = _make_name_label(_("Values"))
+        rows = (
+            (_make_name_label(_("Name")), self.name),
+            (_make_name_label(_("Topic")), self.topic),
+            (_make_name_label(_("Type")), self.kind),
+        )
         for place, (words, field) in enumerate((*rows, (self._value_words, self.values))):
             if isinstance(field, QLineEdit):
                 words.setBuddy(field)
@@ -229,11 +233,11 @@ class MessageForm(QWidget):
         message = self.message
         if message is None:
             return
-        is_json = not is_plain(message.msg_type)
+        is_json = not is_plain_text(message.msg_type)
         self.read = parse_json_text(message.text) if is_json else parse_json_text("{}")
-        self.edit.set_coloured(is_json)
+        self.edit.set_highlighting(is_json)
         fault = self.read.fault
-        self.edit.mark(fault.line if fault is not None else 0)
+        self.edit.mark_line(fault.line if fault is not None else 0)
         self.tidy.setEnabled(is_json and fault is None and not self.read.places)
         self.values.show_fields(self.read.manual_placeholders, dict(message.values))
         for widget in (self._value_words, self.values):
@@ -304,7 +308,7 @@ class MessageForm(QWidget):
             self.edit.setFocus(Qt.FocusReason.OtherFocusReason)
 
 
-def _name(words: str) -> QLabel:
+def _make_name_label(words: str) -> QLabel:
     made = label(words, "body", role="textSecondary")
     made.setMinimumHeight(26)
     return made

@@ -14,8 +14,8 @@ from app.core.network.watches import Suspendable, Watch
 from app.core.run.acting.acting import result_text
 from app.core.run.acting.arming import Target
 from app.core.run.acting.shelf import MAX_MESSAGES, SavedMessage
-from app.core.run.acting.templates import text_of_message, text_of_type
-from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
+from app.core.run.acting.templates import format_empty_message, format_message
+from app.ui.panels.armed_strip import ArmDurationMenu, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.publish.message_form import MessageForm
 from app.ui.panels.publish.shelf_list import ShelfList, state_cell
@@ -52,7 +52,7 @@ class PublishPanel(PanelWidget):
         self.new.clicked.connect(lambda: self.open_for(""))
         self.header = [self.new]
         self.strip = ArmedStrip(context)
-        self._minutes = ArmedMinutes(self.theme, self, self.acting)
+        self._minutes = ArmDurationMenu(self.theme, self, self.acting)
         self.filter = FilterField(self.theme, _("Filter saved messages"))
         self.filter.setMaximumWidth(16_777_215)
         self.list = ShelfList(self.theme, lambda each: state_cell(each, self.acting))
@@ -202,7 +202,7 @@ class PublishPanel(PanelWidget):
         return known.msg_type if known is not None else ""
 
     def badge(self) -> tuple[str, str] | None:
-        going = len(self.acting.outbox.all_repeated)
+        going = len(self.acting.outbox.repeated_messages)
         return (str(going), "warn") if going else None
 
     # -- user actions -------------------------------------------------------------------------------------
@@ -212,10 +212,10 @@ class PublishPanel(PanelWidget):
         _network, topic = split_key(key)
         kept = [each for each in self.acting.shelf.messages if topic and each.topic == topic]
         msg_type = self._type_of(topic) or "json"
-        made = kept[-1] if kept else self.acting.new_message(topic, msg_type, text_of_type(msg_type))
+        made = kept[-1] if kept else self.acting.new_message(topic, msg_type, format_empty_message(msg_type))
         if made is None:
             said = _("You have {count} saved messages, the maximum. Delete one first.")
-            self.context.toast(said.format(count=MAX_MESSAGES))
+            self.context.show_toast(said.format(count=MAX_MESSAGES))
             return
         self._wanted = made.id
         self.filter.clear()
@@ -237,9 +237,9 @@ class PublishPanel(PanelWidget):
         topic = self.session.live.topics.get(message.topic)
         if self._peek is not None or topic is None or not topic.publishers:
             self._end_peek()
-            self.form.replace_text(text_of_type(message.msg_type))
+            self.form.replace_text(format_empty_message(message.msg_type))
             if topic is None or not topic.publishers:
-                self.context.toast(_("No publisher on this topic: using the fields of the message type"))
+                self.context.show_toast(_("No publisher on this topic: using the fields of the message type"))
             return
         if topic.msg_type != message.msg_type:
             self.form.set_type(topic.msg_type)
@@ -257,9 +257,9 @@ class PublishPanel(PanelWidget):
             return
         self._end_peek()
         try:
-            self.form.replace_text(text_of_message(newest))
+            self.form.replace_text(format_message(newest))
         except NepError as error:
-            self.context.toast(str(error))
+            self.context.show_toast(str(error))
 
     def _end_peek(self) -> None:
         if self._peek is not None:
@@ -295,7 +295,7 @@ class PublishPanel(PanelWidget):
 
     def _show_reason(self, why_not: str) -> None:
         if why_not:
-            self.context.toast(why_not)
+            self.context.show_toast(why_not)
         self.refresh()
 
     def copy(self, id: str) -> None:
@@ -311,7 +311,7 @@ class PublishPanel(PanelWidget):
         removed = self.acting.shelf.remove(id)
         if removed is not None:
             said = _("Deleted “{name}”").format(name=removed.name)
-            self.context.toast(said, _("Undo"), self._undo_delete)
+            self.context.show_toast(said, _("Undo"), self._undo_delete)
             self._rebuild()
 
     def _undo_delete(self) -> None:

@@ -11,10 +11,10 @@ from app.core.run.acting.acting import SessionActing
 from app.core.run.acting.arming import Target
 from app.core.run.acting.json_text import parse_json_text
 from app.core.run.acting.shelf import SavedMessage
-from app.core.run.acting.templates import is_plain
+from app.core.run.acting.templates import is_plain_text
 from app.ui.text.numbers import rate_text
 from app.ui.theme.theme import Theme
-from app.ui.widgets.keyboard import is_plain as is_plain_key
+from app.ui.widgets.keyboard import has_no_modifiers as is_plain_key
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.two_lines import ROW_PX, TwoLines
 from app.ui.widgets.table.view import TableView
@@ -25,7 +25,7 @@ def state_cell(message: SavedMessage, acting: SessionActing) -> Cell:
     """Return the cell with the state of a message as text and icon."""
     if acting.outbox.is_sending(message.id):
         return Cell(_("{rate}/s").format(rate=rate_text(message.rate_hz)), "dot", "warn")
-    fault = None if is_plain(message.msg_type) else parse_json_text(message.text).fault
+    fault = None if is_plain_text(message.msg_type) else parse_json_text(message.text).fault
     if fault is not None:
         return Cell(_("line {line}").format(line=fault.line), "circle-x", "error")
     if acting.problem_of(message):

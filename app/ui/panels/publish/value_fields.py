@@ -11,7 +11,7 @@ from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import label
 from app.ui.widgets.flow_layout import Flow
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.i18n import _
 
 FIELD_WIDTH_PX = 120
@@ -50,7 +50,7 @@ class ValueFields(QWidget):
             value = values.get(name, "")
             if field.text() != value:
                 field.setText(value)
-            self._mark(field, wrong=not value.strip())
+            self._set_invalid(field, wrong=not value.strip())
 
     def _rebuild(self, names: Sequence[str]) -> None:
         focused = next((name for name, field in self.fields.items() if field.hasFocus()), "")
@@ -60,11 +60,11 @@ class ValueFields(QWidget):
             part.deleteLater()
         self._parts, self.fields = [], {}
         for name in names:
-            self._add(name)
+            self._add_field(name)
         if focused in self.fields:
             self.fields[focused].setFocus()
 
-    def _add(self, name: str) -> None:
+    def _add_field(self, name: str) -> None:
         part = QWidget()
         row = QHBoxLayout(part)
         row.setContentsMargins(0, 0, 0, 0)
@@ -79,7 +79,7 @@ class ValueFields(QWidget):
         )
         field.setToolTip(plain.tip(hint))
         field.setProperty("focusRadius", self._theme.radius("control"))
-        EditMenu(self._theme, field)
+        ContextMenuFilter(self._theme, field)
         field.textEdited.connect(lambda text, name=name: self.typed.emit(name, text))
         words.setBuddy(field)
         row.addWidget(words)
@@ -89,7 +89,7 @@ class ValueFields(QWidget):
         self.fields[name] = field
 
     @staticmethod
-    def _mark(field: QLineEdit, *, wrong: bool) -> None:
+    def _set_invalid(field: QLineEdit, *, wrong: bool) -> None:
         if (field.property("wrong") == "true") != wrong:
             field.setProperty("wrong", "true" if wrong else "false")
             field.style().unpolish(field)

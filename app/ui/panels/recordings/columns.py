@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from PySide6.QtCore import QPointF, QRectF, QSize
 from PySide6.QtGui import QImage, QPainter, QPainterPath
 
-from app.core.recording.folder import RecordingFacts
+from app.core.recording.folder import RecordingInfo
 from app.ui.text.dates import date_time_text
 from app.ui.text.numbers import group_digits, length_text, size_text
 from app.ui.theme.icons import paint_icon
@@ -30,7 +30,7 @@ BADGES = {
 """Text, status and icon of each badge, by key."""
 
 
-def badge_of(facts: RecordingFacts, being_written: bool) -> str:
+def badge_of(facts: RecordingInfo, being_written: bool) -> str:
     """Return the key in `BADGES` of a recording's badge, or "" for no badge.
 
     Args:
@@ -134,16 +134,16 @@ def crop_to_thumbnail(image: QImage) -> QImage:
     return middle.scaled(2 * THUMBNAIL_SIZE.width(), 2 * THUMBNAIL_SIZE.height())
 
 
-def note_of(facts: RecordingFacts) -> str:
+def note_of(facts: RecordingInfo) -> str:
     """Return the second line of a row: the error, the note, or the names of the first topics."""
     return facts.problem or facts.scan_problem or facts.note or ", ".join(facts.topics[:3])
 
 
 def columns(
-    picture: Callable[[RecordingFacts], QImage | None],
-    is_written: Callable[[RecordingFacts], bool],
+    picture: Callable[[RecordingInfo], QImage | None],
+    is_written: Callable[[RecordingInfo], bool],
     now: Callable[[], dt.datetime],
-) -> tuple[Column[RecordingFacts], ...]:
+) -> tuple[Column[RecordingInfo], ...]:
     """Return the columns of the table.
 
     Args:
@@ -152,7 +152,7 @@ def columns(
         now: Returns the current local time.
     """
 
-    def name(facts: RecordingFacts) -> Cell:
+    def name(facts: RecordingInfo) -> Cell:
         image = picture(facts)
         badge = badge_of(facts, is_written(facts))
         note = note_of(facts)
@@ -160,15 +160,15 @@ def columns(
         said = ", ".join(filter(None, (facts.path.stem, _(BADGES[badge][0]) if badge else "", note)))
         return Cell(mark=mark, accessible_text=said)
 
-    def date_cell(facts: RecordingFacts) -> Cell:
-        seconds = facts.started_ns / 1e9 if facts.started_ns else facts.changed_s
+    def date_cell(facts: RecordingInfo) -> Cell:
+        seconds = facts.start_ns / 1e9 if facts.start_ns else facts.changed_s
         then = dt.datetime.fromtimestamp(min(max(seconds, 0.0), 4e10), tz=dt.timezone.utc).astimezone()
         return Cell(date_time_text(then, now()))
 
-    def length(facts: RecordingFacts) -> Cell:
+    def length(facts: RecordingInfo) -> Cell:
         return Cell(length_text(facts.duration_s) if facts.message_count else "")
 
-    def lost(facts: RecordingFacts) -> Cell:
+    def lost(facts: RecordingInfo) -> Cell:
         if facts.lost is None:
             return Cell()
         return Cell(
@@ -181,7 +181,7 @@ def columns(
         Column("name", lazy("Recording"), 280, name, key=lambda facts: facts.path.stem.casefold(),
                stretch=True, tip=lambda facts: str(facts.path)),
         Column("when", lazy("Recorded"), 132, date_cell,
-               key=lambda facts: facts.started_ns or facts.changed_s * 1e9, hide_order=1),
+               key=lambda facts: facts.start_ns or facts.changed_s * 1e9, hide_order=1),
         Column("length", lazy("Length"), 68, length, key=lambda facts: facts.duration_s, is_numeric=True),
         Column("size", lazy("Size"), 72, lambda facts: Cell(size_text(facts.size_bytes)),
                key=lambda facts: facts.size_bytes, is_numeric=True, hide_order=2),

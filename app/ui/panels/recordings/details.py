@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 from app.core.recording.choice import file_stem
 from app.core.recording.exporting import RecordingExport
 from app.core.recording.film_strip import FilmStripPreview, select_part
-from app.core.recording.folder import RecordingFacts
+from app.core.recording.folder import RecordingInfo
 from app.core.recording.replay.scale import duration_text
 from app.ui.panels.recordings.film_strip import FilmStrip
 from app.ui.panels.recordings.topic_list import TopicList, shortest_choice
@@ -151,7 +151,7 @@ class RecordingDetails(QWidget):
         form.addWidget(self.list, 3, 1)
         return form
 
-    def show_facts(self, facts: RecordingFacts, being_written: bool) -> None:
+    def show_recording(self, facts: RecordingInfo, being_written: bool) -> None:
         """Show the properties of a recording and enable the possible actions.
 
         Args:

@@ -170,28 +170,28 @@ class FilmStrip(QWidget):
     def minimumSizeHint(self) -> QSize:
         return QSize(120, self.sizeHint().height())
 
-    def _film(self) -> QRectF:
+    def _film_rect(self) -> QRectF:
         # Leaves room for the handles at both ends.
         high = self._theme.scaled(FILM_HEIGHT)
         return QRectF(HANDLE_WIDTH, 0, max(1.0, self.width() - 2 * HANDLE_WIDTH), high)
 
     def _x_of(self, at_ns: int) -> float:
-        film, look = self._film(), self.look
+        film, look = self._film_rect(), self.look
         if look is None or look.end_ns <= look.start_ns:
             return film.left()
         return film.left() + (at_ns - look.start_ns) / (look.end_ns - look.start_ns) * film.width()
 
     def _time_at(self, x: float) -> int:
-        film, look = self._film(), self.look
+        film, look = self._film_rect(), self.look
         if look is None:
             return 0
         return look.start_ns + round((x - film.left()) / film.width() * (look.end_ns - look.start_ns))
 
     def _arrange(self) -> None:
-        high = round(self._film().height())
+        high = round(self._film_rect().height())
         begin, end = self._x_of(self.begin_ns), self._x_of(self.end_ns)
         if self.look is not None and self.look.end_ns <= self.look.start_ns:
-            end = self._film().right()
+            end = self._film_rect().right()
         self.begin.setGeometry(round(begin) - HANDLE_WIDTH, 0, HANDLE_WIDTH, high)
         self.end.setGeometry(round(end), 0, HANDLE_WIDTH, high)
         self.updateGeometry()
@@ -222,7 +222,7 @@ class FilmStrip(QWidget):
         look, theme = self.look, self._theme
         if look is None:
             return
-        painter, film = QPainter(self), self._film()
+        painter, film = QPainter(self), self._film_rect()
         painter.fillRect(film, theme.colour("sunken"))
         if any(image is not None for image in self._images):
             self._paint_pictures(painter, film)

@@ -18,7 +18,7 @@ from app.core.recording.choice import file_stem
 from app.core.recording.choice import free_path as free
 from app.core.recording.exporting import RecordingExport
 from app.core.recording.film_strip import FilmStripPreview, film_strip
-from app.core.recording.folder import FolderScan, RecordingFacts, RecordingFolder, picture_in
+from app.core.recording.folder import FolderScan, RecordingFolder, RecordingInfo, read_picture
 from app.core.recording.opener import RecordingOpener
 from app.core.recording.recordings import FOLDER_KEY
 from app.ui.other_programs import open_externally
@@ -30,7 +30,7 @@ from app.ui.panels.row_actions import RowAction
 from app.ui.panels.table_panel import TablePanel, TableTexts
 from app.ui.text.numbers import group_digits, size_text
 from app.ui.widgets import ContentScrollArea, EmptyAction, label
-from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.keyboard import has_no_modifiers
 from app.ui.widgets.table.model import TableModel
 from nep.i18n import _, lazy, ngettext
 from nep.system.replace_file import replace_file
@@ -42,14 +42,14 @@ TABLE_TEXTS = TableTexts(
     clear_filter_hint=lazy("Clear the filter to see all recordings."),
 )
 ROW_HEIGHT = 56
-SCAN_TICKS = 30  # refreshes at 30 Hz
+SCAN_INTERVAL_TICKS = 30  # refreshes at 30 Hz
 FIRST_SCAN_TICK = 1
 MAX_CACHED_PICTURES = 300
 STRIP_PICTURES, STRIP_BARS, STRIP_SIZE = 8, 120, (240, 142)
-SIDECAR = ".bookmarks.json"
+SIDECAR_SUFFIX = ".bookmarks.json"
 
 
-class RecordingsPanel(TablePanel[RecordingFacts]):
+class RecordingsPanel(TablePanel[RecordingInfo]):
     """Panel with the table of recordings and, below it, the details of the selected one."""
 
     def __init__(self, context: PanelContext) -> None:
@@ -93,14 +93,14 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         details.delete.clicked.connect(lambda: self._run_on_selected(self._delete))
         details.show_file.clicked.connect(lambda: self._run_on_selected(self._show_file))
         details.export_requested.connect(self._export)
-        details.cancelled.connect(self._cancel)
+        details.cancelled.connect(self._cancel_export)
         details.choose.clicked.connect(self._select_folder)
 
-    def make_model(self) -> TableModel[RecordingFacts]:
+    def make_model(self) -> TableModel[RecordingInfo]:
         made = columns(self._picture, self._is_being_written, lambda: dt.datetime.now().astimezone())
         return TableModel(made, lambda facts: str(facts.path))
 
-    def make_table(self, model: TableModel[RecordingFacts]) -> RecordingTable:
+    def make_table(self, model: TableModel[RecordingInfo]) -> RecordingTable:
         return RecordingTable(self.theme, model)
 
     # -- display ------------------------------------------------------------------------------------------
@@ -114,7 +114,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             self._ticks = FIRST_SCAN_TICK
         seen = recordings.client.revision
         is_new = seen != self._recorder_seen
-        if self._ticks % SCAN_TICKS == FIRST_SCAN_TICK:
+        if self._ticks % SCAN_INTERVAL_TICKS == FIRST_SCAN_TICK:
             self._folder.start_scan(recordings.client.state.path if recordings.is_recording else None)
         found = self._folder.pop_result()
         if found is not None:
@@ -140,7 +140,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self.show_table(bool(rows), bool(words) and bool(known))
         self._show_details()
 
-    def _with_live_state(self, facts: RecordingFacts) -> RecordingFacts:
+    def _with_live_state(self, facts: RecordingInfo) -> RecordingInfo:
         # Size and duration of a recording in progress come from the recorder.
         if not self._is_being_written(facts):
             return facts
@@ -150,15 +150,15 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             size_bytes=max(facts.size_bytes, state.size_bytes),
             duration_s=state.duration_s,
             message_count=state.message_count,
-            lost=state.lost + state.unwritten,
+            lost=state.lost + state.unwritten_count,
             topics=tuple(sorted(state.topics))[:3],
         )
 
-    def _is_being_written(self, facts: RecordingFacts) -> bool:
+    def _is_being_written(self, facts: RecordingInfo) -> bool:
         state = self._recordings.client.state
         return bool(state.phase) and facts.path == state.path
 
-    def _update_counts(self, known: Sequence[RecordingFacts]) -> None:
+    def _update_counts(self, known: Sequence[RecordingInfo]) -> None:
         count = len(known) + self._look.omitted_count
         words = ngettext("{count} recording, {size}", "{count} recordings, {size}", count)
         size = size_text(sum(each.size_bytes for each in known))
@@ -203,15 +203,15 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         facts = self._selected()
         self._below.setVisible(facts is not None)
         if facts is not None:
-            self.details.show_facts(facts, self._is_being_written(facts))
+            self.details.show_recording(facts, self._is_being_written(facts))
         self._request_strip(facts)
 
-    def _selected(self) -> RecordingFacts | None:
+    def _selected(self) -> RecordingInfo | None:
         return self.model.row_at(self.table.currentIndex())
 
     # -- pictures -----------------------------------------------------------------------------------------
 
-    def _picture(self, facts: RecordingFacts) -> QImage | None:
+    def _picture(self, facts: RecordingInfo) -> QImage | None:
         # Missing thumbnails are requested from a background thread.
         if not facts.is_read or facts.problem or facts.scan_problem:
             return None
@@ -239,7 +239,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     # -- film strip ---------------------------------------------------------------------------------------
 
-    def _request_strip(self, facts: RecordingFacts | None) -> None:
+    def _request_strip(self, facts: RecordingInfo | None) -> None:
         # Loads the film strip in a background thread.
         can_read = (
             facts is not None and facts.is_read and not facts.problem and not self._is_being_written(facts)
@@ -251,7 +251,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self.details.show_strip(None)
         if mark is not None:
             path = mark[0]
-            self._strips.submit("strip", lambda: _strip(path, self._opener))
+            self._strips.submit("strip", lambda: _load_strip(path, self._opener))
 
     def _poll_strip(self) -> None:
         # Shows the film strip once it is loaded; a loop on the timeline becomes the selected part.
@@ -296,13 +296,13 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self._ticks = 0
         self.rebuild()
 
-    def _facts_of(self, key: str) -> RecordingFacts | None:
+    def _facts_of(self, key: str) -> RecordingInfo | None:
         return self.model.row_at(self.model.index_of(key))
 
     def _rename(self, key: str) -> None:
         facts = self._facts_of(key)
         if facts is None or self._is_being_written(facts):
-            self.context.toast(_("A recording can be renamed after it has ended"))
+            self.context.show_toast(_("A recording can be renamed after it has ended"))
             return
         table = self.table
         if isinstance(table, RecordingTable):
@@ -313,11 +313,11 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         if stem == path.stem:
             return True
         if not stem:
-            self.context.toast(_("Enter a name for the recording"))
+            self.context.show_toast(_("Enter a name for the recording"))
             return False
         new = path.with_name(f"{stem}{path.suffix}")
         if new.exists():
-            self.context.toast(_("A recording named “{name}” already exists").format(name=stem))
+            self.context.show_toast(_("A recording named “{name}” already exists").format(name=stem))
             return False
         if not self._move_files(path, new):
             return False
@@ -328,12 +328,14 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
     def _move_files(self, path: Path, new: Path) -> bool:
         try:
             replace_file(path, new)
-            beside = path.with_name(path.name + SIDECAR)
+            beside = path.with_name(path.name + SIDECAR_SUFFIX)
             if beside.exists():
-                replace_file(beside, new.with_name(new.name + SIDECAR))
+                replace_file(beside, new.with_name(new.name + SIDECAR_SUFFIX))
         except OSError as error:
             words = _("Can't rename {file}: {reason}")
-            self.context.toast(words.format(file=path.name, reason=(error.strerror or str(error)).lower()))
+            self.context.show_toast(
+                words.format(file=path.name, reason=(error.strerror or str(error)).lower())
+            )
             return False
         return True
 
@@ -351,22 +353,22 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
     def _delete(self, key: str) -> None:
         facts = self._facts_of(key)
         if facts is None or self._is_being_written(facts):
-            self.context.toast(_("A recording can be deleted after it has ended"))
+            self.context.show_toast(_("A recording can be deleted after it has ended"))
             return
         path = facts.path
         bin_file = QFile(str(path))
         if not bin_file.moveToTrash():
             words = _("Can't move {file} to the bin: {reason}")
-            self.context.toast(words.format(file=path.name, reason=bin_file.errorString().lower()))
+            self.context.show_toast(words.format(file=path.name, reason=bin_file.errorString().lower()))
             return
         self._update_listing(path, None)
         self.table.setFocus(Qt.FocusReason.OtherFocusReason)
         there = Path(bin_file.fileName())
         words = _("Moved “{name}” to the bin").format(name=path.stem)
         if there != path and there.is_file():
-            self.context.toast(words, _("Undo"), lambda: self._restore_deleted(there, path))
+            self.context.show_toast(words, _("Undo"), lambda: self._restore_deleted(there, path))
         else:
-            self.context.toast(words)
+            self.context.show_toast(words)
 
     def _restore_deleted(self, there: Path, path: Path) -> None:
         try:
@@ -375,7 +377,9 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             about.unlink(missing_ok=True)
         except OSError as error:
             words = _("Can't restore {file}: {reason}")
-            self.context.toast(words.format(file=path.name, reason=(error.strerror or str(error)).lower()))
+            self.context.show_toast(
+                words.format(file=path.name, reason=(error.strerror or str(error)).lower())
+            )
             return
         self._wanted = str(path)
         self._ticks = 0
@@ -383,7 +387,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
     def _show_file(self, key: str) -> None:
         path = Path(key)
         if not open_externally(QUrl.fromLocalFile(str(path.parent))):
-            self.context.toast(_("File: {path}").format(path=path))
+            self.context.show_toast(_("File: {path}").format(path=path))
 
     # -- export -------------------------------------------------------------------------------------------
 
@@ -392,7 +396,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         if facts is None or self._job is not None:
             return
         if part is None:
-            self.context.toast(_("No matching topics in this recording"))
+            self.context.show_toast(_("No matching topics in this recording"))
             return
         folder = free(self.details.export_path() or facts.path.with_suffix(""), is_folder=True)
         self._job = RecordingExport(facts.path, kind, folder, part, self._recordings.new_opener())
@@ -404,7 +408,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             place = self.details.folder or facts.path.parent
             self.context.files.select_folder(str(place), self.details.set_folder)
 
-    def _cancel(self) -> None:
+    def _cancel_export(self) -> None:
         if self._job is not None:
             self._job.cancel()
 
@@ -412,23 +416,25 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         job = self._job
         if job is None:
             return
-        if not job.is_over:
+        if not job.is_finished:
             self.details.show_export(job)
             return
         self._job = None
         self.details.show_export(None)
         self._show_details()
         if job.files:
-            self.context.toast(job.result_text(), _("Show"), lambda: self._show_file(str(job.files[0].path)))
+            self.context.show_toast(
+                job.result_text(), _("Show"), lambda: self._show_file(str(job.files[0].path))
+            )
         else:
-            self.context.toast(job.result_text())
+            self.context.show_toast(job.result_text())
 
     # -- overrides ----------------------------------------------------------------------------------------
 
     def event(self, event: QEvent) -> bool:
         # Within the panel, F2 renames the recording; otherwise the window's shortcut would rename the
         # behaviour.
-        if isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_F2 and is_plain(event):
+        if isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_F2 and has_no_modifiers(event):
             if event.type() == QEvent.Type.ShortcutOverride:
                 event.accept()
                 return True
@@ -442,13 +448,13 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     def set_density(self, density: Density) -> None:
         super().set_density(density)
-        self._fit_head()
+        self._fit_header()
 
     def theme_changed(self) -> None:
         super().theme_changed()
-        self._fit_head()
+        self._fit_header()
 
-    def _fit_head(self) -> None:
+    def _fit_header(self) -> None:
         # Same header height as in other tables, despite the taller rows.
         self.table.horizontalHeader().setFixedHeight(super().row_height() + 1)
 
@@ -468,25 +474,27 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
 def _load_thumbnail(path: Path, opener: RecordingOpener) -> QImage | None:
     # Runs in a background thread.
-    found = picture_in(path, (2 * THUMBNAIL_SIZE.width(), 2 * THUMBNAIL_SIZE.height()), opener)
-    return crop_to_thumbnail(_image(found)).copy() if found is not None else None
+    found = read_picture(path, (2 * THUMBNAIL_SIZE.width(), 2 * THUMBNAIL_SIZE.height()), opener)
+    return crop_to_thumbnail(_convert_picture(found)).copy() if found is not None else None
 
 
-def _image(picture: Picture) -> QImage:
+def _convert_picture(picture: Picture) -> QImage:
     pixels = picture.bgra
     high, wide = pixels.shape[:2]
     return QImage(pixels.tobytes(), wide, high, wide * 4, QImage.Format.Format_RGB32).copy()
 
 
-def _strip(path: Path, opener: RecordingOpener) -> tuple[FilmStripPreview | None, Sequence[QImage | None]]:
+def _load_strip(
+    path: Path, opener: RecordingOpener
+) -> tuple[FilmStripPreview | None, Sequence[QImage | None]]:
     # Runs in a background thread.
     look = film_strip(path, STRIP_PICTURES, STRIP_BARS, STRIP_SIZE, opener)
     if look is None:
         return None, ()
-    return look, [_image(each) if each is not None else None for each in look.pictures]
+    return look, [_convert_picture(each) if each is not None else None for each in look.pictures]
 
 
-def _haystack(facts: RecordingFacts) -> str:
+def _haystack(facts: RecordingInfo) -> str:
     return " ".join((facts.path.stem, facts.note, *facts.topics)).casefold()
 
 

@@ -7,18 +7,18 @@ from collections.abc import Callable
 from PySide6.QtCore import QModelIndex, QRect, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 
-from app.core.recording.folder import RecordingFacts
+from app.core.recording.folder import RecordingInfo
 from app.ui.panels.recordings.columns import GAP, THUMBNAIL_SIZE
 from app.ui.theme.theme import Theme
 from app.ui.widgets.inputs.rename_field import RenameField
-from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.keyboard import has_no_modifiers
 from app.ui.widgets.table.cells import EDGE
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _
 
 
-class RecordingTable(TableView[RecordingFacts]):
+class RecordingTable(TableView[RecordingInfo]):
     """Table of recordings, in which a click selects a row without opening the recording.
 
     Signals:
@@ -31,7 +31,7 @@ class RecordingTable(TableView[RecordingFacts]):
     rename_requested = Signal(str)
     delete_requested = Signal(str)
 
-    def __init__(self, theme: Theme, model: TableModel[RecordingFacts]) -> None:
+    def __init__(self, theme: Theme, model: TableModel[RecordingInfo]) -> None:
         super().__init__(theme, model, "when")
         self.order.is_descending = True
         self.field: RenameField | None = None
@@ -50,7 +50,7 @@ class RecordingTable(TableView[RecordingFacts]):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = self.selected_key()
-        if key is None or not is_plain(event):
+        if key is None or not has_no_modifiers(event):
             super().keyPressEvent(event)
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self._open_row(self.currentIndex())

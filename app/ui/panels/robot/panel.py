@@ -16,7 +16,7 @@ from app.robots.description.description import Event
 from app.robots.virtual.room import Ball, Box, Room
 from app.robots.virtual.room_map import kind_of
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.panels.no_robot import NoRobotState
+from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robot.large_room import LargeRoom
 from app.ui.panels.robot.room_view import RoomView
@@ -24,7 +24,7 @@ from app.ui.panels.robot.say_bar import SayBar
 from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
-from app.ui.widgets.indicators import ROBOT_STATUS
+from app.ui.widgets.indicators import STATUS_BY_ROBOT_STATE
 from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _, lazy
 
@@ -83,7 +83,7 @@ class RobotPanel(OneRobotPanel):
         self.chips = [self.choose, self.chip]
         self.add.setVisible(False)
         self.large = IconButton(self.theme, "maximize-2", _("Large room"), size=30)
-        self.large.clicked.connect(self.enlarge)
+        self.large.clicked.connect(self.toggle_enlarged)
         self.large.setVisible(False)
         self.header = [self.add, self.reset, self.large]
         self._make_stage()
@@ -91,7 +91,7 @@ class RobotPanel(OneRobotPanel):
         text = _("With a virtual robot you can try everything right away.")
         start = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
         self.empty = EmptyState(self.theme, "bot", title, text, [start])
-        self._no_robot = NoRobotState(self.empty, title, text, [start])
+        self._no_robot = NoRobotController(self.empty, title, text, [start])
         self._no_robot.set_starting(self.session.starting_robots)
         self.pages = self.make_page_stack(self.empty, self.stage)
 
@@ -107,19 +107,21 @@ class RobotPanel(OneRobotPanel):
         # The drawing and the bar below it.
         self.view = RoomView(self.theme)
         view = self.view
-        view.touched.connect(lambda name, part, down: self._change({"touch": part, "down": down}, name))
-        view.moved.connect(self._move)
+        view.touched.connect(lambda name, part, down: self._change_world({"touch": part, "down": down}, name))
+        view.moved.connect(self._move_thing)
         view.robot_moved.connect(
-            lambda name, x, y: self._change({"move": "robot", "x": round(x, 3), "y": round(y, 3)}, name)
+            lambda name, x, y: self._change_world({"move": "robot", "x": round(x, 3), "y": round(y, 3)}, name)
         )
-        view.robot_lifted.connect(lambda name, on: self._change({"hold": on}, name))
-        view.bumper_pressed.connect(lambda name, side: self._change({"happen": "bump", "side": side}, name))
+        view.robot_lifted.connect(lambda name, on: self._change_world({"hold": on}, name))
+        view.bumper_pressed.connect(
+            lambda name, side: self._change_world({"happen": "bump", "side": side}, name)
+        )
         view.removed.connect(self.session.room.remove)
         view.menu_requested.connect(self._show_room_menu)
-        view.enlarged.connect(self.enlarge)
+        view.enlarge_requested.connect(self.toggle_enlarged)
         self.say = SayBar(self.theme, self._awaited_values)
-        self.say.speech_submitted.connect(lambda words: self._change({"say": words}))
-        self.say.event_simulated.connect(self._change)
+        self.say.speech_submitted.connect(lambda words: self._change_world({"say": words}))
+        self.say.event_simulated.connect(self._change_world)
         stage = QWidget()
         column = QVBoxLayout(stage)
         column.setContentsMargins(0, 0, 0, 0)
@@ -146,7 +148,7 @@ class RobotPanel(OneRobotPanel):
         self._update_sound_button()
         if self._large is not None:
             self._large.raise_()  # a panel raised in its tab group would cover it
-        self.chip.set(link.chip_text, ROBOT_STATUS[link.state])
+        self.chip.set(link.chip_text, STATUS_BY_ROBOT_STATE[link.state])
         if link.drawing is not None:
             now = time.monotonic()
             if link.drawing is not self._told:
@@ -178,14 +180,14 @@ class RobotPanel(OneRobotPanel):
     def show_robot(self, link: RobotLink) -> None:
         self.set_title(link.name)
         for button in (self.reset, self.add, self.large):
-            button.setVisible(link.virtual)
+            button.setVisible(link.is_virtual)
         self.view.robot_name = link.name
         self.say.show_robot(link.robot)
         self._update_empty_state(link)
 
     def _update_empty_state(self, link: RobotLink) -> None:
         self.pages.setCurrentWidget(self.empty)
-        if link.virtual:
+        if link.is_virtual:
             title = _("{robot} is starting").format(robot=link.name)
             self.empty.set_texts(title, _("The robot appears as soon as it reports its position."))
             self.empty.set_actions([])
@@ -254,7 +256,7 @@ class RobotPanel(OneRobotPanel):
     def _watch_other_robots(self, link: RobotLink) -> list[RobotLink]:
         # Every other virtual robot is watched while the panel is visible.
         fleet = self.session.fleet
-        there = [each for each in fleet.connected if each.virtual and each.name != link.name]
+        there = [each for each in fleet.connected if each.is_virtual and each.name != link.name]
         names = {each.name for each in there}
         for name in self._looks.keys() - names:
             self._looks.pop(name).close()
@@ -262,19 +264,19 @@ class RobotPanel(OneRobotPanel):
             self._looks[name] = fleet.watch_sensors(name)
         return there
 
-    def _move(self, name: str, x: float, y: float) -> None:
+    def _move_thing(self, name: str, x: float, y: float) -> None:
         if self.view.state.is_room_shared:
             states = [self.view.state, *(state for _name, state in self.view.others)]
             robots = {str(at): (each.x, each.y, radius_of(each)) for at, each in enumerate(states)}
             self.session.room.move(name, x, y, robots)
         else:
-            self._change({"move": name, "x": round(x, 3), "y": round(y, 3)})
+            self._change_world({"move": name, "x": round(x, 3), "y": round(y, 3)})
 
     def _reset_room(self) -> None:
         # Resets robots and room.
         self.session.room.reset()
         for name in ("", *(name for name, _state in self.view.others)):
-            self._change({"reset": True}, name)
+            self._change_world({"reset": True}, name)
 
     def _show_room_menu(self, thing: str, place: QPoint | None, button: QWidget | None = None) -> None:
         # Opens at a position (context menu), or below a button.
@@ -287,7 +289,7 @@ class RobotPanel(OneRobotPanel):
         if self.view.state.is_room_shared:
             for kind, (words, icon) in ADDABLE_THINGS.items():
                 action = menu.addAction(self.theme.icon(icon), _(words))
-                action.triggered.connect(lambda _on=False, kind=kind: self._add(kind))
+                action.triggered.connect(lambda _on=False, kind=kind: self._add_thing(kind))
             menu.addSeparator()
         menu.addAction(self.theme.icon("rotate-cw"), _("Reset room")).triggered.connect(self._reset_room)
         start = menu.addAction(_("Reset robots to their start position before each run"))
@@ -300,7 +302,7 @@ class RobotPanel(OneRobotPanel):
         else:
             menu.popup(place)
 
-    def _add(self, kind: str) -> None:
+    def _add_thing(self, kind: str) -> None:
         # Adds a thing at a free place in front of the first robot.
         state = self.view.state
         room = self.session.room.room
@@ -308,13 +310,13 @@ class RobotPanel(OneRobotPanel):
         x, y = room.nearest_free(state.x + 1.0, state.y + 0.9, radius)
         name = self.session.room.add(kind, x, y)
         if name is None:
-            self.context.toast(_("The room is full. Remove something first"))
+            self.context.show_toast(_("The room is full. Remove something first"))
         else:
             self.view.chosen = name
 
     # -- enlarged room ------------------------------------------------------------------------------------
 
-    def enlarge(self) -> None:
+    def toggle_enlarged(self) -> None:
         """Show or hide the enlarged room."""
         if self._large is not None:
             self._large.dispose()
@@ -330,7 +332,7 @@ class RobotPanel(OneRobotPanel):
             self._large.dispose()
             return
         if self._large is None:
-            self.enlarge()
+            self.toggle_enlarged()
         if self._large is not None:
             self._large.toggle_full_screen()
 
@@ -341,7 +343,7 @@ class RobotPanel(OneRobotPanel):
         self.large.set_icon("maximize-2")
         self.view.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _change(self, change: Mapping[str, object], robot: str = "") -> None:
+    def _change_world(self, change: Mapping[str, object], robot: str = "") -> None:
         if robot or self._robot:
             with suppress(UnknownRobotError):
                 self.session.fleet.change_world(robot or self._robot, change)

@@ -18,12 +18,12 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.robot_drawing.bubble import paint_caption
-from app.ui.robot_drawing.scene import TURTLE, Marks, RobotDrawing
+from app.ui.robot_drawing.scene import TURTLE_FIGURE, Marks, RobotDrawing
 from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.keyboard import has_no_modifiers
 from nep.i18n import _
 
 TOUCHABLE_PARTS = ("head", "left_hand", "right_hand")
@@ -66,7 +66,7 @@ class RoomView(QWidget):
     bumper_pressed = Signal(str, str)  # robot, side of the bumper
     removed = Signal(str)  # thing
     menu_requested = Signal(str, QPoint)  # thing or "", position on the screen
-    enlarged = Signal()
+    enlarge_requested = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -267,14 +267,14 @@ class RoomView(QWidget):
 
     def _has_bumper(self, part: str | None) -> bool:
         robot = self._robot(part)
-        return robot is not None and robot.figure == TURTLE
+        return robot is not None and robot.figure == TURTLE_FIGURE
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         part = self._part_at(event.position())
         if part is not None and (split(part)[1] in TOUCHABLE_PARTS or self._has_bumper(part)):
             self.mousePressEvent(event)  # second press of a fast double click
         elif event.button() == Qt.MouseButton.LeftButton:
-            self.enlarged.emit()
+            self.enlarge_requested.emit()
 
     def leaveEvent(self, _event: object) -> None:
         if self._pressed is None:
@@ -317,7 +317,7 @@ class RoomView(QWidget):
             self._move(self.chosen, where[0] + ahead * step, where[1] + aside * step)
         elif key in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and self._thing(self.chosen) is not None:
             self.removed.emit(self.chosen)
-        elif key in PRESS_KEYS and self._has_bumper(self._keyboard_target()) and is_plain(event):
+        elif key in PRESS_KEYS and self._has_bumper(self._keyboard_target()) and has_no_modifiers(event):
             if not event.isAutoRepeat():
                 self.bumper_pressed.emit(split(self.chosen or "")[0], "front")
         else:
@@ -328,8 +328,8 @@ class RoomView(QWidget):
         return self.chosen or BODY
 
     def _touch_with_key(self, event: QKeyEvent, key: Qt.Key) -> None:
-        part = TOUCH_KEYS.get(key) if is_plain(event) else None
-        if key in PRESS_KEYS and is_plain(event) and self._robot(self._keyboard_target()) is not None:
+        part = TOUCH_KEYS.get(key) if has_no_modifiers(event) else None
+        if key in PRESS_KEYS and has_no_modifiers(event) and self._robot(self._keyboard_target()) is not None:
             part = "head"
         if part is None:
             event.ignore()

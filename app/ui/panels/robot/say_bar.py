@@ -13,7 +13,7 @@ from app.robots.description.description import Event, Robot
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import IconButton, SearchField
-from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.keyboard import has_no_modifiers
 from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _
 
@@ -22,7 +22,7 @@ HEARD_EVENT = "heard"
 MAX_ENTRIES = 24
 MAX_WIDTH = 720
 """Maximum width of the speech field in px, which is reached in the enlarged room."""
-Awaited: TypeAlias = Callable[[Event, str], Sequence[str]]
+AwaitedValuesGetter: TypeAlias = Callable[[Event, str], Sequence[str]]
 SimulatedEvent: TypeAlias = dict[str, object]
 
 
@@ -56,7 +56,7 @@ class SayField(SearchField):
             self.submitted.emit(self._last)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key = event.key() if is_plain(event) else None
+        key = event.key() if has_no_modifiers(event) else None
         if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.submit(self.text())
         elif key == Qt.Key.Key_Up and not self.text():
@@ -81,7 +81,7 @@ class SayBar(QWidget):
     speech_submitted = Signal(str)
     event_simulated = Signal(object)  # `SimulatedEvent`, in the format of a virtual robot's world
 
-    def __init__(self, theme: Theme, awaited: Awaited) -> None:
+    def __init__(self, theme: Theme, awaited: AwaitedValuesGetter) -> None:
         super().__init__()
         self._theme, self._awaited = theme, awaited
         self._robot: Robot | None = None
@@ -159,7 +159,7 @@ class SayBar(QWidget):
         open_below(menu, anchor)
 
 
-def _entries(event: Event, awaited: Awaited) -> Iterator[tuple[str, str, SimulatedEvent]]:
+def _entries(event: Event, awaited: AwaitedValuesGetter) -> Iterator[tuple[str, str, SimulatedEvent]]:
     # One entry per value, such as "head is touched" and "left hand is touched".
     if not event.filters:
         yield _event_text(event, {}), event.icon, {"happen": event.name}

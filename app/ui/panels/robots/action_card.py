@@ -30,8 +30,8 @@ from nep.i18n import _, lazy
 if TYPE_CHECKING:
     from app.core.robots.robot_link import Invocation
 
-MOVES = lazy("moves the robot")
-RISKS = {"moves": MOVES, "locomotes": MOVES}
+MOVES_TEXT = lazy("moves the robot")
+RISK_TEXTS = {"moves": MOVES_TEXT, "locomotes": MOVES_TEXT}
 
 
 class ActionCard(Card):
@@ -72,7 +72,7 @@ class ActionCard(Card):
         self.form.changed.connect(self._update_summary)
         self.title = label(action.title[:1].upper() + action.title[1:], "card", wrap=True)
         self.summary = ElidedLabel("bodyLarge", "textSecondary")
-        self.risk = Chip(theme, _(RISKS.get(action.risk or "", "")), "warn")
+        self.risk = Chip(theme, _(RISK_TEXTS.get(action.risk or "", "")), "warn")
         self.words = ElidedLabel("body", "textSecondary", 60)
         self.left = label("", "body", role="textTertiary")
         self.result = Chip(theme)
@@ -195,7 +195,7 @@ class ActionCard(Card):
         self.set_highlighted(self.border == "accent")
         share, words, left = None, "", ""
         if invocation is not None and self._running:
-            share = progress_of(self.action, self._given or invocation.given, invocation.feedback)
+            share = progress_of(self.action, self._given or invocation.input, invocation.feedback)
             words = state_text(self.action, invocation, self._title_of)
             left = remaining_text(invocation)
         self.progress.setVisible(share is not None)

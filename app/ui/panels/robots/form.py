@@ -17,12 +17,12 @@ from app.ui.panels.robots.input_text import input_summary
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Segments, label
-from app.ui.widgets.inputs.fields import LongText
+from app.ui.widgets.inputs.fields import LongTextField
 from nep.i18n import _
 
 LABEL_WIDTH = 92
 ROW_GAP = 10
-TALL_ROW = 60  # px; in taller rows the label is vertically centred
+MIN_TALL_ROW_HEIGHT = 60  # px; in taller rows the label is vertically centred
 
 
 class ActionForm(QWidget):
@@ -74,11 +74,11 @@ class ActionForm(QWidget):
         column.addWidget(self.more)
         column.addWidget(self.problem)
         for parameter in sorted(action.parameters, key=lambda one: one.advanced):
-            self._add(parameter, options(parameter.options_from) if parameter.options_from else ())
+            self._add_row(parameter, options(parameter.options_from) if parameter.options_from else ())
         self.more.setVisible(any(parameter.advanced for parameter in action.parameters))
         self._show_advanced(False)
 
-    def _add(self, parameter: Parameter, options: Sequence[str]) -> None:
+    def _add_row(self, parameter: Parameter, options: Sequence[str]) -> None:
         control = control_for(self._theme, parameter, options, self._pictures)
         # not plain text: with a buddy, "&" would define a mnemonic
         words = plain.escape_menu_text(sentence_case(parameter.title))
@@ -93,7 +93,7 @@ class ActionForm(QWidget):
         inside.addWidget(control.widget)
         inside.addWidget(wrong)
         control.widget.setMinimumHeight(ROW_HEIGHT)
-        self._heights[name] = max(ROW_HEIGHT, min(TALL_ROW, control.widget.sizeHint().height()))
+        self._heights[name] = max(ROW_HEIGHT, min(MIN_TALL_ROW_HEIGHT, control.widget.sizeHint().height()))
         self._position_row(2 * len(self._rows), name, cell)
         self.controls[parameter.name] = control
         self._sentences[parameter.name] = wrong
@@ -183,7 +183,7 @@ class ActionForm(QWidget):
     def _show_errors_of(self, parameter: Parameter, said: Sequence[str]) -> None:
         control = self.controls[parameter.name]
         self._set_errors(self._sentences[parameter.name], () if control.error_text else said)
-        self._mark(control.widget, wrong=bool(said or control.error_text))
+        self._set_invalid(control.widget, wrong=bool(said or control.error_text))
         if said and parameter.advanced:
             self.more.setChecked(True)
 
@@ -191,8 +191,8 @@ class ActionForm(QWidget):
         place.setText(" ".join(f"{sentence_case(one)}." for one in sentences))
         place.setVisible(bool(sentences))
 
-    def _mark(self, widget: QWidget, *, wrong: bool) -> None:
-        if isinstance(widget, LongText):
+    def _set_invalid(self, widget: QWidget, *, wrong: bool) -> None:
+        if isinstance(widget, LongTextField):
             widget.set_invalid(wrong=wrong)
             return
         for field in [widget, *widget.findChildren(QLineEdit)]:

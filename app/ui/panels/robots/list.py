@@ -17,7 +17,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Card, label, paint
 from app.ui.widgets.buttons import PaintedButton
-from app.ui.widgets.indicators import ROBOT_STATUS, Chip
+from app.ui.widgets.indicators import STATUS_BY_ROBOT_STATE, Chip
 from app.ui.widgets.menus import Menu
 from nep.i18n import _
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from app.core.robots.known import KnownRobot
     from app.core.robots.robot_link import RobotLink
 
-TURTLE = "diffdrive"
+TURTLE_KIND = "diffdrive"
 LIST_WIDTH = 300
 
 
@@ -65,10 +65,10 @@ class RobotItem(PaintedButton):
             link: Link to the robot.
             seen: Text with the time when the robot was last seen, shown while it is disconnected.
         """
-        where = _("virtual, this computer") if link.virtual else link.robot.title
+        where = _("virtual, this computer") if link.is_virtual else link.robot.title
         away = not link.is_connected
         self._show(link.state, seen if away and seen else where, away=away)
-        self.may_be_forgotten = self._away and not link.virtual
+        self.may_be_forgotten = self._away and not link.is_virtual
 
     def show_disconnected(self, seen: str) -> None:
         """Show a robot of an earlier session that is not connected. A click opens its context menu.
@@ -83,7 +83,7 @@ class RobotItem(PaintedButton):
 
     def _show(self, state: str, where: str, *, away: bool) -> None:
         said = _(STATE_LABELS[state])
-        self.chip.set(said, ROBOT_STATUS[state])
+        self.chip.set(said, STATUS_BY_ROBOT_STATE[state])
         self.where, self._away = where, away
         self.setAccessibleName(f"{self.name}, {where}, {said}")
         self.update()
@@ -142,9 +142,9 @@ class RobotList(QWidget):
         self._column.setContentsMargins(8, 8, 8, 8)
         self._column.setSpacing(2)
         self._column.addStretch(1)
-        self._column.addWidget(self._make_help(run))
+        self._column.addWidget(self._make_help_button(run))
 
-    def _make_help(self, run: Callable[[str], object]) -> QWidget:
+    def _make_help_button(self, run: Callable[[str], object]) -> QWidget:
         card = Card(self._theme, fill="sunken")
         column = QVBoxLayout(card)
         column.setContentsMargins(14, 12, 14, 12)
@@ -174,7 +174,7 @@ class RobotList(QWidget):
         """
         self._known = {robot.name: robot for robot in fleet.known.robots}
         links = [
-            link for link in fleet.links if link.is_connected or link.virtual or link.name in self._known
+            link for link in fleet.links if link.is_connected or link.is_virtual or link.name in self._known
         ]
         names = [link.name for link in links]
         self._show(links, [robot for name, robot in self._known.items() if name not in names])
@@ -182,7 +182,7 @@ class RobotList(QWidget):
 
     def last_seen_text(self, name: str) -> str:
         """Return the text with the time when a robot was last seen; "" for unknown and virtual robots."""
-        return seen_text(self._known[name].seen_s) if name in self._known else ""
+        return seen_text(self._known[name].last_connected_s) if name in self._known else ""
 
     def _show(self, links: Sequence[RobotLink], away: Sequence[KnownRobot]) -> None:
         gone = {robot.name: robot for robot in away}
@@ -200,8 +200,10 @@ class RobotList(QWidget):
                 item = self._make_item(robot.name, len(self.items) + len(self.away))
                 item.clicked.connect(partial(self._open_menu_below, item))
                 self.away[robot.name] = item
-            self.away[robot.name].show_disconnected(seen_text(robot.seen_s))
-        self.turtle.setVisible(not any(link.robot.model == TURTLE and link.is_connected for link in links))
+            self.away[robot.name].show_disconnected(seen_text(robot.last_connected_s))
+        self.turtle.setVisible(
+            not any(link.robot.model == TURTLE_KIND and link.is_connected for link in links)
+        )
 
     def _make_item(self, name: str, place: int) -> RobotItem:
         item = RobotItem(self._theme, name)

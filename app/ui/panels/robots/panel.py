@@ -20,7 +20,7 @@ from app.core.robots.motion.permission import MayNotMoveError
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import AppError, InputProblem, RobotInputError
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.panels.no_robot import NoRobotState
+from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robots.action_card import ActionCard
 from app.ui.panels.robots.list import LIST_WIDTH, RobotList
@@ -29,7 +29,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, ElidedLabel, EmptyAction, EmptyState, SearchField, Separator, label
 from app.ui.widgets.file_dialogs import FileDialogs
 from app.ui.widgets.flow_layout import Flow
-from app.ui.widgets.indicators import ROBOT_STATUS
+from app.ui.widgets.indicators import STATUS_BY_ROBOT_STATE
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from nep.i18n import _, lazy, ngettext
 
@@ -39,14 +39,14 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
     from app.core.session import Session
 
-EXPANDED_CARDS = 4
+EXPANDED_CARD_COUNT = 4
 LIST_MIN_WIDTH = 760
 FINDER_MIN_WIDTH, ABOUT_MIN_WIDTH = 620, 440
 FINDER_WIDTH = 180
 PICTURE_CODEC = "image"
 
 
-class RobotHead(QWidget):
+class RobotHeader(QWidget):
     """Header with name and state of the selected robot, a search field for actions, and a Stop button."""
 
     def __init__(self, theme: Theme) -> None:
@@ -88,7 +88,7 @@ class SessionImageSource:
             t.name for t in self._session.live.topics if t.codec == PICTURE_CODEC and t.gone_s is None
         )
 
-    def stream(self, topic: str) -> ImageStream:
+    def open_stream(self, topic: str) -> ImageStream:
         """Subscribe to the images of a topic; the caller closes the stream."""
         made = self._session.live.images.stream(topic)
         self._opened = [*self.streams, made]
@@ -130,7 +130,7 @@ class RobotsPanel(OneRobotPanel):
             _("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot", is_primary=True
         )
         self.empty = EmptyState(theme, "bot", title, text, [start])
-        self._no_robot = NoRobotState(self.empty, title, text, [start])
+        self._no_robot = NoRobotController(self.empty, title, text, [start])
         self._no_robot.set_starting(self.session.starting_robots)
         self.list = RobotList(theme, self.context.run)
         self.list.selected.connect(self.select_robot)
@@ -139,10 +139,10 @@ class RobotsPanel(OneRobotPanel):
         self._list_line = Separator(theme, upright=True)
         right = QVBoxLayout()
         right.setSpacing(0)
-        self.head = head = RobotHead(theme)
+        self.head = head = RobotHeader(theme)
         self.name, self.chip, self.about = head.name, head.chip, head.about
         self.finder, self.stop = head.finder, head.stop
-        self.finder.textChanged.connect(self._filter)
+        self.finder.textChanged.connect(self._apply_filter)
         self.stop.clicked.connect(lambda: self.session.runs.stop_robot(self._robot))
         right.addWidget(head)
         right.addWidget(Separator(theme))
@@ -239,7 +239,7 @@ class RobotsPanel(OneRobotPanel):
                 self.theme,
                 action,
                 self._options,
-                folded=place >= EXPANDED_CARDS,
+                folded=place >= EXPANDED_CARD_COUNT,
                 pictures=self._pictures,
                 title_of=lambda name: titles.get(name, name.replace("_", " ")),
             )
@@ -253,12 +253,12 @@ class RobotsPanel(OneRobotPanel):
         self.name.setText(link.name)
         self.stop.set_label(_("Stop {robot}").format(robot=link.name))
         count = len(actions)
-        if link.virtual:
+        if link.is_virtual:
             about = ngettext("virtual, {count} action", "virtual, {count} actions", count)
         else:
             about = ngettext("{count} action", "{count} actions", count)
         self.about.setText(about.format(count=group_digits(count)))
-        self._filter()
+        self._apply_filter()
 
     def _has_cards_of(self, link: RobotLink) -> bool:
         # Returns True if the typed input of the cards was kept.
@@ -280,7 +280,7 @@ class RobotsPanel(OneRobotPanel):
     def _show_link(self, link: RobotLink) -> None:
         self._make_forms()
         if self._has_changed("head", link.state, link.chip_text):
-            self.chip.set(link.state_label, ROBOT_STATUS[link.state])
+            self.chip.set(link.state_label, STATUS_BY_ROBOT_STATE[link.state])
         may_move = link.state in {NOT_STOPPED, STOPPING}
         for name, card in self.cards.items():
             made = link.invocations.get(name)
@@ -297,7 +297,7 @@ class RobotsPanel(OneRobotPanel):
             self._told[self._robot, name] = [str(item) for item in value]
         return self._told.get((self._robot, name), [])  # the last known values, while the watch is suspended
 
-    def _filter(self) -> None:
+    def _apply_filter(self) -> None:
         words = self.finder.text().casefold().split()
         shown = 0
         for name, card in self.cards.items():

@@ -79,18 +79,18 @@ def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[s
         feedback: Latest feedback by field name.
     """
     for name in RATIO_FIELDS:
-        share = _number(feedback.get(name))
+        share = _float_or_none(feedback.get(name))
         if share is not None:
             return _clamp_ratio(share)
     for field in action.feedback:
-        value = _number(feedback.get(field.name))
+        value = _float_or_none(feedback.get(field.name))
         if value is None:
             continue
         if field.unit == "%" or field.name in PERCENT_FIELDS:
             return _clamp_ratio(value / 100)
         asked = next(
             (
-                _number(given.get(one.name))
+                _float_or_none(given.get(one.name))
                 for one in action.parameters
                 if field.unit and one.unit == field.unit
             ),
@@ -113,13 +113,13 @@ def state_text(action: Action, made: Invocation, title_of: Callable[[str], str])
     if made.state == "sent":
         return _("sent")
     if made.state == "accepted":
-        if made.waits_for:
+        if made.awaited_actions:
             return _("waits for {actions}").format(
-                actions=format_list([title_of(name) for name in made.waits_for])
+                actions=format_list([title_of(name) for name in made.awaited_actions])
             )
-        if made.replaces:
+        if made.replaced_actions:
             return _("replaces {actions}").format(
-                actions=format_list([title_of(name) for name in made.replaces])
+                actions=format_list([title_of(name) for name in made.replaced_actions])
             )
         return _("sent")
     took = _("for {duration}").format(duration=seconds_text(made.elapsed_s))
@@ -158,7 +158,7 @@ def _as_sentence(words: str) -> str:
     return f"{words[:1].upper()}{words[1:]}{'' if words.endswith('.') or not words else '.'}"
 
 
-def _number(value: object) -> float | None:
+def _float_or_none(value: object) -> float | None:
     good = isinstance(value, (int, float)) and not isinstance(value, bool)
     return float(value) if good else None  # type: ignore[arg-type]
 
@@ -175,7 +175,7 @@ class TryRow(PaintedButton):
         self.made = made
         said, status, sentence = result_texts(made)
         self.when = time.strftime("%H:%M:%S", time.localtime(made.sent_at_s))
-        self.given = input_summary(action, made.given)
+        self.given = input_summary(action, made.input)
         told = output_text(action, made.output) if made.state == "succeeded" else ""
         self.result = f"{said}, {told}" if told else sentence.rstrip(".") or said
         self.status = status

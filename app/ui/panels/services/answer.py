@@ -106,7 +106,7 @@ def duration_cell(record: CallRecord) -> Cell:
 
 def clock_text(record: CallRecord) -> str:
     """Format the time of a call, such as "8:41:50"."""
-    then = dt.datetime.fromtimestamp(record.at_s, tz=dt.timezone.utc).astimezone()
+    then = dt.datetime.fromtimestamp(record.started_s, tz=dt.timezone.utc).astimezone()
     return then.strftime("%H:%M:%S").lstrip("0")
 
 
@@ -150,11 +150,11 @@ class ReplyView(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
-        column.addLayout(self._make_head())
+        column.addLayout(self._make_header())
         column.addWidget(self.pages, 1)
         self.show_record(None)
 
-    def _make_head(self) -> QBoxLayout:
+    def _make_header(self) -> QBoxLayout:
         # In a narrow panel the header wraps into two rows.
         ended, shown = QHBoxLayout(), QHBoxLayout()
         for row in (ended, shown):

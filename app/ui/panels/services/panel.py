@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 from app.core.run.acting.arming import Target
 from app.core.run.acting.calling import MAX_S, MIN_S, TIMEOUT_S, CallRecord
 from app.core.run.acting.json_text import JsonText, format_json, parse_json_text
-from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
+from app.ui.panels.armed_strip import ArmDurationMenu, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.row_actions import RowAction, copy_action, fill_menu
 from app.ui.panels.services.answer import ReplyView, clock_text, duration_cell
@@ -60,7 +60,7 @@ class ServicesPanel(PanelWidget):
         self.count = label("", "small", role="textSecondary")
         self.chips = [self.count]
         self.strip = ArmedStrip(context)
-        self._minutes = ArmedMinutes(self.theme, self, self.acting)
+        self._minutes = ArmDurationMenu(self.theme, self, self.acting)
         self.filter = FilterField(self.theme, _("Filter services"))
         self.filter.setMaximumWidth(16_777_215)
         self.list = ServiceList(self.theme)
@@ -95,7 +95,7 @@ class ServicesPanel(PanelWidget):
         self.timeout_s = TIMEOUT_S
 
     def _make_calls(self) -> None:
-        self.answer = ReplyView(self.theme, self.context.toast)
+        self.answer = ReplyView(self.theme, self.context.show_toast)
         columns: tuple[Column[CallRecord], ...] = (
             Column(
                 "at", lazy("Calls"), 88, lambda each: Cell(clock_text(each), role="textSecondary", mono=True)
@@ -139,7 +139,7 @@ class ServicesPanel(PanelWidget):
     def _arrange(self) -> None:
         self._sides = ListDetailView(
             self.theme,
-            (self.filter, self.list, self._right_side()),
+            (self.filter, self.list, self._make_right_side()),
             list_px=LIST_WIDTH_PX,
             list_high_px=LIST_HEIGHT_PX,
             narrow_px=SIDE_BY_SIDE_PX,
@@ -153,7 +153,7 @@ class ServicesPanel(PanelWidget):
         column.addWidget(self.strip)
         column.addWidget(self.pages, 1)
 
-    def _right_side(self) -> QWidget:
+    def _make_right_side(self) -> QWidget:
         head, fault, buttons = QHBoxLayout(), QHBoxLayout(), Flow(gap=10, row_gap=6)
         head.addWidget(self.name, 1)
         head.addWidget(self.way)
@@ -296,7 +296,7 @@ class ServicesPanel(PanelWidget):
 
     def _validate(self) -> None:
         fault = self._parse_text().fault
-        self.edit.mark(fault.line if fault is not None else 0)
+        self.edit.mark_line(fault.line if fault is not None else 0)
         said = fault.message if fault is not None else self._problem()
         self.sentence.setText(said)
         self.sentence.setVisible(bool(said))
@@ -383,7 +383,7 @@ class ServicesPanel(PanelWidget):
         self.calls.setCurrentIndex(self.calls_model.index(-1, -1))
         why_not = self.acting.call(self.service, self.text, self.timeout_s)
         if why_not:
-            self.context.toast(why_not)
+            self.context.show_toast(why_not)
         self.refresh()
 
     def _cancel_call(self) -> None:
@@ -415,12 +415,14 @@ class ServicesPanel(PanelWidget):
         menu.addAction(
             self.theme.icon("repeat"), _("Repeat the call"), lambda: self._set_text(record.request)
         )
-        menu.addAction(self.theme.icon("copy"), _("Copy the request"), lambda: self._copy(record.request))
+        menu.addAction(
+            self.theme.icon("copy"), _("Copy the request"), lambda: self._copy_request(record.request)
+        )
         menu.popup(at)
 
-    def _copy(self, text: str) -> None:
+    def _copy_request(self, text: str) -> None:
         QGuiApplication.clipboard().setText(text)
-        self.context.toast(_("Copied the request"))
+        self.context.show_toast(_("Copied the request"))
 
     # -- overrides ----------------------------------------------------------------------------------------
 
@@ -455,13 +457,13 @@ def _request_cell(record: CallRecord) -> Cell:
     except NepError:
         asked = None
     if isinstance(asked, Mapping):
-        words = ", ".join(f"{name} {_short(value)}" for name, value in asked.items()) or _("nothing")
+        words = ", ".join(f"{name} {_one_line(value)}" for name, value in asked.items()) or _("nothing")
     else:
         words = " ".join(record.request.split())
     return Cell(shortened(words, MAX_REQUEST_CHARS))
 
 
-def _short(value: object) -> str:
+def _one_line(value: object) -> str:
     return value if isinstance(value, str) else " ".join(format_json(value).split())
 
 

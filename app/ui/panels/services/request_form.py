@@ -13,7 +13,7 @@ from app.core.run.acting.json_text import parse_typed_value
 from app.robots.description.typed_number import TypedNumberError, parse_number
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Switch, label
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.i18n import _, lazy
 
 LABEL_WIDTH_PX = 80
@@ -83,7 +83,7 @@ class RequestForm(QWidget):
             self._rebuild(kinds)
         self._request = given
         for name, value in some.items():
-            self._show(name, value)
+            self._show_value(name, value)
         if not isinstance(request, Mapping):
             self.nothing.setText(_("The request must be an object with names and values. Edit it as JSON."))
         elif not given:
@@ -100,7 +100,7 @@ class RequestForm(QWidget):
             before if (before is not None and (before, kind) in WIDENING_KINDS) or before == "json" else kind
         )
 
-    def _show(self, name: str, value: object) -> None:
+    def _show_value(self, name: str, value: object) -> None:
         field, kind = self.fields[name], self._kinds[name]
         self.problems.pop(name, None)
         if isinstance(field, Switch):
@@ -112,7 +112,7 @@ class RequestForm(QWidget):
             field.hasFocus() and self._parse_value(name, field.text()) == (value,)
         ):
             field.setText(words)
-        self._mark(field, wrong=False)
+        self._set_invalid(field, wrong=False)
 
     def _rebuild(self, kinds: Mapping[str, str]) -> None:
         while (item := self._grid.takeAt(0)) is not None:
@@ -125,36 +125,36 @@ class RequestForm(QWidget):
             words = label(name, "body", role="textSecondary", wrap=True)
             words.setTextFormat(Qt.TextFormat.PlainText)
             words.setMinimumHeight(26)
-            field = self._field(name, kind)
+            field = self._make_field(name, kind)
             field.setAccessibleName(name)
             self._grid.addWidget(words, row, 0, Qt.AlignmentFlag.AlignTop)
             self._grid.addWidget(field, row, 1)
             self.fields[name] = field
 
-    def _field(self, name: str, kind: str) -> QLineEdit | Switch:
+    def _make_field(self, name: str, kind: str) -> QLineEdit | Switch:
         if kind == "bool":
             switch = Switch(self._theme, "")
             switch.clicked.connect(lambda: self._set_value(name, switch.isChecked()))
             return switch
         line = QLineEdit()
         line.setProperty("focusRadius", self._theme.radius("control"))
-        EditMenu(self._theme, line)
-        line.textEdited.connect(lambda text: self._typed(name, text))
+        ContextMenuFilter(self._theme, line)
+        line.textEdited.connect(lambda text: self._on_typed(name, text))
         return line
 
-    def _typed(self, name: str, text: str) -> None:
+    def _on_typed(self, name: str, text: str) -> None:
         meant = self._parse_value(name, text)
         field = self.fields[name]
         if meant is None:
             said = TYPE_ERRORS["separators" if self._has_separators(name, text) else self._kinds[name]]
             self.problems[name] = _(said).format(name=name, example="[1, 2]")
             if isinstance(field, QLineEdit):
-                self._mark(field, wrong=True)
+                self._set_invalid(field, wrong=True)
             self.typed.emit(dict(self._request))
         else:
             self.problems.pop(name, None)
             if isinstance(field, QLineEdit):
-                self._mark(field, wrong=False)
+                self._set_invalid(field, wrong=False)
             self._set_value(name, meant[0])
 
     def _parse_value(self, name: str, text: str) -> tuple[object] | None:
@@ -186,7 +186,7 @@ class RequestForm(QWidget):
         self.typed.emit(dict(self._request))
 
     @staticmethod
-    def _mark(field: QLineEdit, *, wrong: bool) -> None:
+    def _set_invalid(field: QLineEdit, *, wrong: bool) -> None:
         if (field.property("wrong") == "true") != wrong:
             field.setProperty("wrong", "true" if wrong else "false")
             field.style().unpolish(field)

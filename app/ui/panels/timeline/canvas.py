@@ -45,13 +45,13 @@ NARROW_NAMES_WIDTH, NARROW_FIGURES_WIDTH, NARROW_WIDTH = 120, 76, 560
 RULER_HEIGHT, LANE_HEIGHT, ROW_HEIGHT = 26, 24, 22
 DENSITY_HEIGHT, TICK_WIDTH = 10, 2
 MIN_ALPHA, MAX_ALPHA = 0.14, 0.76
-SPARSE_PX = 8
+MIN_LINE_SPACING_PX = 8
 """Average distance between messages in px above which each message is drawn as a line."""
 LABEL_SPACING_PX = 78
 MAX_BUCKETS = 4000
 GRIP_PX = 6
 FIELD_WIDTH = 180
-ICONS = {"image": "image", "json": "braces", "string": "type", "msgpack": "braces"}
+TOPIC_ICONS = {"image": "image", "json": "braces", "string": "type", "msgpack": "braces"}
 ZOOM_PER_WHEEL_UNIT = 1.0015
 
 
@@ -150,8 +150,8 @@ class TimelineCanvas(QAbstractScrollArea):
         """Request the message counts of the visible time range, which are computed in a background thread."""
         replay, scale = self._replay, self.scale
         if replay is not None and replay.densities is not None and scale is not None:
-            buckets = max(1, min(MAX_BUCKETS, round(self._plot().width())))
-            replay.densities.request(scale.begin_ns, scale.end_ns + 1, buckets)
+            buckets = max(1, min(MAX_BUCKETS, round(self._plot_rect().width())))
+            replay.densities.request(scale.start_ns, scale.end_ns + 1, buckets)
 
     # -- geometry -----------------------------------------------------------------------------------------
 
@@ -164,7 +164,7 @@ class TimelineCanvas(QAbstractScrollArea):
             visible_lanes(self._replay)
         )
 
-    def _plot(self) -> QRectF:
+    def _plot_rect(self) -> QRectF:
         # Area of the time axis, including the ruler.
         view = self.viewport()
         narrow = view.width() < self._theme.scaled(NARROW_WIDTH)
@@ -174,7 +174,7 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def x_of(self, at_ns: int) -> float:
         """Return the x coordinate of a time in ns since 1970."""
-        return self._x_mapper(self._plot())(at_ns)
+        return self._x_mapper(self._plot_rect())(at_ns)
 
     def _x_mapper(self, plot: QRectF) -> Callable[[int], float]:
         # Returns a closure for speed: each rendering maps thousands of times.
@@ -186,7 +186,7 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def time_at(self, x: float) -> int:
         """Return the time at an x coordinate, in ns since 1970."""
-        plot = self._plot()
+        plot = self._plot_rect()
         return self.scale.time((x - plot.left()) / plot.width()) if self.scale is not None else 0
 
     def topic_at(self, y: float) -> str:
@@ -245,7 +245,7 @@ class TimelineCanvas(QAbstractScrollArea):
         made.setDevicePixelRatio(ratio)
         made.fill(self._theme.colour("panel"))
         painter = QPainter(made)
-        plot = self._plot()
+        plot = self._plot_rect()
         painter.save()
         painter.setClipRect(QRectF(0, self._lanes_top(), self.viewport().width(), self.viewport().height()))
         first = int(self.verticalScrollBar().value() / self._row_height())
@@ -264,7 +264,7 @@ class TimelineCanvas(QAbstractScrollArea):
             return
         high = theme.scaled(RULER_HEIGHT)
         most = max(2, int(plot.width() / theme.scaled(LABEL_SPACING_PX)))
-        digits = 0 if scale.step_s(most) >= 1 else 3
+        digits = 0 if scale.mark_interval_s(most) >= 1 else 3
         font, ink = theme.font("small"), theme.colour("textSecondary")
         painter.setPen(QPen(theme.colour("border"), 1))
         for at_ns in scale.marks(most, by_clock=self.by_clock):
@@ -310,14 +310,14 @@ class TimelineCanvas(QAbstractScrollArea):
         lanes = visible_lanes(replay)
         if replay is None or replay.densities is None or RUNS not in lanes:
             return
-        plot, high = self._plot(), theme.scaled(LANE_HEIGHT)
+        plot, high = self._plot_rect(), theme.scaled(LANE_HEIGHT)
         top = theme.scaled(RULER_HEIGHT) + lanes.index(RUNS) * high
         event_lanes = EventLanes(theme, painter, plot, self._x_mapper(plot))
         painter.save()
         painter.setClipRect(QRectF(plot.left(), top, plot.width(), high))
         for span in replay.densities.spans.runs:
             if span.start_ns <= at_ns < span.end_ns:
-                event_lanes.paint_run(span, event_lanes.bar(span, top, high), "changedTint", "running")
+                event_lanes.paint_run(span, event_lanes.bar_rect(span, top, high), "changedTint", "running")
         painter.restore()
 
     def _paint_name(self, painter: QPainter, box: QRectF, icon: str, words: str, role: str) -> None:
@@ -340,7 +340,7 @@ class TimelineCanvas(QAbstractScrollArea):
             painter.fillRect(whole, theme.colour("selected"))
         known = replay.recorded_topics[topic]
         role = "selectedText" if is_chosen else "text"
-        icon = ICONS.get(known.codec, "binary")
+        icon = TOPIC_ICONS.get(known.codec, "binary")
         self._paint_name(painter, QRectF(0, top, plot.left(), self._row_height()), icon, topic, role)
         self._paint_density(painter, plot, top, topic, is_chosen=is_chosen)
         self._paint_losses(painter, plot, top, topic)
@@ -366,8 +366,8 @@ class TimelineCanvas(QAbstractScrollArea):
         painter.setClipRect(
             QRectF(plot.left(), top, plot.width(), self._row_height()), Qt.ClipOperation.IntersectClip
         )
-        if filled * SPARSE_PX < density.buckets:
-            per_px = box.width() / density.buckets
+        if filled * MIN_LINE_SPACING_PX < density.bucket_count:
+            per_px = box.width() / density.bucket_count
             for place, count in enumerate(counts):
                 if count:
                     painter.fillRect(
@@ -441,7 +441,7 @@ class TimelineCanvas(QAbstractScrollArea):
     def _paint_loop(self, painter: QPainter) -> None:
         if self._loop is None:
             return
-        plot, accent = self._plot(), self._theme.colour("accent")
+        plot, accent = self._plot_rect(), self._theme.colour("accent")
         left, right = (self.x_of(each) for each in self._loop)
         painter.save()
         painter.setClipRect(plot)
@@ -456,7 +456,7 @@ class TimelineCanvas(QAbstractScrollArea):
         painter.restore()
 
     def _paint_playhead(self, painter: QPainter) -> None:
-        plot, theme = self._plot(), self._theme
+        plot, theme = self._plot_rect(), self._theme
         x = self.x_of(self._position_ns)
         if self.scale is None or not plot.left() - 1 <= x <= plot.right() + 1:
             return
@@ -481,7 +481,7 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def _grip_at(self, at: QPointF) -> str:
         # Part that is dragged after a press at this position.
-        plot = self._plot()
+        plot = self._plot_rect()
         if not plot.left() - GRIP_PX <= at.x() <= plot.right() + GRIP_PX or self.scale is None:
             return ""
         if self._loop is not None and at.y() < self._theme.scaled(RULER_HEIGHT):
@@ -528,7 +528,7 @@ class TimelineCanvas(QAbstractScrollArea):
             self.rename_requested.emit(mark.bookmark)
             return
         topic = self.topic_at(event.position().y())
-        if topic and event.position().x() < self._plot().left():
+        if topic and event.position().x() < self._plot_rect().left():
             self.opened.emit(topic)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
@@ -576,7 +576,7 @@ class TimelineCanvas(QAbstractScrollArea):
     def wheelEvent(self, event: QWheelEvent) -> None:
         # Zooms if the mouse is above the time axis, scrolls if above the names.
         x, delta = event.position().x(), event.angleDelta()
-        if x < self._plot().left() or self.scale is None:
+        if x < self._plot_rect().left() or self.scale is None:
             super().wheelEvent(event)
         elif delta.x() and not delta.y():
             self.set_scale(self.scale.moved(-round(delta.x() / 1200 * self.scale.span_ns)))
@@ -601,7 +601,7 @@ class TimelineCanvas(QAbstractScrollArea):
             return mark.text if mark is not None else ""
         losses = replay.densities.losses.get(topic, ()) if replay.densities is not None else ()
         lost = sum(each.count for each in losses if abs(self.x_of(each.at_ns) - at.x()) <= GRIP_PX)
-        if at.x() >= self._plot().left() and lost:
+        if at.x() >= self._plot_rect().left() and lost:
             words = ngettext(
                 "{count} message of {topic} was lost here", "{count} messages of {topic} were lost here", lost
             )

@@ -24,7 +24,7 @@ LANE_LABELS = {
     ALARMS: ("bell", lazy("Alarms")),
 }
 """Icon and name of each lane."""
-RESULTS = {
+RESULT_STYLES = {
     "ended": ("circle-check", "ok", lazy("ended")),
     "stopped": ("square", "textSecondary", lazy("stopped")),
     "failed": ("circle-x", "error", lazy("failed")),
@@ -142,7 +142,7 @@ class EventLanes:
 
     # -- behaviours ---------------------------------------------------------------------------------------
 
-    def bar(self, span: RecordedSpan, top: float, high: float) -> QRectF:
+    def bar_rect(self, span: RecordedSpan, top: float, high: float) -> QRectF:
         """Return the rectangle of a run in a lane.
 
         Args:
@@ -154,7 +154,7 @@ class EventLanes:
         return QRectF(left, top + 3, max(MIN_MARK_WIDTH, right - left), high - 6)
 
     def _paint_run_mark(self, span: RecordedSpan, box: QRectF, start_ns: int) -> LaneMark:
-        bar = self.bar(span, box.top(), box.height())
+        bar = self.bar_rect(span, box.top(), box.height())
         self.paint_run(span, bar, "sunken", "controlBorder")
         return LaneMark(bar, span.start_ns, run_text(span, start_ns))
 
@@ -176,7 +176,7 @@ class EventLanes:
         font, side = theme.font("small"), theme.scaled(ICON_SIZE)
         self._paint_icon("blocks", inside.left(), inside, "textTertiary")
         inside.adjust(side + GAP, 0, 0, 0)
-        icon, role, result = RESULTS.get(span.result, ("", "", ""))
+        icon, role, result = RESULT_STYLES.get(span.result, ("", "", ""))
         words = span.details or (_(result) if result else "")
         wide = side + GAP + paint.width_of(font, words)
         name = min(paint.width_of(font, span.name), theme.scaled(MAX_NAME_WIDTH))
@@ -224,7 +224,7 @@ def alarm_text(span: RecordedSpan) -> str:
     """Format an alarm and, if known, its duration: "/distance: range is 0.36, below 0.4, 1.2 s"."""
     name = span.name.rstrip(".")
     name = f"{name[:1].upper()}{name[1:]}"
-    if not span.is_over:
+    if not span.has_ended:
         return name
     seconds = (span.end_ns - span.start_ns) / 1e9
     return _("{alarm}, {seconds} s").format(alarm=name, seconds=f"{seconds:.1f}")
@@ -237,13 +237,13 @@ def run_text(span: RecordedSpan, start_ns: int) -> str:
         span: Run.
         start_ns: Start of the recording, in ns since 1970.
     """
-    known = RESULTS.get(span.result)
+    known = RESULT_STYLES.get(span.result)
     words = span.details or (_(known[2]) if known is not None else "")
     return _with_times(f"{span.name}: {words}" if words else span.name, span, start_ns)
 
 
 def _with_times(words: str, span: RecordedSpan, start_ns: int) -> str:
     begin, end = (duration_text(each - start_ns, digits=1) for each in (span.start_ns, span.end_ns))
-    if not span.is_over:
+    if not span.has_ended:
         return _("{what}\nsince {begin}").format(what=words, begin=begin)
     return _("{what}\n{begin} to {end}").format(what=words, begin=begin, end=end)

@@ -12,14 +12,14 @@ from PySide6.QtGui import QAction, QKeyEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.recording.replay.replay import STEP_NS, Replay
-from app.ui.panels.armed_strip import ArmedMinutes
+from app.ui.panels.armed_strip import ArmDurationMenu
 from app.ui.panels.base import PanelContext, PanelWidget
 from app.ui.panels.row_actions import RowAction, fill_menu
 from app.ui.panels.timeline.canvas import TimelineCanvas
 from app.ui.panels.timeline.sending import ReplayStrip, SendChooser
 from app.ui.panels.timeline.transport import TransportRow
 from app.ui.widgets import Chip, EmptyAction, EmptyState, Segments, Separator
-from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.keyboard import has_no_modifiers
 from app.ui.widgets.menus import Menu
 from nep.errors import RecordingError
 from nep.i18n import _, pgettext
@@ -53,7 +53,7 @@ class TimelinePanel(PanelWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         self.strip, self.chooser = ReplayStrip(context), SendChooser(theme)
-        self._minutes = ArmedMinutes(theme, self, context.session.acting)
+        self._minutes = ArmDurationMenu(theme, self, context.session.acting)
         self._below = QStackedWidget()
         self._below.addWidget(self.canvas)
         self._below.addWidget(self.chooser)
@@ -68,11 +68,11 @@ class TimelinePanel(PanelWidget):
         self.canvas.opened.connect(self.context.open_topic)
         self.canvas.rename_requested.connect(self.rename_bookmark)
         self.canvas.menu_requested.connect(self._show_menu)
-        self.transport.bookmark_requested.connect(self._bookmark)
+        self.transport.bookmark_requested.connect(self._add_bookmark)
         self.transport.arm_requested.connect(self.show_send_chooser)
         self.strip.change_requested.connect(self.show_send_chooser)
         self.chooser.exited.connect(self._close_chooser)
-        self.chooser.arming_failed.connect(self.context.toast)
+        self.chooser.arming_failed.connect(self.context.show_toast)
         self._update_text()
 
     # -- display ------------------------------------------------------------------------------------------
@@ -157,12 +157,12 @@ class TimelinePanel(PanelWidget):
         self.canvas.by_clock = which == BY_CLOCK
         self.canvas.refresh_lanes()
 
-    def _bookmark(self) -> None:
+    def _add_bookmark(self) -> None:
         self.context.run("replay.bookmark")
 
     def event(self, event: QEvent) -> bool:
         # Within the panel, F2 and Delete apply to the bookmark at the playhead.
-        if isinstance(event, QKeyEvent) and event.key() in BOOKMARK_KEYS and is_plain(event):
+        if isinstance(event, QKeyEvent) and event.key() in BOOKMARK_KEYS and has_no_modifiers(event):
             if event.type() == QEvent.Type.ShortcutOverride and self._shown is not None:
                 event.accept()
                 return True
@@ -192,7 +192,7 @@ class TimelinePanel(PanelWidget):
             (NONE, Qt.Key.Key_BracketLeft): lambda: replay.set_loop_edge(is_start=True),
             (NONE, Qt.Key.Key_BracketRight): lambda: replay.set_loop_edge(is_start=False),
             (NONE, Qt.Key.Key_L): replay.toggle_loop,
-            (NONE, Qt.Key.Key_B): self._bookmark,
+            (NONE, Qt.Key.Key_B): self._add_bookmark,
             (NONE, Qt.Key.Key_Plus): lambda: self.canvas.zoom(1 / ZOOM_FACTOR),
             (SHIFT, Qt.Key.Key_Plus): lambda: self.canvas.zoom(1 / ZOOM_FACTOR),
             (NONE, Qt.Key.Key_Minus): lambda: self.canvas.zoom(ZOOM_FACTOR),
@@ -242,7 +242,7 @@ class TimelinePanel(PanelWidget):
         if mark is not None:
             do(mark)
         else:
-            self.context.toast(_("No bookmark at the playhead. Select one, or press B to add one"))
+            self.context.show_toast(_("No bookmark at the playhead. Select one, or press B to add one"))
 
     def _show_menu(self, mark: Bookmark, place: QPoint) -> None:
         # Context menu of a bookmark.
@@ -257,34 +257,40 @@ class TimelinePanel(PanelWidget):
     def rename_bookmark(self, mark: Bookmark) -> None:
         """Start editing the name of a bookmark in place."""
         replay = self._shown
-        if replay is not None and not self._rejects_note(mark):
+        if replay is not None and not self._reject_note(mark):
             self.canvas.rename(
-                mark, lambda name: self._try(lambda: replay.rename_bookmark(mark, name.strip()))
+                mark, lambda name: self._apply_change(lambda: replay.rename_bookmark(mark, name.strip()))
             )
 
     def delete_bookmark(self, mark: Bookmark) -> None:
         """Delete a bookmark; the toast offers to undo it."""
         replay = self._shown
-        if replay is None or self._rejects_note(mark) or not self._try(lambda: replay.remove_bookmark(mark)):
+        if (
+            replay is None
+            or self._reject_note(mark)
+            or not self._apply_change(lambda: replay.remove_bookmark(mark))
+        ):
             return
         words = _("Deleted the bookmark “{name}”").format(name=mark.name) if mark.name else ""
-        self.context.toast(
+        self.context.show_toast(
             words or _("Deleted the bookmark"),
             _("Undo"),
-            lambda: self._try(lambda: replay.restore_bookmark(mark)),
+            lambda: self._apply_change(lambda: replay.restore_bookmark(mark)),
         )
 
-    def _rejects_note(self, mark: Bookmark) -> bool:
+    def _reject_note(self, mark: Bookmark) -> bool:
         if mark.is_note:
-            self.context.toast(_("Notes added while recording are part of the file and can't be changed"))
+            self.context.show_toast(
+                _("Notes added while recording are part of the file and can't be changed")
+            )
         return mark.is_note
 
-    def _try(self, change: Callable[[], object]) -> bool:
+    def _apply_change(self, change: Callable[[], object]) -> bool:
         # Errors are shown in a toast.
         try:
             change()
         except RecordingError as error:
-            self.context.toast(_("Can't save the bookmark: {reason}").format(reason=error.reason))
+            self.context.show_toast(_("Can't save the bookmark: {reason}").format(reason=error.reason))
             return False
         except ValueError:  # already deleted
             return True

@@ -18,7 +18,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy, ngettext
@@ -34,7 +34,7 @@ class ReplayStrip(ArmedStrip):
         change_requested: The page for choosing topics should be shown.
     """
 
-    for_replay = True
+    is_for_replay = True
     change_requested = Signal()
 
     def __init__(self, context: PanelContext) -> None:
@@ -59,7 +59,7 @@ class ReplayStrip(ArmedStrip):
         going = self.sending.outbox.active_topics if self.sending is not None else ()
         if not going:
             return ""
-        count, skipped = sum(each.count for each in going), sum(each.skipped for each in going)
+        count, skipped = sum(each.count for each in going), sum(each.dropped_count for each in going)
         heard = max(each.subscriber_count for each in going)
         sent = ngettext("{count} sent", "{count} sent", count).format(count=group_digits(count))
         late = [late_text(skipped)] if skipped else []
@@ -120,7 +120,7 @@ class SendChooser(QWidget):
         self.name.setProperty("focusRadius", theme.radius("control"))
         self.name.setMinimumWidth(round(theme.scaled(NAME_WIDTH_PX) / 2))
         self.name.setMaximumWidth(round(theme.scaled(NAME_WIDTH_PX)))
-        EditMenu(theme, self.name)
+        ContextMenuFilter(theme, self.name)
         self.arm = Button(theme, _("Arm and send"), "lock", kind="primary", size="small")
         self.cancel = Button(theme, _("Cancel"), size="small")
         self.table.opened.connect(self._toggle)

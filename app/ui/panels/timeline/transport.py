@@ -13,13 +13,13 @@ from app.core.recording.replay.scale import clock_text, date_text, duration_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, Switch, ToggleButton, label
 from app.ui.widgets.flow_layout import Flow
-from app.ui.widgets.inputs.slider import Track
+from app.ui.widgets.inputs.slider import SliderTrack
 from app.ui.widgets.labels import set_role
 from nep.i18n import _
 from nep.recordings.player import SPEED_MAX, SPEED_MIN, PlayerStatus
 
-SPEED_STEPS = 40
-SLOW_RATIO = 0.97
+SPEED_STEP_COUNT = 40
+MIN_NORMAL_SPEED_RATIO = 0.97
 """Ratio of actual to requested speed below which the actual speed is displayed."""
 
 
@@ -43,9 +43,9 @@ class TransportRow(QWidget):
         self.play = Button(theme, _("Play"), "play", kind="primary")
         self.on = IconButton(theme, "step-forward", _("Next message of the selected topic"))
         self.next = IconButton(theme, "skip-forward", _("Next bookmark"), "Ctrl+Right")
-        self.speed = Track(theme, SPEED_STEPS)
+        self.speed = SliderTrack(theme, SPEED_STEP_COUNT)
         self.speed.setAccessibleName(_("Speed"))
-        self.speed.setValue(SPEED_STEPS // 2)
+        self.speed.setValue(SPEED_STEP_COUNT // 2)
         self.speed.setMaximumWidth(110)
         self.said = label("", "code", role="textSecondary")
         self.loop = ToggleButton(theme, _("Loop"), "repeat")
@@ -82,19 +82,21 @@ class TransportRow(QWidget):
 
     def _connect(self) -> None:
         self.armed.clicked.connect(self._request_arming)
-        self.previous.clicked.connect(lambda: self._with_replay(lambda replay: replay.skip(forward=False)))
-        self.next.clicked.connect(lambda: self._with_replay(lambda replay: replay.skip(forward=True)))
-        self.back.clicked.connect(lambda: self._with_replay(lambda replay: replay.step(forward=False)))
-        self.on.clicked.connect(lambda: self._with_replay(lambda replay: replay.step(forward=True)))
-        self.play.clicked.connect(lambda: self._with_replay(Replay.toggle))
-        self.loop.clicked.connect(lambda: self._with_replay(Replay.toggle_loop))
+        self.previous.clicked.connect(
+            lambda: self._apply_to_replay(lambda replay: replay.skip(forward=False))
+        )
+        self.next.clicked.connect(lambda: self._apply_to_replay(lambda replay: replay.skip(forward=True)))
+        self.back.clicked.connect(lambda: self._apply_to_replay(lambda replay: replay.step(forward=False)))
+        self.on.clicked.connect(lambda: self._apply_to_replay(lambda replay: replay.step(forward=True)))
+        self.play.clicked.connect(lambda: self._apply_to_replay(Replay.toggle))
+        self.loop.clicked.connect(lambda: self._apply_to_replay(Replay.toggle_loop))
         self.bookmark.clicked.connect(self.bookmark_requested)
         self.speed.valueChanged.connect(
-            lambda step: self._with_replay(lambda replay: replay.set_speed(speed_of(step)))
+            lambda step: self._apply_to_replay(lambda replay: replay.set_speed(speed_of(step)))
         )
-        self.speed.reset.connect(lambda: self.speed.setValue(SPEED_STEPS // 2))
+        self.speed.reset.connect(lambda: self.speed.setValue(SPEED_STEP_COUNT // 2))
 
-    def _with_replay(self, what: Callable[[Replay], object]) -> None:
+    def _apply_to_replay(self, what: Callable[[Replay], object]) -> None:
         if self._replay is not None:
             what(self._replay)
 
@@ -130,8 +132,8 @@ class TransportRow(QWidget):
         return _("Loop {begin} to {end}").format(begin=begin, end=end)
 
     def _update_speed(self, player: PlayerStatus) -> None:
-        asked, true = player.speed, player.true_speed
-        is_slow = player.is_playing and true is not None and true < SLOW_RATIO * asked
+        asked, true = player.speed, player.measured_speed
+        is_slow = player.is_playing and true is not None and true < MIN_NORMAL_SPEED_RATIO * asked
         if is_slow:
             words = _("requested {asked}, actual {true} \u00d7").format(
                 asked=f"{asked:.3g}", true=f"{true:.2g}"
@@ -145,11 +147,13 @@ class TransportRow(QWidget):
 
 def speed_of(step: int) -> float:
     """Return the speed for a slider step: 0.1 at the left end, 1 in the middle, 10 at the right end."""
-    return round(SPEED_MIN * exp(log(SPEED_MAX / SPEED_MIN) * step / SPEED_STEPS), 2)
+    return round(SPEED_MIN * exp(log(SPEED_MAX / SPEED_MIN) * step / SPEED_STEP_COUNT), 2)
 
 
 def step_of(speed: float) -> int:
     """Return the slider step for a speed, rounded to the nearest step."""
     return round(
-        log10(max(SPEED_MIN, min(SPEED_MAX, speed)) / SPEED_MIN) / log10(SPEED_MAX / SPEED_MIN) * SPEED_STEPS
+        log10(max(SPEED_MIN, min(SPEED_MAX, speed)) / SPEED_MIN)
+        / log10(SPEED_MAX / SPEED_MIN)
+        * SPEED_STEP_COUNT
     )

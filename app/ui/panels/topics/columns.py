@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from app.core.network.topic_tree import TopicFolder, TreeRow, parts_of_name
+from app.core.network.topic_tree import TopicFolder, TreeRow, split_name
 from app.core.networks.kinds import NetworkKind, find_kind
 from app.ui.text.numbers import age_text, bandwidth_text, group_digits, rate_text
 from app.ui.widgets.table.model import Cell, Column
@@ -15,7 +15,7 @@ from nep.i18n import _, lazy, ngettext, number, pgettext
 if TYPE_CHECKING:
     from app.core.network.topics import Topic
 
-ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
+TOPIC_ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
 
 
 def _text_role(topic: Topic, role: str) -> str:
@@ -33,7 +33,7 @@ def name_cell(topic: Topic) -> Cell:
     gone = topic.gone_s is not None
     chip = pgettext("topic", "new") if topic.is_new and not gone else None
     return Cell(
-        topic.name, role=_text_role(topic, "text"), mono=True, bold=bool(chip), struck=gone, chip=chip
+        topic.name, role=_text_role(topic, "text"), mono=True, bold=bool(chip), is_struck_out=gone, chip=chip
     )
 
 
@@ -47,7 +47,7 @@ def network_cell(topic: Topic) -> Cell:
 
 def type_cell(topic: Topic) -> Cell:
     """Return the cell with icon and last part of the type; the tooltip has the full type."""
-    icon = ICONS.get(topic.codec) or ICONS.get(topic.msg_type, "box")
+    icon = TOPIC_ICONS.get(topic.codec) or TOPIC_ICONS.get(topic.msg_type, "box")
     return Cell(topic.msg_type.rpartition("/")[2], icon, _text_role(topic, "textTertiary"))
 
 
@@ -145,7 +145,7 @@ def _displayed_tip(topic: Topic) -> str:
     # Shown only if messages were dropped before they reached the panels.
     if not (topic.dropped or topic.missed):
         return ""
-    shown, sent = topic.displayed_and_sent
+    shown, sent = topic.displayed_and_sent_counts
     return _("{shown} of {sent} messages shown").format(shown=group_digits(shown), sent=group_digits(sent))
 
 
@@ -262,23 +262,23 @@ COLUMNS: tuple[Column[Topic], ...] = (
 )
 
 
-NETWORK = Column("network", lazy("Network"), 84, network_cell, lambda t: t.network, tip=_network_tip)
+NETWORK_COLUMN = Column("network", lazy("Network"), 84, network_cell, lambda t: t.network, tip=_network_tip)
 INDENT, CHEVRON = 14, 19
 """Indentation of each level of the tree, and width of the arrow of a folder, in px."""
 
 
-def _folder_name(folder: TopicFolder) -> Cell:
+def _folder_name_cell(folder: TopicFolder) -> Cell:
     icon = "chevron-down" if folder.is_open else "chevron-right"
     return Cell(f"{folder.name}/", icon, mono=True, indent=folder.depth * INDENT)
 
 
-def _folder_type(folder: TopicFolder) -> Cell:
+def _folder_type_cell(folder: TopicFolder) -> Cell:
     count = len(folder.topics)
     words = ngettext("{count} topic", "{count} topics", count).format(count=group_digits(count))
     return Cell(words, role="textTertiary")
 
 
-def _folder_loss(folder: TopicFolder) -> Cell:
+def _folder_loss_cell(folder: TopicFolder) -> Cell:
     lost = folder.stats.lost
     if not lost:
         return Cell() if lost is None else Cell("0")
@@ -300,12 +300,12 @@ def _sum_tip(folder: TopicFolder) -> str:
 FolderColumn = tuple[
     Callable[[TopicFolder], Cell], Callable[[TopicFolder], object], Callable[[TopicFolder], str] | None
 ]
-FOLDERS: dict[str, FolderColumn] = {
-    "topic": (_folder_name, lambda f: f.path.casefold(), lambda f: f.path),
+FOLDER_COLUMNS: dict[str, FolderColumn] = {
+    "topic": (_folder_name_cell, lambda f: f.path.casefold(), lambda f: f.path),
     "network": (
         lambda f: network_cell(f.topics[0]), lambda f: f.network, lambda f: _network_tip(f.topics[0])
     ),
-    "type": (_folder_type, lambda _f: "", None),
+    "type": (_folder_type_cell, lambda _f: "", None),
     "rate": (lambda f: Cell(rate_text(f.stats.rate_hz)), lambda f: f.stats.rate_hz, _sum_tip),
     "bandwidth": (
         lambda f: Cell(bandwidth_text(f.stats.bandwidth_Bps)), lambda f: f.stats.bandwidth_Bps, _sum_tip
@@ -315,12 +315,12 @@ FOLDERS: dict[str, FolderColumn] = {
         lambda f: f.stats.age_s,
         lambda f: _("Newest message in {folder}").format(folder=f.path),
     ),
-    "loss": (_folder_loss, lambda _f: None, _folder_loss_tip),
+    "loss": (_folder_loss_cell, lambda _f: None, _folder_loss_tip),
 }  # fmt: skip
 """Cell, sort key and tooltip for folders, by column; the other columns are empty for folders."""
 
 
-BLANK: FolderColumn = (lambda _f: Cell(), lambda _f: None, None)
+BLANK_FOLDER_COLUMN: FolderColumn = (lambda _f: Cell(), lambda _f: None, None)
 
 
 def _with_folders(column: Column[Topic], of_folder: FolderColumn) -> Column[TreeRow]:
@@ -349,7 +349,9 @@ def _with_folders(column: Column[Topic], of_folder: FolderColumn) -> Column[Tree
     )
 
 
-COMMON_COLUMNS = tuple(_with_folders(column, FOLDERS.get(column.name, BLANK)) for column in COLUMNS[1:])
+COMMON_COLUMNS = tuple(
+    _with_folders(column, FOLDER_COLUMNS.get(column.name, BLANK_FOLDER_COLUMN)) for column in COLUMNS[1:]
+)
 """Columns that do not depend on the arguments of `columns`."""
 
 
@@ -370,18 +372,18 @@ def columns(
             cell = replace(cell, bold=False, chip=None)
         if not as_tree():
             return cell
-        parts = parts_of_name(topic.name)
+        parts = split_name(topic.name)
         return replace(cell, text=parts[-1], indent=(len(parts) - 1) * INDENT + CHEVRON)
 
     def folder_name_cell(folder: TopicFolder) -> Cell:
-        cell = _folder_name(folder)
+        cell = _folder_name_cell(folder)
         fresh = not folder.is_open and any(
             topic.is_new and topic.gone_s is None and not own(topic) for topic in folder.topics
         )
         return replace(cell, chip=pgettext("topic", "new")) if fresh else cell
 
     first = _with_folders(
-        replace(COLUMNS[0], cell=topic_name_cell), (folder_name_cell, *FOLDERS["topic"][1:])
+        replace(COLUMNS[0], cell=topic_name_cell), (folder_name_cell, *FOLDER_COLUMNS["topic"][1:])
     )
-    network = _with_folders(replace(NETWORK, is_available=several), FOLDERS["network"])
+    network = _with_folders(replace(NETWORK_COLUMN, is_available=several), FOLDER_COLUMNS["network"])
     return (first, network, *COMMON_COLUMNS)

@@ -19,7 +19,7 @@ from app.ui.panels.table_panel import TableTexts
 from app.ui.panels.topics.columns import columns
 from app.ui.text.numbers import group_digits
 from app.ui.widgets import ElidedLabel, EmptyAction, IconButton
-from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.keyboard import has_no_modifiers
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _, format_list, lazy, ngettext
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from app.core.network.topics import Topic
     from app.core.networks.kinds import NetworkKind
 
-FOOT = lazy("Rates are reported by the publishers; Studio subscribes only to the topics you open")
-FOOT_OF_NETWORKS = lazy(
+FOOTER_TEXT = lazy("Rates are reported by the publishers; Studio subscribes only to the topics you open")
+NETWORKS_FOOTER_TEXT = lazy(
     "Rates are reported by the publishers. {networks} report neither rates nor losses; Studio "
     "measures the topics you open there"
 )
-RECORDED_FOOT = lazy("Recorded values; ages are relative to the playhead")
+RECORDED_FOOTER_TEXT = lazy("Recorded values; ages are relative to the playhead")
 TABLE_TEXTS = TableTexts(
     title=lazy("Topics"),
     filter=lazy("Filter topics"),
@@ -46,7 +46,7 @@ TABLE_TEXTS = TableTexts(
 STATS_UPDATE_TICKS = 6  # refreshes at 30 Hz; faster changes would be illegible
 SORT_TICKS = 30
 CHANGING_COLUMNS = frozenset({"rate", "bandwidth", "age", "loss"})
-MAX_CLOSED = 1000
+MAX_COLLAPSED_FOLDERS = 1000
 """Maximum number of collapsed folders to save in a layout."""
 
 
@@ -62,7 +62,7 @@ class TopicsTable(TableView[TreeRow]):
     """True while folders are shown; otherwise Left and Right have their default behaviour."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key = self.selected_key() if self.shows_folders and is_plain(event) else None
+        key = self.selected_key() if self.shows_folders and has_no_modifiers(event) else None
         if event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right} and key is not None:
             self.keyboard = True
             self.expand_requested.emit(key, event.key() == Qt.Key.Key_Right)
@@ -145,8 +145,8 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self.show_table(bool(rows), bool(words))
         self.show_networks()
         recorded = self.session.replay is not None
-        kinds = [network.kind for network in self.session.networks.selected]
-        self.foot.setText(_(RECORDED_FOOT) if recorded else _foot(kinds))
+        kinds = [network.kind for network in self.session.networks.selected_networks]
+        self.foot.setText(_(RECORDED_FOOTER_TEXT) if recorded else _footer_text(kinds))
         self.foot.setVisible(bool(rows))
         self.line.setVisible(bool(rows))
 
@@ -212,18 +212,18 @@ class TopicsPanel(NetworkTable[TreeRow]):
         folder = self._folder(key)
         if folder is None or (is_open is False and not folder.is_open):
             if is_open is False:
-                self._go_up(key)
+                self._select_parent(key)
             return
         if is_open is None:
             is_open = not folder.is_open
         if is_open:
             self._closed.discard(key)
-        elif len(self._closed) < MAX_CLOSED and not self.filter_words():
+        elif len(self._closed) < MAX_COLLAPSED_FOLDERS and not self.filter_words():
             self._closed.add(key)
         self.rebuild()
         self.table.select_key(key)
 
-    def _go_up(self, key: str) -> None:
+    def _select_parent(self, key: str) -> None:
         network, name = split_key(key)
         above = folders_above(name.removesuffix("/*"), network)
         if self._tree is not None and above:
@@ -232,7 +232,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
     def _set_all_expanded(self, *, is_open: bool) -> None:
         self._closed.clear()
         if not is_open and self._tree is not None:
-            self._closed.update(folder.key for folder in list(self._tree)[:MAX_CLOSED])
+            self._closed.update(folder.key for folder in list(self._tree)[:MAX_COLLAPSED_FOLDERS])
         self.rebuild()
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
@@ -265,17 +265,17 @@ class TopicsPanel(NetworkTable[TreeRow]):
     def restore_state(self, state: Mapping[str, object]) -> None:
         closed = state.get("closed")
         known = closed if isinstance(closed, list) else []
-        self._closed = {key for key in known[:MAX_CLOSED] if isinstance(key, str)}
+        self._closed = {key for key in known[:MAX_COLLAPSED_FOLDERS] if isinstance(key, str)}
         self.as_tree.setChecked(state.get("tree") is True)
         super().restore_state(state)
 
 
-def _foot(kinds: Sequence[NetworkKind]) -> str:
+def _footer_text(kinds: Sequence[NetworkKind]) -> str:
     # Note about the source of the statistics.
     untold = [kind.product_name for kind in kinds if not kind.reports_stats]
     if not untold:
-        return _(FOOT)
-    return _(FOOT_OF_NETWORKS).format(networks=format_list(untold))
+        return _(FOOTER_TEXT)
+    return _(NETWORKS_FOOTER_TEXT).format(networks=format_list(untold))
 
 
 def _haystack(topic: Topic) -> str:

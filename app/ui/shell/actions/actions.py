@@ -12,13 +12,13 @@ from PySide6.QtWidgets import QAbstractButton, QMenuBar, QWidget
 
 from app.ui.shell.actions.command import Command, UnknownCommandError
 from app.ui.theme.theme import Theme
-from app.ui.widgets import name_command
+from app.ui.widgets import assign_command
 from app.ui.widgets.letters import with_mnemonics
 from app.ui.widgets.menus import Menu
 from nep.i18n import _
 
-STOP = "run.stop"
-ROLES = {
+STOP_COMMAND = "run.stop"
+MENU_ROLES = {
     "settings.open": QAction.MenuRole.PreferencesRole,
     "file.quit": QAction.MenuRole.QuitRole,
     "help.about": QAction.MenuRole.AboutRole,
@@ -54,7 +54,7 @@ class Actions:
         if command.icon is not None and not command.group:
             action.setIcon(self._theme.icon(command.icon))
         action.setShortcuts([QKeySequence(key) for key in command.default_keys()])
-        action.setMenuRole(ROLES.get(command.id, QAction.MenuRole.NoRole))
+        action.setMenuRole(MENU_ROLES.get(command.id, QAction.MenuRole.NoRole))
         if command.in_all_windows:
             action.setShortcutContext(Qt.ShortcutContext.ApplicationShortcut)
         action.setCheckable(bool(command.group) or command.is_checkable)
@@ -80,7 +80,7 @@ class Actions:
         A click triggers the command, and the button's tooltip shows the command's shortcut (see
         `Shortcuts`).
         """
-        name_command(button, name)
+        assign_command(button, name)
         button.clicked.connect(self[name].trigger)
 
     def set_keys(self, keys_of: Callable[[str], Sequence[str]]) -> None:
@@ -103,7 +103,7 @@ class Actions:
     def disable_unavailable(self) -> None:
         """Disable the actions of unavailable commands, except for Stop, which is always enabled."""
         for name, action in self._actions.items():
-            action.setEnabled(name == STOP or not self.disabled_reason(name))
+            action.setEnabled(name == STOP_COMMAND or not self.disabled_reason(name))
 
     def enable_all(self) -> None:
         """Enable all actions, because Qt ignores the shortcuts of disabled actions.

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
-from app.ui.shell.actions.actions import STOP
+from app.ui.shell.actions.actions import STOP_COMMAND
 from app.ui.shell.actions.command import Command, UnknownCommandError
 from app.ui.text import plain
 from app.ui.text.numbers import shortcut_text, tip_with_key
@@ -25,7 +25,7 @@ from app.ui.widgets import IconButton
 from nep.i18n import _, lazy
 
 STOP_KEY = "F12"
-NEEDS_MODIFIER = lazy(
+MODIFIER_REQUIRED_TEXT = lazy(
     "A single letter can't be a shortcut. Combine it with Ctrl or Alt, or use a function key."
 )
 FUNCTION_KEYS = range(Qt.Key.Key_F1, Qt.Key.Key_F35 + 1)
@@ -121,7 +121,7 @@ def normal(key: str) -> str:
     return QKeySequence(key).toString(QKeySequence.SequenceFormat.PortableText)
 
 
-def key_of(pressed: QKeyCombination) -> str:
+def format_key(pressed: QKeyCombination) -> str:
     """Return a key combination in Qt's portable text format."""
     return QKeySequence(pressed).toString(QKeySequence.SequenceFormat.PortableText)
 
@@ -169,8 +169,8 @@ class Shortcuts(QObject):
     def keys_of(self, name: str) -> tuple[str, ...]:
         """Return the current shortcuts of a command; menus show the first one."""
         keys = self._own.get(name, self.default_keys(name))
-        if name == STOP:
-            given = {key for other, own in self._own.items() if other != STOP for key in own}
+        if name == STOP_COMMAND:
+            given = {key for other, own in self._own.items() if other != STOP_COMMAND for key in own}
             return (STOP_KEY, *(key for key in keys if key != STOP_KEY and key not in given))
         return tuple(key for key in keys if key != STOP_KEY)
 
@@ -188,12 +188,12 @@ class Shortcuts(QObject):
 
     def rejection_reason(self, name: str, pressed: QKeyCombination) -> str:
         """Return the reason why a shortcut can't be assigned to a command, as a sentence, or "" if it can."""
-        key = key_of(pressed)
+        key = format_key(pressed)
         if key == STOP_KEY:
-            return "" if name == STOP else _("F12 always triggers Stop and can't be changed.")
+            return "" if name == STOP_COMMAND else _("F12 always triggers Stop and can't be changed.")
         held = pressed.keyboardModifiers() & MODIFIERS
         if not held and pressed.key() not in FUNCTION_KEYS:
-            return _(NEEDS_MODIFIER)
+            return _(MODIFIER_REQUIRED_TEXT)
         for fixed in FIXED_KEYS:
             own = key in self.default_keys(name)  # Ctrl+F is "find" both in the Inspector and in the blocks
             if key in [normal(each) for each in fixed.key.split(", ")] and held and not own:

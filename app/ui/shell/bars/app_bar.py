@@ -24,7 +24,7 @@ from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _, lazy, ngettext
 
 FIELD_WIDTH, FIELD_HEIGHT, LEFT, ICON, GAP = 248, 28, 10, 14, 9
-EDGE = 12
+EDGE_MARGIN = 12
 DIRECT_CHILDREN = Qt.FindChildOption.FindDirectChildrenOnly
 MIN_TEXT_WIDTH = 44  # minimum text width of the palette field in px; below it only icon and key are shown
 CHIP_TEXTS = {
@@ -113,8 +113,8 @@ class AppBar(QWidget):
             self.search.set_icon_only(bare > 2)
             if self._needed_width() <= self.width():
                 break
-        taken = 0 if self.switch.isHidden() else self.switch.sizeHint().width() + EDGE
-        half = (self.width() - 2 * EDGE - taken - EDGE) / 2
+        taken = 0 if self.switch.isHidden() else self.switch.sizeHint().width() + EDGE_MARGIN
+        half = (self.width() - 2 * EDGE_MARGIN - taken - EDGE_MARGIN) / 2
         self._grid.setColumnStretch(2, int(self._halves[1].sizeHint().width() <= half))
 
     def _needed_width(self) -> int:
@@ -122,7 +122,7 @@ class AppBar(QWidget):
             part for half in self._halves for part in half.findChildren(QWidget, options=DIRECT_CHILDREN)
         ]
         wide = sum(self._min_width(part) + GAP for part in (self.switch, *parts) if not part.isHidden())
-        return wide + 2 * EDGE
+        return wide + 2 * EDGE_MARGIN
 
     def _min_width(self, part: QWidget) -> int:
         if part is self.menus:
@@ -194,32 +194,32 @@ class PaletteField(PaintedButton):
         self.updateGeometry()
         self.update()
 
-    def _side(self) -> float:
+    def _icon_side(self) -> float:
         return self._theme.scaled(ICON)
 
-    def _key_room(self) -> float:
+    def _key_cap_width(self) -> float:
         return paint.key_width(self._theme, self._key) + 7 if self._key and not self._bare else 0.0
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("body")
-        wide = LEFT + self._side() + GAP + paint.width_of(font, self.text()) + 16 + self._key_room()
+        wide = LEFT + self._icon_side() + GAP + paint.width_of(font, self.text()) + 16 + self._key_cap_width()
         high = max(FIELD_HEIGHT, round(paint.height_of(font)) + 8)
         return QSize(max(FIELD_WIDTH, round(wide)), high)
 
     def minimumSizeHint(self) -> QSize:
-        least = LEFT + self._side() + GAP + (self._key_room() or LEFT)
+        least = LEFT + self._icon_side() + GAP + (self._key_cap_width() or LEFT)
         return QSize(round(least), self.sizeHint().height())
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme, middle = self._theme, rect.height() / 2
         fill = theme.colour("hover" if self.is_highlighted else "panel")
         paint.box(painter, rect, theme.radius("control"), fill, theme.colour("borderStrong"))
-        side = self._side()
+        side = self._icon_side()
         square = QRectF(LEFT, middle - side / 2, side, side)
         paint_icon(painter, square, "search", theme.colour("textSecondary"))
         font = theme.font("body")
         left = LEFT + side + GAP
-        room = rect.width() - left - self._key_room() - 4
+        room = rect.width() - left - self._key_cap_width() - 4
         if room >= self._theme.scaled(MIN_TEXT_WIDTH):
             area = QRectF(left, 0, room, rect.height())
             whole = paint.width_of(font, self.text()) <= room
@@ -251,7 +251,7 @@ def robots_chip(session: Session) -> tuple[str, str]:
         return words.format(count=len(stopping)), "running"
     silent = [link for link in links if link.state == "silent"]
     if silent:
-        words = silent[0].silent or _("not responding")
+        words = silent[0].silence_reason or _("not responding")
         if len(silent) > 1:
             words = ngettext("{count} robot not responding", "{count} robots not responding", len(silent))
             return words.format(count=len(silent)), "error"

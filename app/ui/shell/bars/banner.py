@@ -33,7 +33,7 @@ STEP_ICONS = {
     "robots.virtual": "bot",
     "file.open": "folder-open",
 }
-NEXT_ICON = "arrow-right"
+NARROW_BUTTON_ICON = "arrow-right"
 CLICK_GUARD_S = 0.5
 """Time in s during which a banner that appeared under the mouse pointer ignores clicks."""
 
@@ -158,7 +158,7 @@ class Banner(AlertBox):
     second_pressed = Signal()
     more_pressed = Signal()
     closed = Signal()
-    mouse_left = Signal()
+    mouse_exited = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
@@ -220,7 +220,7 @@ class Banner(AlertBox):
 
     def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
-        self.mouse_left.emit()
+        self.mouse_exited.emit()
 
     def _fit(self) -> None:
         scaled = self._theme.scaled
@@ -238,7 +238,7 @@ class Banner(AlertBox):
         room = self.width() - self.left - self.close_button.sizeHint().width() - self.gap - taken
         is_narrow = room < scaled(MIN_TEXT_WIDTH)
         self.more.set_label(f"+{self._others}" if is_narrow else count, name=count)
-        self.button.icon_name = NEXT_ICON if is_narrow and self._icon is None else self._icon
+        self.button.icon_name = NARROW_BUTTON_ICON if is_narrow and self._icon is None else self._icon
         self.button.set_label("" if is_narrow else self._step, name=self._step)
         self.button.setToolTip(plain.tip(self._step if is_narrow else ""))
 
@@ -280,7 +280,7 @@ class AlertBanner(QWidget):
         self.banner.second_pressed.connect(lambda: self._answer(1))
         self.banner.more_pressed.connect(self._show_more)
         self.banner.closed.connect(self._close)
-        self.banner.mouse_left.connect(lambda: self.show_alerts(self._alerts))
+        self.banner.mouse_exited.connect(lambda: self.show_alerts(self._alerts))
         self.hide()
 
     @property

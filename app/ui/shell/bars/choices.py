@@ -13,13 +13,13 @@ from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
-from app.ui.widgets.keyboard import is_activation_key, is_plain
+from app.ui.widgets.keyboard import has_no_modifiers, is_activation_key
 
 GAP = 8
 PADDING = 14
 MIN_HEIGHT = 52
 MAX_COLUMNS = 3
-NUMBER_KEYS = 9
+NUMBER_KEY_COUNT = 9
 _WRAP_FLAGS = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 
 
@@ -80,7 +80,7 @@ class ChoiceButton(PaintedButton):
         painter.drawText(rect.adjusted(self._text_left(), 0, -PADDING, 0), _WRAP_FLAGS, self._shown)
 
 
-class Choices(QWidget):
+class ChoiceGrid(QWidget):
     """Grid of buttons for the choices of a question.
 
     There are as many columns as fit with each text on one line. `chosen` is emitted with the text of
@@ -106,7 +106,7 @@ class Choices(QWidget):
             button.deleteLater()
         self.buttons = []
         for number, words in enumerate(choices, 1):
-            button = ChoiceButton(self._theme, words, str(number) if number <= NUMBER_KEYS else "")
+            button = ChoiceButton(self._theme, words, str(number) if number <= NUMBER_KEY_COUNT else "")
             button.clicked.connect(lambda _on=False, words=words: self.selected.emit(words))
             button.setParent(self)
             button.show()
@@ -114,7 +114,7 @@ class Choices(QWidget):
         self._arrange()
         self.updateGeometry()
 
-    def take_focus(self) -> None:
+    def focus_first(self) -> None:
         """Set the focus to the first choice."""
         if self.buttons:
             self.buttons[0].setFocus(Qt.FocusReason.PopupFocusReason)
@@ -172,9 +172,9 @@ class Choices(QWidget):
         """Move the focus on an arrow key, or activate a choice on a number key; return True if handled."""
         key = event.key()
         number = key - Qt.Key.Key_1
-        if not is_plain(event) or not self.buttons or not self.buttons[0].isEnabled():
+        if not has_no_modifiers(event) or not self.buttons or not self.buttons[0].isEnabled():
             return False
-        if 0 <= number < min(len(self.buttons), NUMBER_KEYS):
+        if 0 <= number < min(len(self.buttons), NUMBER_KEY_COUNT):
             if not event.isAutoRepeat():
                 self.buttons[number].click()
             return True

@@ -16,20 +16,22 @@ from app.ui.shell.commands.shell import Shell
 from app.ui.text import plain
 from app.ui.text.numbers import length_text, size_text
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, MenuButton, Separator, ToggleButton, name_command, paint
+from app.ui.widgets import Button, MenuButton, Separator, ToggleButton, assign_command, paint
 from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _
 
 FREEZE, RECORD, KEEP = "view.freeze", "recording.toggle", "recording.keep"
 REFRESH_HALF_TICKS = 8  # refresh interval in half ticks
-RECORD_PX = 146  # fixed width of the record button, so that nothing moves when a recording starts
-KEEP_ROOM_PX = 1340  # width of the whole bar at 100 % text
-ROOM_PX = 940  # width without Keep, which has a shortcut
-RECORD_TEXT_ROOM_PX = 680  # below this the record button shows only its dot
-FREEZE_ROOM_PX = 548
-RECORD_ROOM_PX = 520  # below this the result of a stop would be cut
-SOURCE_ROOM_PX = 1120  # width with the source switch, which is also in the File menu
-RECORDING_ROOM_PX = 1240  # the same with the button back to the live network
+RECORD_BUTTON_WIDTH_PX = (
+    146  # fixed width of the record button, so that nothing moves when a recording starts
+)
+MIN_WIDTH_WITH_KEEP_PX = 1340  # width of the whole bar at 100 % text
+MIN_WIDTH_WITH_LAYOUTS_PX = 940  # width without Keep, which has a shortcut
+MIN_WIDTH_WITH_RECORD_TEXT_PX = 680  # below this the record button shows only its dot
+MIN_WIDTH_WITH_FREEZE_PX = 548
+MIN_WIDTH_WITH_RECORD_PX = 520  # below this the result of a stop would be cut
+MIN_WIDTH_WITH_SOURCE_PX = 1120  # width with the source switch, which is also in the File menu
+MIN_WIDTH_DURING_REPLAY_PX = 1240  # the same with the button back to the live network
 
 
 class RecordButton(Button):
@@ -66,7 +68,7 @@ class RecordButton(Button):
     def sizeHint(self) -> QSize:
         high = super().sizeHint().height()
         bare = self.icon_side() + 2 * self.measure.padding
-        return QSize(bare if self._is_bare else round(self._theme.scaled(RECORD_PX)), high)
+        return QSize(bare if self._is_bare else round(self._theme.scaled(RECORD_BUTTON_WIDTH_PX)), high)
 
     def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
         colour = self._theme.colour
@@ -134,7 +136,7 @@ class DeveloperTools(QObject):
         theme, menus = shell.theme, commands.menus
         self.record = RecordButton(theme)
         self.keep = Button(theme, "", "history", size="small")
-        name_command(self.record, RECORD)
+        assign_command(self.record, RECORD)
         self.record.clicked.connect(commands.recording.start_and_open_sheet)
         self._actions.bind(self.keep, KEEP)
         self.freeze = ToggleButton(theme, _("Freeze"), "snowflake")
@@ -185,14 +187,16 @@ class DeveloperTools(QObject):
         # Hides tools in this order if there is little room: Keep, source, layouts, Freeze, Record. All of
         # them are also in menus.
         width, scaled, recording = self._bar.width(), self._shell.theme.scaled, self.source.is_recording
-        paint.show_when(self.keep, width >= scaled(KEEP_ROOM_PX) and not recording)
-        paint.show_when(self.source, recording or width >= scaled(SOURCE_ROOM_PX))
+        paint.show_when(self.keep, width >= scaled(MIN_WIDTH_WITH_KEEP_PX) and not recording)
+        paint.show_when(self.source, recording or width >= scaled(MIN_WIDTH_WITH_SOURCE_PX))
         paint.show_when(self.source.back, recording)
         for tool in self._wide_only:
-            paint.show_when(tool, width >= scaled(RECORDING_ROOM_PX if recording else ROOM_PX))
-        self.record.set_icon_only(width < scaled(RECORD_TEXT_ROOM_PX))
-        paint.show_when(self.freeze, width >= scaled(FREEZE_ROOM_PX))
-        paint.show_when(self.record, width >= scaled(RECORD_ROOM_PX))
+            paint.show_when(
+                tool, width >= scaled(MIN_WIDTH_DURING_REPLAY_PX if recording else MIN_WIDTH_WITH_LAYOUTS_PX)
+            )
+        self.record.set_icon_only(width < scaled(MIN_WIDTH_WITH_RECORD_TEXT_PX))
+        paint.show_when(self.freeze, width >= scaled(MIN_WIDTH_WITH_FREEZE_PX))
+        paint.show_when(self.record, width >= scaled(MIN_WIDTH_WITH_RECORD_PX))
         self._hide_crowded()
 
     def _hide_crowded(self) -> None:

@@ -11,7 +11,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 
 SIDE = 22
-JOINT = 0.12
+JOINT_RADIUS = 0.12
 
 
 def paint_logo(painter: QPainter, rect: QRectF, theme: Theme) -> None:
@@ -31,7 +31,7 @@ def paint_logo(painter: QPainter, rect: QRectF, theme: Theme) -> None:
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(theme.colour("running"))
     for joint in (at(0.3, 0.71), at(0.7, 0.29)):
-        painter.drawEllipse(joint, side * JOINT, side * JOINT)
+        painter.drawEllipse(joint, side * JOINT_RADIUS, side * JOINT_RADIUS)
 
 
 class Logo(QWidget):

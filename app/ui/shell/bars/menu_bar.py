@@ -11,7 +11,7 @@ from app.ui.widgets import paint
 from app.ui.widgets.letters import strip_mnemonic
 
 
-class _Alt(QObject):
+class _AltKeyFilter(QObject):
     """Event filter that emits `held` when Alt is pressed or released.
 
     This is an object separate from the menu bar, because Qt installs a menu bar as an event filter of
@@ -19,13 +19,13 @@ class _Alt(QObject):
     reach Python.
     """
 
-    held = Signal(bool)
+    held_changed = Signal(bool)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
-            self.held.emit(event.key() == Qt.Key.Key_Alt)
+            self.held_changed.emit(event.key() == Qt.Key.Key_Alt)
         elif event.type() in {QEvent.Type.KeyRelease, QEvent.Type.FocusOut}:
-            self.held.emit(False)
+            self.held_changed.emit(False)
         return super().eventFilter(watched, event)
 
 
@@ -36,8 +36,8 @@ class MenuBar(QMenuBar):
         super().__init__()
         self._theme = theme
         self._shows_letters = False
-        self._alt = _Alt(self)
-        self._alt.held.connect(self._show_mnemonics)
+        self._alt = _AltKeyFilter(self)
+        self._alt.held_changed.connect(self._show_mnemonics)
 
     @property
     def shows_mnemonics(self) -> bool:

@@ -17,13 +17,13 @@ from PySide6.QtWidgets import (
 from shiboken6 import isValid
 
 from app.core.run.asking import AskedQuestion
-from app.ui.shell.bars.choices import GAP, Choices
+from app.ui.shell.bars.choices import GAP, ChoiceGrid
 from app.ui.shell.bars.floating_card import FloatingCard
 from app.ui.shell.dialogs.overlay import stop_buttons_in
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
 from app.ui.widgets.lists.scroll_areas import ContentScrollArea
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.i18n import _
 
 WIDTH, WIDTH_WITH_CHOICES = 460, 560
@@ -50,10 +50,10 @@ class QuestionCard(FloatingCard):
         self.field = QLineEdit()
         self.field.setMaxLength(MAX_ANSWER_LENGTH)
         self.field.setProperty("focusRadius", theme.radius("control"))
-        EditMenu(theme, self.field)
+        ContextMenuFilter(theme, self.field)
         self.button = Button(theme, _("Answer"), kind="primary", size="form")
         self.button.clicked.connect(self._submit)
-        self.choices = Choices(theme)
+        self.choices = ChoiceGrid(theme)
         self.choices.selected.connect(self._send)
         self._offered = ContentScrollArea(self.choices)
         self.choices.focus_moved.connect(lambda button: self._offered.ensureWidgetVisible(button, 0, GAP))
@@ -111,15 +111,15 @@ class QuestionCard(FloatingCard):
         self.show()
         self.place()
         self.raise_()
-        self.take_focus()
+        self.focus_input()
         paint.announce(self, ", ".join((words, *question.choices)))
 
-    def take_focus(self) -> None:
+    def focus_input(self) -> None:
         """Set the focus to the input if there is a question and the card is enabled."""
         if self._question is None or self._held:
             return
         if self.choices.buttons:
-            self.choices.take_focus()
+            self.choices.focus_first()
         else:
             self.field.setFocus(Qt.FocusReason.PopupFocusReason)
 
@@ -143,7 +143,7 @@ class QuestionCard(FloatingCard):
         self.choices.set_paused(held=held)
         self._hint.setVisible(held and bool(self.choices.buttons))
         if had and not held and self.hasFocus():
-            self.choices.take_focus()
+            self.choices.focus_first()
         self.field.setReadOnly(held)
         self.field.setPlaceholderText(_("Press Resume first") if held else "")
         self.button.setEnabled(not held)

@@ -21,20 +21,20 @@ from app.ui.widgets import Button, IconButton, RunButton, Separator, StopButton,
 from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _
 
-PACES = ("run.full_speed", "run.slow", "run.very_slow")
-ROOM_PX = 960  # width of the bar at 100 % text
+SPEED_COMMANDS = ("run.full_speed", "run.slow", "run.very_slow")
+MIN_WIDTH_WITH_TEXTS_PX = 960  # width of the bar at 100 % text
 SENTENCE_PX, RESULT_PX = 190, 230  # at 100 % text: room for the state and for a result
 MIN_RESULT_PX = 110  # minimum width of a successful result; it is elided to this
 FIXED_ITEMS_PX = 150  # speed button, mark and the gaps between all items
 MIN_TEXT_WIDTH_PX = 600  # below this even Run is an icon, so that the result of a stop isn't cut
 MIN_STATE_TEXT_PX = 30  # px at 100 % text
 WIDE_SENTENCE_PX, SENTENCE_SHARE = 300, 0.2  # at 100 % text, and share of the bar: state next to an alert
-BANNER_PX = 300  # at 100 % text; with less room an alert also covers the state of the tool bar
+MIN_BANNER_WIDTH_PX = 300  # at 100 % text; with less room an alert also covers the state of the tool bar
 BANNER_EDGE, GAP = 3, 8
 QWIDGETSIZE_MAX = 16777215  # Qt's constant for "no limit"
-DOT = 10
-HALO = 16
-MARKS = {
+DOT_SIZE = 10
+HALO_SIZE = 16
+STATE_ICONS = {
     "ready": "ring",
     "proven": "ring",
     "running": "dot",
@@ -44,7 +44,7 @@ MARKS = {
 }
 
 
-class Mark(QWidget):
+class RunStateIcon(QWidget):
     """Icon of the run state: ring (idle), amber dot (running), pause sign, or cross (action required)."""
 
     def __init__(self, theme: Theme) -> None:
@@ -69,7 +69,7 @@ class Mark(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         centre = QRectF(self.rect()).center()
-        mark = MARKS.get(self._state, "ring")
+        mark = STATE_ICONS.get(self._state, "ring")
         if mark == "ring":
             painter.setPen(QPen(theme.colour("textTertiary"), 2))
             painter.drawEllipse(centre, 4, 4)
@@ -79,9 +79,9 @@ class Mark(QWidget):
             halo.setAlphaF(0.3)
             painter.setBrush(halo)
             if self._state == "running":
-                painter.drawEllipse(centre, HALO / 2, HALO / 2)
+                painter.drawEllipse(centre, HALO_SIZE / 2, HALO_SIZE / 2)
             painter.setBrush(theme.colour("running"))
-            painter.drawEllipse(centre, DOT / 2, DOT / 2)
+            painter.drawEllipse(centre, DOT_SIZE / 2, DOT_SIZE / 2)
         else:
             role = theme.status("error").colour if mark == "circle-x" else "textSecondary"
             side = 18 if mark == "circle-x" else 16
@@ -90,7 +90,7 @@ class Mark(QWidget):
         painter.end()
 
 
-class StateText(QWidget):
+class RunStateLabel(QWidget):
     """Text that describes the run state, with a title and a detail."""
 
     def __init__(self, theme: Theme) -> None:
@@ -176,7 +176,7 @@ class StateText(QWidget):
         return [*title, *((line, small, quiet) for line in paint.two_lines(small, self._detail, width))]
 
 
-class StopResult(QWidget):
+class StopResultLabel(QWidget):
     """Result of the last Stop: confirmed, pending or unanswered.
 
     While a behaviour runs, a less prominent style shows the result of the previous Stop.
@@ -210,7 +210,7 @@ class StopResult(QWidget):
         """Show the result of the last Stop, or hide the widget if there is none."""
         look, text = "", ""
         if view.state == "unanswered":
-            look, text = "error", (view.compact if self._compact else view.result or "")
+            look, text = "error", (view.compact_text if self._compact else view.result or "")
         elif view.state == "stopping" and view.result:
             look, text = "counting", view.result
         elif view.result:
@@ -328,9 +328,9 @@ class RunBar(Bar):
         self.step = RunButton(theme, _("Step"), "step-forward")
         self.pace = IconButton(theme, "gauge", _("Speed"), checkable=True, size=36)
         self._paces = Menu(theme, self, _("Speed"))
-        self.mark = Mark(theme)
-        self.sentence = StateText(theme)
-        self.result = StopResult(theme)
+        self.mark = RunStateIcon(theme)
+        self.sentence = RunStateLabel(theme)
+        self.result = StopResultLabel(theme)
         self.confirm = Button(theme, "", size="large")
         self.confirm.hide()
         self.confirm.allow_shrinking(96)
@@ -365,7 +365,7 @@ class RunBar(Bar):
     def set_actions(self, actions: Actions) -> None:
         """Connect the buttons to the actions and fill the menu of speeds."""
         bind_run_buttons(self, actions)
-        self._paces.addActions([actions[name] for name in PACES])
+        self._paces.addActions([actions[name] for name in SPEED_COMMANDS])
 
     def banner_area(self) -> QRect:
         """Return the area for an alert, to the right of the run state.
@@ -404,7 +404,7 @@ class RunBar(Bar):
         needed = (
             words + self.stop.sizeHint().width() + FIXED_ITEMS_PX + scaled(SENTENCE_PX) + scaled(RESULT_PX)
         )
-        bare = self.width() < max(scaled(ROOM_PX), needed)
+        bare = self.width() < max(scaled(MIN_WIDTH_WITH_TEXTS_PX), needed)
         self.run.set_icon_only(self.width() < self._theme.scaled(MIN_TEXT_WIDTH_PX))
         self.pause.set_icon_only(bare)
         self.step.set_icon_only(bare)
@@ -446,9 +446,9 @@ class ToolBar(Bar):
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("toolBar"))
         self.setAccessibleName(_("Tools, run and stop"))
-        self.mark = Mark(theme)
+        self.mark = RunStateIcon(theme)
         self.words = label("", "body", role="textSecondary")
-        self.result = StopResult(theme, compact=True)
+        self.result = StopResultLabel(theme, compact=True)
         self.confirm = Button(theme, "", size="small")
         self.confirm.hide()
         self.confirm.allow_shrinking(96)
@@ -482,22 +482,24 @@ class ToolBar(Bar):
 
         In a narrow bar, the area includes the run state.
         """
-        left = max((each.geometry().right() + 1 for each in self._shown_tools()), default=0) + GAP
+        left = max((each.geometry().right() + 1 for each in self._visible_tools()), default=0) + GAP
         buttons = (self.result, self.restart, self.pause, self.step, self.confirm, self.run, self.stop)
         beside: list[QWidget] = [each for each in buttons if not each.isHidden()]
         states = [each for each in (self.mark, self.words) if not each.isHidden()]
         area = free_area(self, left, [*beside, *states])
-        return area if area.width() >= self._theme.scaled(BANNER_PX) else free_area(self, left, beside)
+        return (
+            area if area.width() >= self._theme.scaled(MIN_BANNER_WIDTH_PX) else free_area(self, left, beside)
+        )
 
     def needed_width(self) -> int:
         """Return the width in px at which no text in the bar is shortened."""
         run_state = (self.mark, self.words, self.result, self.restart, self.pause, self.step, self.confirm)
         shown = [each for each in (*run_state, self.run, self.stop) if not each.isHidden()]
-        parts: list[QWidget] = [*shown, *self._shown_tools()]
+        parts: list[QWidget] = [*shown, *self._visible_tools()]
         widths = [each.sizeHint().expandedTo(each.minimumSize()).width() for each in parts]
         return sum(widths) + GAP * (len(widths) + 2)
 
-    def _shown_tools(self) -> list[QWidget]:
+    def _visible_tools(self) -> list[QWidget]:
         items = (self.tools.itemAt(place) for place in range(self.tools.count()))
         tools = [item.widget() for item in items if item is not None]
         return [tool for tool in tools if tool is not None and not tool.isHidden()]
@@ -521,7 +523,7 @@ class ToolBar(Bar):
         spoken = bool(self.result.text) and view.state in {"proven", "unanswered"}
         self.mark.show_state(view.state)
         self.mark.setVisible(not spoken)
-        self.words.setText(view.compact)
+        self.words.setText(view.compact_text)
         self.words.setVisible(not spoken)
         self.run.set_label(_(view.run_label))
         self.run.setVisible(view.can_run)

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 from app.core.network.remote_access import access_status
 from app.core.network.web_words import host_text, web_status
 from app.core.recording.replay.scale import clock_text, date_text
-from app.core.robots.health_facts import facts_of, has_reported
+from app.core.robots.health_facts import has_reported, health_items
 from app.core.robots.robot_link import STOPPING
 from app.core.run.view import connected_text
 from app.core.session import Session
@@ -22,8 +22,8 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Separator, StatusItem, paint
 from nep.i18n import _, ngettext
 
-Fact = tuple[str, str, str | None]  # icon, text, status
-NO_FACT: Fact = ("", "", None)
+StatusEntry = tuple[str, str, str | None]  # icon, text, status
+EMPTY_ENTRY: StatusEntry = ("", "", None)
 TICK_MS = 33
 FIGURE_SPACE = "\u2007"
 
@@ -32,7 +32,7 @@ def _worst_status(found: Iterable[str]) -> tuple[str, str]:
     return ("circle-x", "error") if "error" in found else ("triangle-alert", "warn")
 
 
-class StatusFacts:
+class StatusFormatter:
     """Formatter of the session's state for the status bar.
 
     Each method returns a `Fact` (icon, text, status), which is empty if there is nothing to show.
@@ -47,7 +47,7 @@ class StatusFacts:
         self.window_ms = 0.0
         self._web_host = self._web_network = ""
 
-    def alerts(self, *, for_developers: bool = False) -> Fact:
+    def alerts(self, *, for_developers: bool = False) -> StatusEntry:
         """Return a `Fact` with the number of alerts.
 
         Args:
@@ -55,18 +55,18 @@ class StatusFacts:
         """
         alerts = self._session.alerts.errors_and_warnings(for_developers=for_developers)
         if not alerts:
-            return NO_FACT
+            return EMPTY_ENTRY
         icon, status = _worst_status(alert.severity for alert in alerts)
         words = ngettext("{count} alert", "{count} alerts", len(alerts))
         return icon, words.format(count=len(alerts)), status
 
-    def health(self) -> Fact:
+    def health(self) -> StatusEntry:
         """Return a `Fact` with the number of alerts, else with the health of the robots.
 
         A robot that hasn't reported its state yet is only described as "connected".
         """
         alerts = self.alerts()
-        if alerts != NO_FACT:
+        if alerts != EMPTY_ENTRY:
             return alerts
         known = self._session.fleet.links
         links = [
@@ -76,7 +76,7 @@ class StatusFacts:
             coming = self._session.starting_robots
             return "circle-dashed", connected_text((), coming) if coming else _("No robot"), "off"
         topics, now = self._session.live.topics, time.monotonic()
-        found = [(link, facts_of(link, topics, now, age_text)) for link in links]
+        found = [(link, health_items(link, topics, now, age_text)) for link in links]
         wrong = [fact.status for _link, facts in found for fact in facts if fact.needs_attention]
         if wrong:
             icon, status = _worst_status(wrong)
@@ -97,7 +97,7 @@ class StatusFacts:
         words = words if count > 1 else _("{robot} is connected")
         return "circle-dashed", words.format(robot=name, count=count), "off"
 
-    def save_state(self) -> Fact:
+    def save_state(self) -> StatusEntry:
         """Return a `Fact` with the time of the last save or, for unsaved changes, the state of the backup."""
         document = self._session.document
         if document.dirty and document.journal_error is not None:
@@ -106,25 +106,25 @@ class StatusFacts:
             words = _("Not saved · backed up") if document.path is None else _("Unsaved changes · backed up")
             return "save", words, None
         if document.saved_at is None:
-            return NO_FACT
+            return EMPTY_ENTRY
         then = self._clock(document.saved_at)
         return "save", _("Saved {clock}").format(clock=f"{then.tm_hour}:{then.tm_min:02d}"), None
 
-    def topics(self) -> Fact:
+    def topics(self) -> StatusEntry:
         """Return a `Fact` with the number of active topics."""
         live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         return "", ngettext("{count} active topic", "{count} active topics", live).format(count=live), None
 
-    def remote_access(self) -> Fact:
+    def remote_access(self) -> StatusEntry:
         """Return a `Fact` about the computers that can connect to this master."""
         return access_status(self._session.remote_access)
 
-    def remote_access_plain(self) -> Fact:
+    def remote_access_plain(self) -> StatusEntry:
         """Return the fact of `remote_access`, but without an icon for the default setting."""
         icon, words, status = self.remote_access()
         return ("" if status is None else icon), words, status
 
-    def web_pages(self) -> Fact:
+    def web_pages(self) -> StatusEntry:
         """Return a `Fact` with the network of the web server and the number of connected pages.
 
         The fact is empty while the server is off.
@@ -134,7 +134,7 @@ class StatusFacts:
             self._web_host, self._web_network = web.host, host_text(web)
         return web_status(web, self._web_network)
 
-    def master(self) -> Fact:
+    def master(self) -> StatusEntry:
         """Return a `Fact` with the state and the address of the master."""
         master = self._session.master
         if master.kind == "connected":
@@ -144,11 +144,11 @@ class StatusFacts:
             return "circle-dashed", words, "off"
         return "circle-dashed", _("No master"), "off"
 
-    def traffic(self) -> Fact:
+    def traffic(self) -> StatusEntry:
         """Return a `Fact` with the numbers of nodes and topics, and the message rate."""
         graph = self._session.live.graph
         if graph is None:
-            return NO_FACT
+            return EMPTY_ENTRY
         live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         nodes, rate = len(graph.nodes), self._session.traffic.messages_per_s
         facts = [
@@ -159,38 +159,40 @@ class StatusFacts:
             facts.append(_("{count} messages/s").format(count=group_digits(round(rate))))
         return "", ", ".join(facts), None
 
-    def lost(self) -> Fact:
+    def lost(self) -> StatusEntry:
         """Return a `Fact` with the number of messages lost during the last 30 s; empty for 0."""
         lost = self._session.traffic.lost_30s
         if not lost:
-            return NO_FACT
+            return EMPTY_ENTRY
         words = ngettext("{count} lost in 30 s", "{count} lost in 30 s", lost)
         return "triangle-alert", words.format(count=group_digits(lost)), "warn"
 
-    def recording(self) -> Fact:
+    def recording(self) -> StatusEntry:
         """Return a `Fact` with duration, size and losses of the current recording; empty if there is none."""
         recordings = self._session.recordings
         state = recordings.client.state
         if not recordings.is_recording:
-            return NO_FACT
+            return EMPTY_ENTRY
         if state.phase == "starting":
             return "circle-dot", _("Starting to record"), "recording"
-        lost = state.lost + state.unwritten
+        lost = state.lost + state.unwritten_count
         losses = ngettext("{count} lost", "{count} lost", lost).format(count=group_digits(lost))
         words = _("Recording {time}, {size}, {losses}").format(
             time=length_text(recordings.elapsed_s),
             size=size_text(state.size_bytes),
             losses=losses if lost else _("none lost"),
         )
-        return ("triangle-alert", words, "warn") if state.unwritten else ("circle-dot", words, "recording")
+        return (
+            ("triangle-alert", words, "warn") if state.unwritten_count else ("circle-dot", words, "recording")
+        )
 
-    def arming(self) -> Fact:
+    def arming(self) -> StatusEntry:
         """Return a `Fact` with the remaining arming time and the topics being sent; empty while disarmed."""
         acting = self._session.acting
         if not acting.arming.is_on:
-            return NO_FACT
+            return EMPTY_ENTRY
         left = length_text(math.ceil(acting.arming.remaining_s))
-        going = acting.outbox.all_repeated
+        going = acting.outbox.repeated_messages
         replay = self._session.replay
         played = (
             replay.sending.outbox.active_topics if replay is not None and replay.sending is not None else ()
@@ -209,14 +211,14 @@ class StatusFacts:
             words = _("Armed {time}").format(time=left)
         return "triangle-alert", words, "warn"
 
-    def flight_recorder(self) -> Fact:
+    def flight_recorder(self) -> StatusEntry:
         """Return a `Fact` with the duration stored in the flight recorder; empty while it is off."""
         seconds = self._session.recordings.client.state.ring_s
         if seconds is None:
-            return NO_FACT
+            return EMPTY_ENTRY
         return "history", _("last {count} s available").format(count=round(seconds)), None
 
-    def replayed_recording(self) -> tuple[Fact, ...]:
+    def replayed_recording(self) -> tuple[StatusEntry, ...]:
         """Return facts about the opened recording: name, time range, contents and losses."""
         replay = self._session.replay
         if replay is None or replay.opened is None:
@@ -228,7 +230,7 @@ class StatusFacts:
         count, messages = len(recorded.topics), recorded.message_count
         topics = ngettext("{count} topic", "{count} topics", count).format(count=group_digits(count))
         said = ngettext("{count} message", "{count} messages", messages).format(count=group_digits(messages))
-        lost: Fact = NO_FACT
+        lost: StatusEntry = EMPTY_ENTRY
         if replay.lost:
             words = ngettext("{count} lost while recording", "{count} lost while recording", replay.lost)
             lost = ("triangle-alert", words.format(count=group_digits(replay.lost)), "warn")
@@ -239,18 +241,18 @@ class StatusFacts:
             lost,
         )
 
-    def live_network_note(self) -> Fact:
+    def live_network_note(self) -> StatusEntry:
         """Return a `Fact` that the live network keeps running while a recording is shown."""
         return "radio-tower", _("The live network keeps running"), None
 
-    def displayed_messages(self) -> Fact:
+    def displayed_messages(self) -> StatusEntry:
         """Return a `Fact` with the number of messages of watched topics that were displayed.
 
         The fact is empty if all messages were displayed.
         """
         traffic = self._session.traffic
         if traffic.shown_30s >= traffic.sent_30s:
-            return NO_FACT
+            return EMPTY_ENTRY
         words = _("{shown} of {sent} shown in 30 s")
         return (
             "",
@@ -258,7 +260,7 @@ class StatusFacts:
             None,
         )
 
-    def window(self) -> Fact:
+    def window(self) -> StatusEntry:
         """Return a `Fact` with the duration of the last refresh of the window."""
         spent = f"{round(self.window_ms):>2}".replace(" ", FIGURE_SPACE)  # equal width for 9 and 10
         return "", _("Refresh {spent} ms of {most} ms").format(spent=spent, most=TICK_MS), None
@@ -302,7 +304,7 @@ class StatusBar(QWidget):
             self._row.insertWidget(place, holder)
             items.append((item, line))
 
-    def show_facts(self, left: Sequence[Fact], right: Sequence[Fact]) -> None:
+    def show_entries(self, left: Sequence[StatusEntry], right: Sequence[StatusEntry]) -> None:
         """Show the given facts; empty ones are left out.
 
         Args:
@@ -313,7 +315,7 @@ class StatusBar(QWidget):
             shown = [fact for fact in facts if fact[1]]
             self._add_items(items, len(shown), right=at_right)
             for index, (item, line) in enumerate(items):
-                fact = shown[index] if index < len(shown) else NO_FACT
+                fact = shown[index] if index < len(shown) else EMPTY_ENTRY
                 item.set(*fact)
                 item.set_command(self.commands.get(fact[1], ""))
                 holder = item.parentWidget()

@@ -16,8 +16,8 @@ from app.ui.widgets.buttons import Button
 from app.ui.widgets.labels import label
 
 MARGIN = 16
-ABOVE_STATUS_BAR = 42
-CHECK_AGAIN_MS = 1000
+BOTTOM_MARGIN = 42
+RECHECK_INTERVAL_MS = 1000
 
 
 class Toast(FloatingCard):
@@ -30,7 +30,7 @@ class Toast(FloatingCard):
         self._until: Callable[[], bool] | None = None
         self._words = label("", "bodyLarge", wrap=True)
         self.button = Button(theme, "", kind="ghost", size="small")
-        self.button.clicked.connect(self._pressed)
+        self.button.clicked.connect(self._on_button_pressed)
         row = QHBoxLayout(self)
         row.setContentsMargins(16, 10, 12, 10)
         row.setSpacing(10)
@@ -96,7 +96,7 @@ class Toast(FloatingCard):
             if right - self.width() < 2 * MARGIN:
                 right = window.width()
             left = right - self.width() - MARGIN
-            self.move(max(MARGIN, left), window.height() - self.height() - ABOVE_STATUS_BAR)
+            self.move(max(MARGIN, left), window.height() - self.height() - BOTTOM_MARGIN)
 
     def _fit(self, room: int) -> None:
         aside = self.sizeHint().width() - self._words.sizeHint().width()
@@ -116,11 +116,11 @@ class Toast(FloatingCard):
 
     def _on_timeout(self) -> None:
         if self.button.hasFocus() or self.underMouse():
-            self._timer.start(CHECK_AGAIN_MS)
+            self._timer.start(RECHECK_INTERVAL_MS)
         else:
             self.hide()
 
-    def _pressed(self) -> None:
+    def _on_button_pressed(self) -> None:
         run, self._run = self._run, None
         self.hide()
         if run is not None:

@@ -17,8 +17,8 @@ from app.core.storage import deep_json
 from app.core.storage.settings import RecentFile
 from app.errors import SettingsError
 from app.ui.other_programs import open_externally
-from app.ui.shell.commands.printing import Printing
-from app.ui.shell.commands.program_pictures import ProgramPictures
+from app.ui.shell.commands.printing import PrintCommands
+from app.ui.shell.commands.program_pictures import ImageCommands
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.documents import DocumentController
 from app.ui.widgets.file_dialogs import FileDialogs
@@ -33,7 +33,7 @@ else:
 OfferButton = tuple[str, Callable[[], object]]
 
 
-class OfferChoice(Protocol):
+class ShowOffer(Protocol):
     """Function that shows an offer with two buttons, given as (text, callback)."""
 
     def __call__(self, title: str, detail: str, yes: OfferButton, no: OfferButton) -> None: ...
@@ -113,7 +113,7 @@ class TabPosition:
         return cls(key, int(place))
 
 
-def read_stack(text: str) -> Stack:
+def parse_stack(text: str) -> Stack:
     """Parse a script that the block editor's page has sent as JSON.
 
     Raises:
@@ -164,8 +164,8 @@ class BehaviourCommands:
     def __init__(self, shell: Shell, session: Session, files: DocumentController, asks: FileDialogs) -> None:
         self._shell, self._session, self._files = shell, session, files
         self._versions: version_history.VersionHistorySheet | None = None
-        self.pictures = ProgramPictures(shell, session, asks)
-        self.printing = Printing(shell, session, asks)
+        self.pictures = ImageCommands(shell, session, asks)
+        self.printing = PrintCommands(shell, session, asks)
 
     def run_or_resume(self) -> None:
         """Resume a paused program, or run the current behaviour.
@@ -176,7 +176,7 @@ class BehaviourCommands:
         if runs.view().state == "paused":
             runs.resume()
         else:
-            self._files.after_flush(partial(self._replace_run, runs.run))
+            self._files.run_after_flush(partial(self._replace_run, runs.run))
 
     def _replace_run(self, begin: Callable[[], object]) -> None:
         # Shows a toast with the name of the behaviour that was stopped by this run.
@@ -209,7 +209,7 @@ class BehaviourCommands:
         if document is not None:
             self._files.show(document)
         else:
-            path = next((file.path for file in session.settings.recent if file.name == name), None)
+            path = next((file.path for file in session.settings.recent_files if file.name == name), None)
             if path is None:
                 return _("no behaviour has this name")
             self._files.open(path)
@@ -218,21 +218,21 @@ class BehaviourCommands:
             if session.documents.title(session.document) == name:
                 session.runs.run()
 
-        self._files.after_flush(start)
+        self._files.run_after_flush(start)
         return ""
 
     def try_stack(self, stack: Stack) -> None:
         """Run a single script, after the newest edit of the block editor was applied."""
         try_it = partial(self._session.runs.try_stack, stack)
-        self._files.after_flush(partial(self._replace_run, try_it))
+        self._files.run_after_flush(partial(self._replace_run, try_it))
 
     def restart(self) -> None:
         """Restart the running behaviour, after the newest edit of the block editor was applied."""
-        self._files.after_flush(self._session.runs.restart)
+        self._files.run_after_flush(self._session.runs.restart)
 
     def run_step(self) -> None:
         """Run the next block, after the newest edit of the block editor was applied."""
-        self._files.after_flush(self._session.runs.step)
+        self._files.run_after_flush(self._session.runs.step)
 
     def start_demo(self) -> None:
         """Start the virtual Pepper and open the first example."""
@@ -241,7 +241,7 @@ class BehaviourCommands:
         if self._shell.examples:
             self._files.open_example(self._shell.examples[0].path)
 
-    def next_tab(self, step: int) -> None:
+    def switch_tab(self, step: int) -> None:
         """Show another tab by its offset from the current one, wrapping around.
 
         Args:
@@ -256,16 +256,16 @@ class BehaviourCommands:
 
     def show_tab(self, key: str) -> bool:
         """Show the tab with this key; return False if there is none."""
-        return self._with_document(key, self._files.show)
+        return self._apply_to_document(key, self._files.show)
 
     def close_tab(self, key: str) -> bool:
         """Close the tab with this key; return False if there is none."""
-        return self._with_document(key, self._files.close)
+        return self._apply_to_document(key, self._files.close)
 
     def close_other_tabs(self, key: str) -> bool:
         """Close all tabs except the one with this key; return False if there is no such tab."""
         documents = self._session.documents
-        return self._with_document(
+        return self._apply_to_document(
             key, lambda document: self._files.close(*(other for other in documents if other is not document))
         )
 
@@ -276,7 +276,7 @@ class BehaviourCommands:
             self._files.show(document)
             self._files.save_as()
 
-        return self._with_document(key, save_as)
+        return self._apply_to_document(key, save_as)
 
     def rename_current(self) -> None:
         """Open a text field for the name of the current tab."""
@@ -287,11 +287,11 @@ class BehaviourCommands:
 
     def rename_tab(self, to: TabName) -> bool:
         """Rename a behaviour; return False if there is no such tab."""
-        return self._with_document(to.key, lambda document: self._files.rename(document, to.name))
+        return self._apply_to_document(to.key, lambda document: self._files.rename(document, to.name))
 
     def duplicate_tab(self, key: str) -> bool:
         """Open a copy of a behaviour in a new tab; return False if there is no such behaviour."""
-        return self._with_document(key, self._files.duplicate)
+        return self._apply_to_document(key, self._files.duplicate)
 
     def save_tab(self, key: str) -> bool:
         """Show a tab and save its behaviour; return False if there is no such tab."""
@@ -300,7 +300,7 @@ class BehaviourCommands:
             self._files.show(document)
             self._files.save()
 
-        return self._with_document(key, save)
+        return self._apply_to_document(key, save)
 
     def show_folder(self, key: str) -> bool:
         """Open the folder of a behaviour's file in the file manager; return False if there is no such tab."""
@@ -312,13 +312,13 @@ class BehaviourCommands:
             if not open_externally(QUrl.fromLocalFile(str(folder))):
                 self._shell.show_toast(_("The file is in {folder}").format(folder=folder))
 
-        return self._with_document(key, show)
+        return self._apply_to_document(key, show)
 
     def move_tab(self, to: TabPosition) -> bool:
         """Move a tab to another position; return False if there is no such tab."""
-        return self._with_document(to.key, lambda document: self._files.move(document, to.position))
+        return self._apply_to_document(to.key, lambda document: self._files.move(document, to.position))
 
-    def _with_document(self, key: str, act: Callable[[Document], object]) -> bool:
+    def _apply_to_document(self, key: str, act: Callable[[Document], object]) -> bool:
         document = self._session.documents.find_by_key(key)
         if document is not None:
             act(document)
@@ -380,7 +380,7 @@ class BehaviourCommands:
 
     def show_earlier_versions(self) -> None:
         """Open the version history of the current behaviour, after its newest edit was applied."""
-        self._files.after_flush(self._show_versions)
+        self._files.run_after_flush(self._show_versions)
 
     def _show_versions(self) -> None:
         if self._versions is None:
@@ -393,7 +393,7 @@ class BehaviourCommands:
 
     def clear_recent(self) -> None:
         """Clear the list of recent files and show a toast with an Undo button."""
-        before: list[RecentFile] = self._session.settings.all_recent
+        before: list[RecentFile] = self._session.settings.all_recent_files
         words = _("Recent files cleared")
         if not self._set_recent([]):
             words = _("Can't save this change: the recent files will reappear when Studio restarts")
@@ -409,7 +409,7 @@ class BehaviourCommands:
         self._shell.show_recent()
         return kept
 
-    def restore_tabs(self, left: Sequence[UnsavedWork], offer: OfferChoice) -> None:
+    def restore_tabs(self, left: Sequence[UnsavedWork], offer: ShowOffer) -> None:
         """Restore the tabs of the last session, and offer to recover unsaved changes.
 
         Args:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from app.core.session import Session
-from app.ui.shell.actions.actions import STOP, Actions
+from app.ui.shell.actions.actions import STOP_COMMAND, Actions
 from app.ui.shell.actions.command import UnknownCommandError
 from app.ui.shell.actions.shortcuts import Shortcuts
 from app.ui.shell.commands.acting import ActingCommands
@@ -68,7 +68,9 @@ class Commands:
         self.view.set_actions(self.actions, self.entries)
         self.actions.select("run.full_speed")
         self.actions["run.from_start"].setChecked(session.fleet.resets_at_start)
-        self.stop_keys = StopKeys(shell.surface, lambda: keys.keys_of(STOP), self.actions[STOP].trigger)
+        self.stop_keys = StopKeys(
+            shell.surface, lambda: keys.keys_of(STOP_COMMAND), self.actions[STOP_COMMAND].trigger
+        )
 
     def run(self, name: str) -> bool:
         """Run a command by its id or ``id:argument``.

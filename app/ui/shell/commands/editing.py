@@ -12,7 +12,7 @@ from nep.i18n import _
 
 Edit = Literal["cut", "copy", "paste", "selectAll"]
 Field = QLineEdit | QPlainTextEdit | QTextEdit
-FIELDS = (QLineEdit, QPlainTextEdit, QTextEdit)
+FIELD_TYPES = (QLineEdit, QPlainTextEdit, QTextEdit)
 MODIFYING_EDITS = frozenset({"cut", "paste"})
 
 
@@ -44,7 +44,7 @@ class EditCommands:
 
     def run(self, what: Edit) -> None:
         """Apply an edit to the focused field or to the blocks."""
-        field = self._field()
+        field = self._focused_field()
         if field is not None:
             getattr(field, what)()
             return
@@ -54,11 +54,11 @@ class EditCommands:
 
     def disabled_reason(self, what: Edit) -> str:
         """Return the reason why an edit is unavailable, or "" if it is available."""
-        field = self._field()
+        field = self._focused_field()
         if field is not None:
             return _("This text can't be changed") if what in MODIFYING_EDITS and field.isReadOnly() else ""
         return "" if self._shell.current_layout == "behaviour" else _("Only for blocks and text fields")
 
-    def _field(self) -> Field | None:
+    def _focused_field(self) -> Field | None:
         had = self._had if self._had is not None and isValid(self._had) else None
-        return had if isinstance(had, FIELDS) and had.isVisible() else None
+        return had if isinstance(had, FIELD_TYPES) and had.isVisible() else None

@@ -72,7 +72,7 @@ class DynamicMenus:
 
     def _list_recent(self) -> None:
         self._recent.clear()
-        recent = recent_titles(self._session.settings.all_recent)
+        recent = recent_titles(self._session.settings.all_recent_files)
         self._recent.menuAction().setVisible(bool(recent))
         for file in recent:
             words = file.name
@@ -100,7 +100,7 @@ class DynamicMenus:
             entry = menu.addAction(plain.escape_menu_text(each.name))
             entry.setCheckable(True)
             entry.setChecked(shown == each.base and arrangements.custom_name(each.base) == each.name)
-            entry.triggered.connect(lambda _on=False, name=each.name: self._view.show_own_layout(name))
+            entry.triggered.connect(lambda _on=False, name=each.name: self._view.show_custom_layout(name))
         menu.addSeparator()
         for name in LAYOUT_COMMANDS:
             menu.addAction(self.actions[name])
@@ -119,7 +119,7 @@ class DynamicMenus:
             entry = self._panels.addAction(shell.theme.icon(panel.icon), _(panel.title))
             entry.setCheckable(True)
             entry.setChecked(panel.name in opened)
-            entry.triggered.connect(lambda on=False, name=panel.name: self._toggle(name, on))
+            entry.triggered.connect(lambda on=False, name=panel.name: self._set_panel_open(name, on))
             for key in opened:
                 name, number = parse_key(key)
                 if name == panel.name and number > 1:
@@ -130,9 +130,9 @@ class DynamicMenus:
         entry = self._panels.addAction(self._shell.theme.icon(panel.icon), words)
         entry.setCheckable(True)
         entry.setChecked(True)
-        entry.triggered.connect(lambda on=False, key=key: self._toggle(key, on))
+        entry.triggered.connect(lambda on=False, key=key: self._set_panel_open(key, on))
 
-    def _toggle(self, name: str, on: bool) -> None:
+    def _set_panel_open(self, name: str, on: bool) -> None:
         bench = self._shell.bench
         if bench is None:
             return

@@ -88,7 +88,7 @@ class PaletteEntries:
     def _files(self) -> list[Entry]:
         now = dt.datetime.now().astimezone()
         made = []
-        for file in recent_titles(self._session.settings.all_recent):
+        for file in recent_titles(self._session.settings.all_recent_files):
             when = relative_day_text(dt.datetime.fromtimestamp(file.opened_s).astimezone(), now)
             reason = ""
             if not file.exists:

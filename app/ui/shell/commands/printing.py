@@ -40,7 +40,7 @@ class SupportsPrinting(Protocol):
         """
 
 
-class Printing:
+class PrintCommands:
     """Handlers that print the blocks of the current behaviour or save them as PDF."""
 
     def __init__(
@@ -58,7 +58,7 @@ class Printing:
         """Show the print dialog or, if there are no printers, the dialog to save a PDF."""
         if not self._printers():
             self._shell.show_toast(_("No printer is set up on this computer. Save the pages as PDF instead."))
-            self.ask_pdf()
+            self.ask_save_pdf()
             return
         from PySide6.QtPrintSupport import QPrintDialog, QPrinter  # noqa: PLC0415 - needed for printing only
 
@@ -86,9 +86,9 @@ class Printing:
                     _("The printer {name} isn't responding").format(name=printer.printerName())
                 )
 
-        self._make(printer.pageLayout(), paint)
+        self._render(printer.pageLayout(), paint)
 
-    def ask_pdf(self) -> None:
+    def ask_save_pdf(self) -> None:
         """Ask for a file and save the blocks to it as PDF."""
         self._asks.save_as(
             _("Save blocks as PDF"),
@@ -114,9 +114,9 @@ class Printing:
             else:
                 self._shell.show_toast(_("Saved {name}").format(name=whole.name))
 
-        self._make(default_page_layout(), write)
+        self._render(default_page_layout(), write)
 
-    def _make(self, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+    def _render(self, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
         editor = self._shell.editor()
         if isinstance(editor, SupportsPrinting):
             today = dt.datetime.now().astimezone()

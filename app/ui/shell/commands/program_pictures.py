@@ -16,14 +16,14 @@ from app.ui.shell.commands.shell import Shell
 from app.ui.widgets.file_dialogs import FileDialogs, FileKind
 from nep.i18n import _, lazy
 
-OPAQUE_KINDS = (
+OPAQUE_IMAGE_KINDS = (
     FileKind(lazy("Image"), ".png"),
     FileKind(lazy("An image that stays sharp at any size"), ".svg"),
 )
-KINDS = (
-    OPAQUE_KINDS[0],
+IMAGE_KINDS = (
+    OPAQUE_IMAGE_KINDS[0],
     FileKind(lazy("Image with transparent background"), ".png"),
-    OPAQUE_KINDS[1],
+    OPAQUE_IMAGE_KINDS[1],
     FileKind(lazy("Vector image with transparent background"), ".svg"),
 )
 
@@ -52,7 +52,7 @@ class SupportsPicture(Protocol):
         """
 
 
-class ProgramPictures:
+class ImageCommands:
     """Handlers that save or copy an image of the current behaviour's blocks."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
@@ -63,9 +63,9 @@ class ProgramPictures:
         suggestion = suggested_path(self._session.document)
 
         def take(path: Path, kind: FileKind) -> None:
-            self.save(path, kind.suffix.lstrip("."), kind in OPAQUE_KINDS)
+            self.save(path, kind.suffix.lstrip("."), kind in OPAQUE_IMAGE_KINDS)
 
-        self._asks.save_as(_("Save blocks as image"), suggestion, KINDS, take)
+        self._asks.save_as(_("Save blocks as image"), suggestion, IMAGE_KINDS, take)
 
     def save(self, path: Path, kind: str, white: bool) -> None:
         """Save an image of the blocks, adding the file extension if it is missing.
@@ -90,7 +90,7 @@ class ProgramPictures:
             else:
                 self._shell.show_toast(_("Saved {name}").format(name=whole.name))
 
-        self._make(kind, white, write)
+        self._render(kind, white, write)
 
     def copy(self) -> None:
         """Copy an image of the blocks to the clipboard."""
@@ -103,9 +103,9 @@ class ProgramPictures:
             QGuiApplication.clipboard().setImage(image)
             self._shell.show_toast(_("Copied the image"))
 
-        self._make("png", True, copy_image)
+        self._render("png", True, copy_image)
 
-    def _make(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+    def _render(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
         editor = self._shell.editor()
         if isinstance(editor, SupportsPicture):
             editor.picture(kind, white, done)

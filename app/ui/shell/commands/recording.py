@@ -130,9 +130,9 @@ class RecordCommands:
             self.show(path)
         else:
             words = _("{file} is in another folder. Choose that folder for recordings first")
-            self._shell.show_toast(words.format(file=path.name), _("Choose a folder"), self.select_folder)
+            self._shell.show_toast(words.format(file=path.name), _("Choose a folder"), self.ask_folder)
 
-    def select_folder(self) -> None:
+    def ask_folder(self) -> None:
         """Ask for the folder in which recordings are saved."""
         recordings = self._recordings
 
@@ -151,7 +151,7 @@ class RecordCommands:
             words = {
                 "time": _("Recording stopped at the time limit: {file}, {length}, {size}"),
                 "size": _("Recording stopped at the size limit: {file}, {length}, {size}"),
-            }.get(state.limit, _("Saved recording {file}: {length}, {size}"))
+            }.get(state.reached_limit, _("Saved recording {file}: {length}, {size}"))
             words = words.format(
                 file=path.stem, length=length_text(state.duration_s), size=size_text(state.size_bytes)
             )

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 else:
     folder = lazy_module("app.core.recording.folder")
 
-TIMELINE = "timeline"
+TIMELINE_PANEL = "timeline"
 
 
 class ReplayCommands:
@@ -43,14 +43,14 @@ class ReplayCommands:
             return
         self._shell.show_layout("developer")
         self._session.open_recording(path)
-        self._shell.open_panel(TIMELINE)
+        self._shell.open_panel(TIMELINE_PANEL)
 
     def return_to_live(self) -> None:
         """Close the recording and show the live network."""
         self._session.return_to_live()
         bench = self._shell.bench
-        if bench is not None and TIMELINE in bench.open_names():
-            bench.docks[TIMELINE].close()
+        if bench is not None and TIMELINE_PANEL in bench.open_names():
+            bench.docks[TIMELINE_PANEL].close()
 
     def show_folder(self, path: Path) -> None:
         """Open the folder of a recording in the file manager."""
@@ -65,7 +65,7 @@ class ReplayCommands:
         if self._replay is not None:
             self._replay.toggle()
 
-    def bookmark(self) -> None:
+    def add_bookmark(self) -> None:
         """Add a bookmark at the playhead."""
         replay = self._replay
         if replay is None:

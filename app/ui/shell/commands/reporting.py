@@ -10,8 +10,8 @@ from PySide6.QtCore import QLocale, QUrl, qVersion
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
-from app.core.documents.file_format import BehaviourFile, file_bytes
-from app.core.reports.crash_reports import ALERT
+from app.core.documents.file_format import BehaviourFile, encode_file
+from app.core.reports.crash_reports import ALERT_ID
 from app.core.session import Session
 from app.ui.other_programs import open_externally
 from app.ui.shell.commands.shell import Shell
@@ -52,11 +52,11 @@ class ReportCommands:
 
     def report(self) -> None:
         """Open the sheet for a problem report, after the newest edit of the block editor was applied."""
-        self._session.alerts.resolve(ALERT)
+        self._session.alerts.resolve(ALERT_ID)
         doctor = self._session.doctor
         if doctor.finished_s is None or self._clock() - doctor.finished_s > DOCTOR_MAX_AGE_S:
             doctor.start()
-        self._files.after_flush(self._open)
+        self._files.run_after_flush(self._open)
 
     def _open(self) -> None:
         shell, session = self._shell, self._session
@@ -65,7 +65,7 @@ class ReportCommands:
                 shell.theme, shell.surface, self._asks, shell.show_toast, self._clock
             )
         parts = problem_report.ReportParts(
-            qt_facts(shell.surface), session.settings.all(), lambda: session.doctor.report(DOCTOR_TIMEOUT_S)
+            qt_info(shell.surface), session.settings.all(), lambda: session.doctor.report(DOCTOR_TIMEOUT_S)
         )
         documents = session.documents
         names = [documents.title(each) for each in documents if not each.is_blank]
@@ -76,7 +76,7 @@ class ReportCommands:
         return [
             problem_report.ReportedWork(
                 documents.title(each),
-                file_bytes(BehaviourFile(each.name, each.workspace, each.robots, each.others)),
+                encode_file(BehaviourFile(each.name, each.workspace, each.robots, each.others)),
             )
             for each in documents
             if not each.is_blank
@@ -96,7 +96,7 @@ class ReportCommands:
         self._shell.show_toast(words.format(version=__version__, page=page))
 
 
-def qt_facts(window: QWidget) -> tuple[tuple[str, str], ...]:
+def qt_info(window: QWidget) -> tuple[tuple[str, str], ...]:
     """Return information that only Qt has, about its version, the screens and the window.
 
     Returns:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from app.core.robots.launcher import VIRTUAL_ROBOTS
+from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
 from app.core.session import Session
 from app.errors import SettingsError
 from app.ui.shell.commands.shell import Shell
@@ -18,7 +18,7 @@ from nep.i18n import _
 
 
 @dataclass(frozen=True, slots=True)
-class RobotSwap:
+class RobotReplacement:
     """Replacement of a robot in a behaviour, as argument of a command.
 
     Attributes:
@@ -30,7 +30,7 @@ class RobotSwap:
     replacement: str
 
     @classmethod
-    def parse(cls, text: str) -> RobotSwap:
+    def parse(cls, text: str) -> RobotReplacement:
         """Parse a text such as ``MISSING:OTHER``."""
         missing, _colon, other = text.partition(":")
         return cls(missing, other)
@@ -139,7 +139,7 @@ class RobotCommands:
         link = self._session.fleet.link(name)
         return link.robot.source if link is not None else self._session.document.robots.get(name, {})
 
-    def replace_robot(self, swap: RobotSwap) -> bool:
+    def replace_robot(self, swap: RobotReplacement) -> bool:
         """Replace a missing robot in the behaviour; return False if the new one is not connected.
 
         The toast has an Undo button.
@@ -150,12 +150,12 @@ class RobotCommands:
         document, robot = self._session.document, link.robot
 
         def replace() -> None:
-            if document.use_robot(swap.missing, robot):
+            if document.replace_missing_robot(swap.missing, robot):
                 words = _("Replaced {other} with {robot}")
                 words = words.format(robot=swap.replacement, other=swap.missing)
                 self._shell.show_toast(words, _("Undo"), self._undo)
 
-        self._files.after_flush(replace)
+        self._files.run_after_flush(replace)
         return True
 
     def revoke_motion_permissions(self) -> None:
@@ -203,4 +203,4 @@ class RobotCommands:
 def _virtual_model(kind: object) -> str | None:
     # None if there is no virtual robot of the model.
     model = str(kind.get("model")) if isinstance(kind, Mapping) else ""
-    return model if model in VIRTUAL_ROBOTS else None
+    return model if model in VIRTUAL_ROBOT_MODULES else None

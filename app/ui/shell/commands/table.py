@@ -14,16 +14,16 @@ from typing import TypeVar
 from app.core.session import Session
 from app.ui.shell.actions.command import ArgumentCommand, Command
 from app.ui.shell.commands.acting import ActingCommands
-from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPosition, read_stack
+from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPosition, parse_stack
 from app.ui.shell.commands.editing import Edit, EditCommands
 from app.ui.shell.commands.freeze import freeze_buttons
 from app.ui.shell.commands.recording import RecordCommands
 from app.ui.shell.commands.replay import ReplayCommands
 from app.ui.shell.commands.reporting import ReportCommands
-from app.ui.shell.commands.robots import RobotCommands, RobotSwap
+from app.ui.shell.commands.robots import RobotCommands, RobotReplacement
 from app.ui.shell.commands.shell import START_PAGE, Shell
 from app.ui.shell.commands.variables import VariableCommands
-from app.ui.shell.commands.view import TEXT_STEP, ViewCommands, read_value
+from app.ui.shell.commands.view import TEXT_SIZE_STEP_PERCENT, ViewCommands, parse_topic_field
 from app.ui.shell.documents import DocumentController
 from app.ui.theme.theme import TEXT_PERCENT_RANGE
 from nep.i18n import _, lazy
@@ -37,7 +37,7 @@ RUN_DISABLED_REASONS = {
     "stopping": lazy("Stopping robots"),
     "unanswered": lazy("A robot hasn't confirmed Stop"),
 }
-NOTHING_TO_RUN = lazy("Nothing to run")
+NOTHING_TO_RUN_TEXT = lazy("Nothing to run")
 
 
 @dataclass(frozen=True)
@@ -61,85 +61,85 @@ class Handlers:
 # Reasons why commands are unavailable, shown in the palette.
 
 
-def _no_run(do: Handlers) -> str:
+def _run_disabled_reason(do: Handlers) -> str:
     view = do.session.runs.view()
     if view.can_run or view.can_restart:
         return ""
-    return _(RUN_DISABLED_REASONS.get(view.state, NOTHING_TO_RUN))
+    return _(RUN_DISABLED_REASONS.get(view.state, NOTHING_TO_RUN_TEXT))
 
 
-def _no_restart(do: Handlers) -> str:
+def _restart_disabled_reason(do: Handlers) -> str:
     return "" if do.session.runs.active else _("Nothing is running")
 
 
-def _no_pause(do: Handlers) -> str:
+def _pause_disabled_reason(do: Handlers) -> str:
     view = do.session.runs.view()
     if view.can_pause:
         return ""
     return _("Already paused") if view.state == "paused" else _("Nothing is running")
 
 
-def _no_step(do: Handlers) -> str:
+def _step_disabled_reason(do: Handlers) -> str:
     view = do.session.runs.view()
-    return "" if view.can_step else _(RUN_DISABLED_REASONS.get(view.state, NOTHING_TO_RUN))
+    return "" if view.can_step else _(RUN_DISABLED_REASONS.get(view.state, NOTHING_TO_RUN_TEXT))
 
 
-def _no_editor(do: Handlers) -> str:
+def _editor_disabled_reason(do: Handlers) -> str:
     return "" if do.shell.current_layout == "behaviour" else _("Only in the Behaviour layout")
 
 
-def _no_panels(do: Handlers) -> str:
+def _panels_disabled_reason(do: Handlers) -> str:
     return _("The start page has no panels") if do.shell.bench is None else ""
 
 
-def _no_own_layout(do: Handlers) -> str:
+def _custom_layout_disabled_reason(do: Handlers) -> str:
     if do.shell.saved_layouts.custom_name(do.shell.current_layout):
         return ""
-    return _no_panels(do) or _("Built-in layouts can't be changed")
+    return _panels_disabled_reason(do) or _("Built-in layouts can't be changed")
 
 
-def _no_previous_layout(do: Handlers) -> str:
+def _previous_layout_disabled_reason(do: Handlers) -> str:
     if do.shell.current_layout != START_PAGE:
         return _("Only on the start page")
     return "" if do.shell.left else _("Nothing open")
 
 
-def _nothing_to_freeze(do: Handlers) -> str:
+def _freeze_disabled_reason(do: Handlers) -> str:
     return "" if freeze_buttons(do.shell.bench) else _("Nothing to freeze here")
 
 
-def _no_recent(do: Handlers) -> str:
-    return "" if do.session.settings.all_recent else _("The list is empty")
+def _recent_disabled_reason(do: Handlers) -> str:
+    return "" if do.session.settings.all_recent_files else _("The list is empty")
 
 
-def _no_open_recording(do: Handlers) -> str:
+def _open_recording_disabled_reason(do: Handlers) -> str:
     return "" if do.session.replay is not None else _("No recording is open")
 
 
-def _no_loaded_recording(do: Handlers) -> str:
+def _loaded_recording_disabled_reason(do: Handlers) -> str:
     if do.session.replay is None:
-        return _no_open_recording(do)
+        return _open_recording_disabled_reason(do)
     return "" if do.session.replay.player is not None else _("The recording is still opening")
 
 
-def _no_room(do: Handlers) -> str:
-    there = any(link.virtual for link in do.session.fleet.connected)
+def _room_disabled_reason(do: Handlers) -> str:
+    there = any(link.is_virtual for link in do.session.fleet.connected)
     return "" if there else _("No virtual robots")
 
 
-def _no_virtual_robot(do: Handlers) -> str:
+def _virtual_robot_disabled_reason(do: Handlers) -> str:
     return "" if do.session.launcher.wanted else _("No virtual robot was started in this window")
 
 
-def _not_recording(do: Handlers) -> str:
+def _recording_disabled_reason(do: Handlers) -> str:
     return "" if do.session.recordings.is_recording else _("Not recording")
 
 
-def _largest_text(do: Handlers) -> str:
+def _larger_text_disabled_reason(do: Handlers) -> str:
     return _("Text is at its largest") if do.shell.theme.text_percent >= TEXT_PERCENT_RANGE[1] else ""
 
 
-def _smallest_text(do: Handlers) -> str:
+def _smaller_text_disabled_reason(do: Handlers) -> str:
     return _("Text is at its smallest") if do.shell.theme.text_percent <= TEXT_PERCENT_RANGE[0] else ""
 
 
@@ -196,11 +196,11 @@ COMMANDS: tuple[C, ...] = (
     C("file.save_as", lazy("Save as"), lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",),
       "save-pen"),
     C("picture.save", lazy("Save blocks as image"), lambda do: do.behaviours.pictures.ask_save(), "File",
-      icon="image-down", disabled_reason=_no_editor),
+      icon="image-down", disabled_reason=_editor_disabled_reason),
     C("print.ask", lazy("Print blocks"), lambda do: do.behaviours.printing.show_dialog(), "File", ("Ctrl+P",),
-      "printer", disabled_reason=_no_editor),
-    C("print.pdf", lazy("Save blocks as PDF"), lambda do: do.behaviours.printing.ask_pdf(), "File",
-      icon="file-text", disabled_reason=_no_editor),
+      "printer", disabled_reason=_editor_disabled_reason),
+    C("print.pdf", lazy("Save blocks as PDF"), lambda do: do.behaviours.printing.ask_save_pdf(), "File",
+      icon="file-text", disabled_reason=_editor_disabled_reason),
     C("file.earlier", lazy("Earlier versions"), lambda do: do.behaviours.show_earlier_versions(), "File"),
     C("tab.close", lazy("Close the behaviour"), lambda do: do.behaviours.close(), "File", ("Ctrl+W",), "x"),
     C("tab.rename", lazy("Rename the behaviour"), lambda do: do.behaviours.rename_current(), "File", ("F2",),
@@ -208,23 +208,23 @@ COMMANDS: tuple[C, ...] = (
     C("tab.reopen", lazy("Reopen closed behaviour"), lambda do: do.files.reopen(), "File",
       ("Ctrl+Shift+T",), "history"),
     C("file.forget_recent", lazy("Clear recent files"), lambda do: do.behaviours.clear_recent(),
-      disabled_reason=_no_recent),
+      disabled_reason=_recent_disabled_reason),
     C("file.start_page", lazy("Start page"), lambda do: do.view.show_start_page(), "File", ("Alt+Home",),
       "house", separator_above=True, mac_keys=("Ctrl+Shift+H",)),
-    C("start_page.leave", lazy("Back to your work"), lambda do: do.view.leave_start_page(), icon="arrow-left",
-      in_shortcuts=False, disabled_reason=_no_previous_layout),
+    C("start_page.leave", lazy("Back to your work"), lambda do: do.view.exit_start_page(), icon="arrow-left",
+      in_shortcuts=False, disabled_reason=_previous_layout_disabled_reason),
     C("settings.open", lazy("Settings"), lambda do: do.view.open_settings(), "File", ("Ctrl+,",), "settings"),
     C("file.quit", lazy("Quit"), lambda do: do.shell.close(), "File", ("Ctrl+Q",), separator_above=True),
     C("edit.undo", lazy("Undo"), lambda do: do.behaviours.undo(), "Edit", ("Ctrl+Z",), "rotate-ccw",
-      disabled_reason=_no_editor),
+      disabled_reason=_editor_disabled_reason),
     C("edit.redo", lazy("Redo"), lambda do: do.behaviours.redo(), "Edit", ("Ctrl+Shift+Z", "Ctrl+Y"),
-      "rotate-cw", disabled_reason=_no_editor),
+      "rotate-cw", disabled_reason=_editor_disabled_reason),
     _edit("cut", lazy("Cut"), "Ctrl+X", "scissors", above=True),
     _edit("copy", lazy("Copy"), "Ctrl+C", "copy"),
     _edit("paste", lazy("Paste"), "Ctrl+V", "clipboard-paste"),
     _edit("selectAll", lazy("Select all"), "Ctrl+A", "text-select"),
     C("picture.copy", lazy("Copy blocks as image"), lambda do: do.behaviours.pictures.copy(),
-      "Edit", icon="image", separator_above=True, disabled_reason=_no_editor),
+      "Edit", icon="image", separator_above=True, disabled_reason=_editor_disabled_reason),
     C("blocks.find", lazy("Find in blocks"), lambda do: do.behaviours.find_blocks(to_add=False), "Edit",
       ("Ctrl+F",), "search", separator_above=True),
     C("blocks.search", lazy("Find and add a block"), lambda do: do.behaviours.find_blocks(to_add=True),
@@ -241,36 +241,36 @@ COMMANDS: tuple[C, ...] = (
     C("layout.developer", lazy("Developer layout"), lambda do: do.view.show_layout("developer"), "View",
       ("Alt+2",), "activity", group="layout", mac_keys=("Ctrl+Alt+2",)),
     C("layout.keep", lazy("Save layout as"), lambda do: do.view.save_layout(), "View",
-      submenu=lazy("Layouts"), disabled_reason=_no_panels),
+      submenu=lazy("Layouts"), disabled_reason=_panels_disabled_reason),
     C("layout.rename", lazy("Rename layout"), lambda do: do.view.rename_layout(), "View",
-      submenu=lazy("Layouts"), disabled_reason=_no_own_layout),
+      submenu=lazy("Layouts"), disabled_reason=_custom_layout_disabled_reason),
     C("layout.delete", lazy("Delete layout"), lambda do: do.view.delete_layout(), "View", icon="trash-2",
-      submenu=lazy("Layouts"), disabled_reason=_no_own_layout),
+      submenu=lazy("Layouts"), disabled_reason=_custom_layout_disabled_reason),
     C("layout.export", lazy("Save layout to a file"), lambda do: do.view.export_layout(), "View",
-      icon="download", submenu=lazy("Layouts"), disabled_reason=_no_panels),
+      icon="download", submenu=lazy("Layouts"), disabled_reason=_panels_disabled_reason),
     C("layout.open", lazy("Open a layout from a file"), lambda do: do.view.ask_layout(), "View",
       icon="folder-open", submenu=lazy("Layouts")),
     C("layout.reset", lazy("Reset panels"), lambda do: do.view.reset_layout(), "View",
-      disabled_reason=_no_panels),
+      disabled_reason=_panels_disabled_reason),
     C("panel.next", lazy("Next panel"), lambda do: do.shell.panel_focus.next(1), "View", ("F6",),
-      disabled_reason=_no_panels),
+      disabled_reason=_panels_disabled_reason),
     C("panel.previous", lazy("Previous panel"), lambda do: do.shell.panel_focus.next(-1), "View",
-      ("Shift+F6",), disabled_reason=_no_panels),
+      ("Shift+F6",), disabled_reason=_panels_disabled_reason),
     *map(_go_to_panel, range(1, 10)),
-    C("tab.next", lazy("Next behaviour"), lambda do: do.behaviours.next_tab(1), "View", ("Ctrl+Tab",),
+    C("tab.next", lazy("Next behaviour"), lambda do: do.behaviours.switch_tab(1), "View", ("Ctrl+Tab",),
       separator_above=True, mac_keys=("Meta+Tab", "Ctrl+Shift+]")),
-    C("tab.previous", lazy("Previous behaviour"), lambda do: do.behaviours.next_tab(-1), "View",
+    C("tab.previous", lazy("Previous behaviour"), lambda do: do.behaviours.switch_tab(-1), "View",
       ("Ctrl+Shift+Tab",), mac_keys=("Meta+Shift+Tab", "Ctrl+Shift+[")),
     C("view.freeze", lazy("Freeze display"), lambda do: do.view.freeze(), "View", icon="snowflake",
       tip=lazy("Freezes the Inspector and images"), is_checkable=True, separator_above=True,
-      disabled_reason=_nothing_to_freeze),
+      disabled_reason=_freeze_disabled_reason),
     C("replay.live", lazy("Back to live"), lambda do: do.replay.return_to_live(), "View", icon="radio-tower",
       tip=lazy("Closes the recording and returns to the live network"), separator_above=True,
-      disabled_reason=_no_open_recording),
+      disabled_reason=_open_recording_disabled_reason),
     C("replay.play", lazy("Play recording"), lambda do: do.replay.play(), icon="play",
-      disabled_reason=_no_loaded_recording),
-    C("replay.bookmark", lazy("Add bookmark"), lambda do: do.replay.bookmark(), icon="bookmark",
-      disabled_reason=_no_loaded_recording),
+      disabled_reason=_loaded_recording_disabled_reason),
+    C("replay.bookmark", lazy("Add bookmark"), lambda do: do.replay.add_bookmark(), icon="bookmark",
+      disabled_reason=_loaded_recording_disabled_reason),
     C("theme.light", lazy("Light"), lambda do: do.view.set_theme("light"), "View", icon="sun", group="theme",
       submenu=LOOK),
     C("theme.dark", lazy("Dark"), lambda do: do.view.set_theme("dark"), "View", icon="moon", group="theme",
@@ -278,12 +278,14 @@ COMMANDS: tuple[C, ...] = (
     C("theme.system", lazy("Match system"), lambda do: do.view.set_theme("system"), "View", icon="monitor",
       group="theme", submenu=LOOK),
     C("text.larger", lazy("Larger text"),
-      lambda do: do.view.set_text_size(do.shell.theme.text_percent + TEXT_STEP), "View", ("Ctrl++", "Ctrl+="),
-      "zoom-in", separator_above=True, disabled_reason=_largest_text),
+      lambda do: do.view.set_text_size(do.shell.theme.text_percent + TEXT_SIZE_STEP_PERCENT), "View",
+      ("Ctrl++", "Ctrl+="),
+      "zoom-in", separator_above=True, disabled_reason=_larger_text_disabled_reason),
     C("text.smaller", lazy("Smaller text"),
-      lambda do: do.view.set_text_size(do.shell.theme.text_percent - TEXT_STEP), "View", ("Ctrl+-",),
+      lambda do: do.view.set_text_size(do.shell.theme.text_percent - TEXT_SIZE_STEP_PERCENT), "View",
+      ("Ctrl+-",),
       "zoom-out",
-      disabled_reason=_smallest_text),
+      disabled_reason=_smaller_text_disabled_reason),
     C("text.normal", lazy("Normal text"), lambda do: do.view.set_text_size(100), "View", ("Ctrl+0",)),
     C("theme.contrast", lazy("High contrast"), lambda do: do.view.update_contrast(), "View",
       is_checkable=True,
@@ -291,13 +293,14 @@ COMMANDS: tuple[C, ...] = (
     C("theme.motion", lazy("Reduce motion"), lambda do: do.view.update_motion(), "View", is_checkable=True,
       submenu=LOOK),
     C("run.run", lazy("Run"), lambda do: do.behaviours.run_or_resume(), "Run", ("F5",), "play",
-      lazy("Runs the behaviour, or restarts it"), disabled_reason=_no_run),
+      lazy("Runs the behaviour, or restarts it"), disabled_reason=_run_disabled_reason),
     C("run.restart", lazy("Restart"), lambda do: do.behaviours.restart(), "Run", ("Ctrl+F5",), "rotate-ccw",
-      lazy("Stops the program and runs the behaviour in its current state"), disabled_reason=_no_restart),
+      lazy("Stops the program and runs the behaviour in its current state"),
+      disabled_reason=_restart_disabled_reason),
     C("run.pause", lazy("Pause"), lambda do: do.session.runs.pause(), "Run", ("F8",), "pause",
-      lazy("Pauses the program and its robots"), disabled_reason=_no_pause),
+      lazy("Pauses the program and its robots"), disabled_reason=_pause_disabled_reason),
     C("run.step", lazy("Step"), lambda do: do.behaviours.run_step(), "Run", ("F10",), "step-forward",
-      lazy("Runs one block"), disabled_reason=_no_step),
+      lazy("Runs one block"), disabled_reason=_step_disabled_reason),
     C("run.full_speed", lazy("Full speed"), lambda do: do.session.runs.set_pace(0.0), "Run", group="pace",
       separator_above=True),
     C("run.slow", lazy("Slow motion: 0.5 s per block"), lambda do: do.session.runs.set_pace(0.5), "Run",
@@ -318,9 +321,9 @@ COMMANDS: tuple[C, ...] = (
     C("robots.turtle", lazy("Use the virtual Turtle"), lambda do: do.robots.use_virtual_turtle(), "Robots",
       icon="bot"),
     C("robots.end_virtual", lazy("Remove virtual robots"), lambda do: do.robots.stop_virtual(), "Robots",
-      disabled_reason=_no_virtual_robot),
+      disabled_reason=_virtual_robot_disabled_reason),
     C("robots.room", lazy("Room in full screen"), lambda do: do.robots.toggle_room_full_screen(), "Robots",
-      ("F11",), "fullscreen", disabled_reason=_no_room),
+      ("F11",), "fullscreen", disabled_reason=_room_disabled_reason),
     # unlike "robots.virtual" without changing the layout
     C("robots.start", lazy("Start the virtual Pepper"), lambda do: do.robots.start_pepper(), in_palette=False,
       in_shortcuts=False),
@@ -338,7 +341,7 @@ COMMANDS: tuple[C, ...] = (
       icon="globe"),
     C("alarm.new", lazy("New alarm"), lambda do: do.view.new_alarm(), "View", icon="bell",
       separator_above=True,
-      disabled_reason=_no_panels),
+      disabled_reason=_panels_disabled_reason),
     C("publish.new", lazy("Publish a message"), lambda do: do.acting.publish(), icon="send",
       tip=lazy("Creates a message; nothing is sent until you arm sending")),
     C("service.show", lazy("Call a service"), lambda do: do.acting.call(""), icon="spline",
@@ -346,12 +349,12 @@ COMMANDS: tuple[C, ...] = (
     C("recording.toggle", lazy("Start or stop recording"), lambda do: do.recording.toggle(), "View",
       ("Ctrl+R",), "circle-dot", lazy("Records messages of programs until stopped"), submenu=RECORD),
     C("recording.stop", lazy("Stop recording"), lambda do: do.session.recordings.stop(), icon="circle-dot",
-      in_shortcuts=False, disabled_reason=_not_recording),
+      in_shortcuts=False, disabled_reason=_recording_disabled_reason),
     C("recording.sheet", lazy("Choose topics to record"), lambda do: do.recording.open_sheet(), "View",
       icon="list-checks", submenu=RECORD),
     C("recording.keep", lazy("Save the last seconds"), lambda do: do.recording.save_last(), "View", ("F9",),
       "history", lazy("Saves what just happened as a recording"), submenu=RECORD, separator_above=True),
-    C("recording.folder", lazy("Folder for recordings"), lambda do: do.recording.select_folder(), "View",
+    C("recording.folder", lazy("Folder for recordings"), lambda do: do.recording.ask_folder(), "View",
       icon="folder-open", submenu=RECORD, separator_above=True),
     C("recording.show", lazy("Recordings"), lambda do: do.recording.show(), "View", icon="film",
       submenu=RECORD, in_palette=False),
@@ -365,7 +368,7 @@ COMMANDS: tuple[C, ...] = (
       "stethoscope"),
     C("help.report", lazy("Report a problem"), lambda do: do.reports.report(), "Help",
       icon="message-square-warning", separator_above=True),
-    C("help.log", lazy("Show the log"), lambda do: do.view.show_log(), "Help", icon="folder-open"),
+    C("help.log", lazy("Show the log"), lambda do: do.view.open_log_folder(), "Help", icon="folder-open"),
     *releases(RELEASES_PAGE),
     C("help.about", lazy("About NEP Studio"), lambda do: do.view.about(), "Help", icon="info",
       separator_above=True),
@@ -390,20 +393,20 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
         "alarm.topic", str, lambda do, topic: do.view.new_alarm(AlarmCondition("silent", topic, for_s=2.0))
     ),
     _argument_command("alarm.node", str, lambda do, node: do.view.new_alarm(AlarmCondition("leaves", node))),
-    _argument_command("alarm.value", read_value, lambda do, about: do.view.new_value_alarm(about)),
+    _argument_command("alarm.value", parse_topic_field, lambda do, about: do.view.new_value_alarm(about)),
     _argument_command("publish.topic", str, lambda do, topic: do.acting.publish(topic)),
     _argument_command("service.call", str, lambda do, service: do.acting.call(service)),
     _argument_command("record.topic", str, lambda do, topic: do.recording.record_topic(topic)),
     _argument_command("recording.open", Path, lambda do, path: do.replay.open(path)),
     _argument_command("recording.export", Path, lambda do, path: do.recording.show_for_export(path)),
     _argument_command("recording.folder", Path, lambda do, path: do.replay.show_folder(path)),
-    _argument_command("key", str, lambda do, key: do.view.run_key(key)),
+    _argument_command("key", str, lambda do, key: do.view.run_shortcut(key)),
     _argument_command("blocks.edit", str, lambda do, what: do.behaviours.edit_blocks(what)),
-    _argument_command("try", read_stack, lambda do, stack: do.behaviours.try_stack(stack)),
+    _argument_command("try", parse_stack, lambda do, stack: do.behaviours.try_stack(stack)),
     _argument_command("block", str, lambda do, block: do.behaviours.show_block(block)),
     _argument_command("variable.rename", str, lambda do, id: do.variables.ask_rename(id)),
     _argument_command("variable.delete", str, lambda do, id: do.variables.delete(id)),
-    _argument_command("variable.watch", str, lambda do, id: do.variables.watch(id)),
+    _argument_command("variable.watch", str, lambda do, id: do.variables.toggle_watch(id)),
     _argument_command("variable.find", str, lambda do, id: do.variables.find(id)),
     _argument_command("variable.put", str, lambda do, id: do.variables.ask_value(id)),
     _argument_command("point.block", str, lambda do, block: do.behaviours.point_at(block)),
@@ -418,7 +421,7 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _argument_command("tab.folder", str, lambda do, key: do.behaviours.show_folder(key)),
     _argument_command("tab.move", TabPosition.parse, lambda do, place: do.behaviours.move_tab(place)),
     _argument_command("connect", str, lambda do, robot: do.robots.connect(robot)),
-    _argument_command("robot.use", RobotSwap.parse, lambda do, swap: do.robots.replace_robot(swap)),
+    _argument_command("robot.use", RobotReplacement.parse, lambda do, swap: do.robots.replace_robot(swap)),
     _argument_command("robot.end_virtual", str, lambda do, robot: do.robots.stop_virtual(robot)),
     _argument_command("robot.virtual", str, lambda do, missing: do.robots.start_virtual_model(missing)),
     *map(

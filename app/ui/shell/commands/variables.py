@@ -57,7 +57,7 @@ class VariableCommands:
                 question, verb, self.rejection_reason, take, self._free_name(is_list=is_list)
             )
 
-        self._after_flush(ask_name)
+        self._run_after_flush(ask_name)
 
     def _free_name(self, *, is_list: bool) -> str:
         # Suggests a name so that none has to be typed: "count", "count 2", "count 3".
@@ -83,7 +83,7 @@ class VariableCommands:
                 old if has_name else "",
             )
 
-        self._after_flush(ask_name)
+        self._run_after_flush(ask_name)
 
     def delete(self, id: str) -> None:
         """Delete a variable and the blocks that use it, and show a toast with an Undo button."""
@@ -103,9 +103,9 @@ class VariableCommands:
                 ).format(name=name, count=count)
             self._shell.show_toast(said, _("Undo"), lambda: self._edit({"do": "undo"}))
 
-        self._after_flush(delete)
+        self._run_after_flush(delete)
 
-    def watch(self, id: str) -> None:
+    def toggle_watch(self, id: str) -> None:
         """Show or hide the value of the variable with this id next to the blocks."""
         self._edit({"do": "watch", "id": id})
 
@@ -120,7 +120,7 @@ class VariableCommands:
                 self._used_before = {id: uses[place]}
                 self._edit({"do": "show", "id": uses[place]})
 
-        self._after_flush(show)
+        self._run_after_flush(show)
 
     def ask_value(self, id: str) -> None:
         """Ask for a value and assign it to a variable of the running program."""
@@ -159,9 +159,9 @@ class VariableCommands:
             return _("A variable named “{name}” already exists. Choose another name.").format(name=name)
         return ""
 
-    def _after_flush(self, act: Callable[[], None]) -> None:
+    def _run_after_flush(self, act: Callable[[], None]) -> None:
         self._shell.show_layout("behaviour")
-        self._files.after_flush(act)
+        self._files.run_after_flush(act)
 
     def _workspace(self) -> Workspace:
         return parse_workspace(self._session.document.workspace)

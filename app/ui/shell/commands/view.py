@@ -26,7 +26,7 @@ from app.ui.shell.commands.freeze import toggle_freeze
 from app.ui.shell.commands.palette_entries import PaletteEntries
 from app.ui.shell.commands.shell import START_PAGE, Shell
 from app.ui.shell.dialogs.about import AboutSheet
-from app.ui.shell.docking.layout_file import MAX_BYTES, LayoutFileError, layout_bytes, read_layout
+from app.ui.shell.docking.layout_file import MAX_BYTES, LayoutFileError, decode_layout, encode_layout
 from app.ui.shell.docking.layouts import layout_named
 from app.ui.shell.documents import DocumentController
 from app.ui.shell.hint_ring import HintRing
@@ -58,7 +58,7 @@ else:
         lazy_module("app.ui.shell.dialogs.shortcuts"),
     )
 
-TEXT_STEP = 25
+TEXT_SIZE_STEP_PERCENT = 25
 MAX_NAMED = 4
 
 
@@ -74,7 +74,7 @@ class SupportsRobotChoice(Protocol):
 class SupportsDiagnosis(Protocol):
     """Interface of the panel of the connection doctor."""
 
-    def check_panel(self, asker: PanelWidget | None) -> None:
+    def set_stalled_panel(self, asker: PanelWidget | None) -> None:
         """Set the panel whose missing data is to be diagnosed; None for a general check."""
 
 
@@ -94,7 +94,7 @@ class SupportsAlarms(Protocol):
         """
 
 
-def read_value(text: str) -> tuple[str, str]:
+def parse_topic_field(text: str) -> tuple[str, str]:
     """Split a text such as "/odom pose.x" at the first space into topic and field path."""
     topic, _blank, path = text.partition(" ")
     return topic, path
@@ -106,7 +106,7 @@ class ViewCommands:
     def __init__(self, shell: Shell, session: Session, files: DocumentController, keys: Shortcuts) -> None:
         self._shell, self._session, self._files = shell, session, files
         self.shortcuts = keys
-        self._palette: command_palette.Palette | None = None
+        self._palette: command_palette.CommandPalette | None = None
         self._shortcut_sheet: shortcuts.ShortcutSheet | None = None
         self._name_sheet: name_sheet.NameSheet | None = None
         self._settings_sheet: settings_sheet.SettingsSheet | None = None
@@ -119,12 +119,12 @@ class ViewCommands:
         The shortcuts and check marks of the actions are updated from now on.
         """
         self._actions, self._entries = actions, entries
-        self.shortcuts.changed.connect(self.show_keys)
+        self.shortcuts.changed.connect(self.update_shortcuts)
         self._shell.theme.changed.connect(self._update_theme_actions)
-        self.show_keys()
+        self.update_shortcuts()
         self._update_theme_actions()
 
-    def show_keys(self) -> None:
+    def update_shortcuts(self) -> None:
         """Update the shortcuts of all actions.
 
         The command "Find" has its shortcut only in the Behaviour layout; elsewhere the panels handle
@@ -134,7 +134,7 @@ class ViewCommands:
         of = self.shortcuts.keys_of
         self._actions.set_keys(lambda name: of(name) if here or name != "blocks.find" else ())
 
-    def run_key(self, key: str) -> bool:
+    def run_shortcut(self, key: str) -> bool:
         """Run the command to which a shortcut is assigned; return False if none is available."""
         holder = self.shortcuts.command_for(key)
         return bool(holder) and self._actions.run(holder)
@@ -143,7 +143,7 @@ class ViewCommands:
         """Open the command palette, or close it if it is open."""
         if self._palette is None:
             shell = self._shell
-            self._palette = command_palette.Palette(
+            self._palette = command_palette.CommandPalette(
                 shell.theme, shell.surface, self._entries.all, self.run_entry, self._rebind
             )
             kept: list[object] = self._session.settings.get("palette_last", [])
@@ -168,7 +168,7 @@ class ViewCommands:
             if dock is not None and isinstance(dock.panel, SupportsRobotChoice):
                 dock.panel.select_robot(name)
         elif kind == "layout":
-            self.show_own_layout(name)
+            self.show_custom_layout(name)
         elif kind in {"file", "example"}:
             (self._files.open if kind == "file" else self._files.open_example)(Path(name))
 
@@ -273,7 +273,7 @@ class ViewCommands:
         self._shell.show_start()
         self._shell.state.save_layout(START_PAGE)
 
-    def leave_start_page(self) -> None:
+    def exit_start_page(self) -> None:
         """Leave the start page and show the previous layout."""
         if self._shell.current_layout == START_PAGE and self._shell.left:
             self.show_layout(self._shell.left)
@@ -288,7 +288,7 @@ class ViewCommands:
         self._shell.saved_layouts.switch(self._shell.show_layout(layout), layout, "")
         self._actions.select(f"layout.{layout}")
 
-    def show_own_layout(self, name: str) -> None:
+    def show_custom_layout(self, name: str) -> None:
         """Show the custom layout with this name, if it exists."""
         own = self._shell.saved_layouts.named(name)
         if own is not None:
@@ -360,7 +360,7 @@ class ViewCommands:
 
         def save(path: Path, _kind: FileKind) -> None:
             try:
-                write_atomically(path, layout_bytes(name, base, bench.save()))
+                write_atomically(path, encode_layout(name, base, bench.save()))
             except OSError as error:
                 reason = (error.strerror or str(error)).lower()
                 shell.show_toast(_("can't write {file}: {reason}").format(file=path.name, reason=reason))
@@ -379,7 +379,7 @@ class ViewCommands:
         """Import a layout file and show the layout; an error is shown in a toast."""
         shell = self._shell
         try:
-            found = read_layout(read_regular_file(path, MAX_BYTES), path.stem, shell.panels)
+            found = decode_layout(read_regular_file(path, MAX_BYTES), path.stem, shell.panels)
         except (OSError, LayoutFileError) as error:
             reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
             reason = f"{reason[:1].lower()}{reason[1:]}"
@@ -392,7 +392,7 @@ class ViewCommands:
             )
             return
         name, _is_kept = layouts.import_layout(found.name, found.base, found.saved)
-        self.show_own_layout(name)
+        self.show_custom_layout(name)
 
         def undo() -> None:
             bench = shell.bench if shell.current_layout == found.base else None
@@ -401,8 +401,8 @@ class ViewCommands:
                 layouts.switch(bench, found.base, before)
 
         words = _("Opened the layout “{name}”").format(name=name)
-        if found.unknown:
-            left_out = format_list(list(found.unknown[:MAX_NAMED]))
+        if found.unknown_panels:
+            left_out = format_list(list(found.unknown_panels[:MAX_NAMED]))
             words = _("{opened}. Unknown panels were skipped: {panels}").format(opened=words, panels=left_out)
         shell.show_toast(words, _("Undo"), undo)
 
@@ -475,9 +475,9 @@ class ViewCommands:
             self.show_layout("developer")
         dock = self._shell.open_panel("doctor")
         if dock is not None and isinstance(dock.panel, SupportsDiagnosis):
-            dock.panel.check_panel(asker)
+            dock.panel.set_stalled_panel(asker)
 
-    def show_log(self) -> None:
+    def open_log_folder(self) -> None:
         """Open the folder of log files, creating it if necessary."""
         folder = log_folder()
         try:

@@ -16,7 +16,7 @@ from nep.i18n import _, lazy
 from nep.version import __version__
 
 TITLE = "NEP Studio"
-LINES = (
+TEXT_LINES = (
     lazy("See what robots send, and program what they do."),
     lazy("NEP Studio is free software (MIT licence)."),
     lazy("Inter, JetBrains Mono and M PLUS 1p: SIL Open Font License 1.1. Icons: Lucide, ISC licence."),
@@ -55,7 +55,7 @@ class AboutSheet(Overlay):
         column.addLayout(head)
         lines = QVBoxLayout()
         lines.setSpacing(6)
-        for words in LINES:
+        for words in TEXT_LINES:
             lines.addWidget(label(_(words), "body", role="textSecondary", wrap=True))
         column.addLayout(lines)
         grid = QGridLayout()

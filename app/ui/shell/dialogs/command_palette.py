@@ -16,7 +16,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Finder, Match
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.i18n import _, lazy, ngettext
 
 WIDTH, TOP, FIELD, FOOTER_HEIGHT = 640, 128, 56, 36
@@ -36,7 +36,7 @@ class _Field(QLineEdit):
         self.setProperty("bare", "true")
         self.setProperty("ownFocus", True)
         self.setFrame(False)
-        EditMenu(theme, self)
+        ContextMenuFilter(theme, self)
         self.restyle()
 
     def restyle(self) -> None:
@@ -59,10 +59,10 @@ class _Field(QLineEdit):
         painter.end()
 
 
-class _Foot(QWidget):
+class _Footer(QWidget):
     """Footer with hints about keys and the number of matches."""
 
-    KEYS = (
+    KEY_HINTS = (
         (("↑", "↓"), lazy("choose")),
         (("Enter",), lazy("run")),
         (("Ctrl+Enter",), lazy("change shortcut")),
@@ -83,7 +83,7 @@ class _Foot(QWidget):
         middle, left = self.height() / 2, 18.0
         paint.hairline(painter, QRectF(self.rect()), Qt.Edge.TopEdge, theme.colour("border"))
         count = paint.width_of(font, self.counted)
-        for keys, words in self.KEYS:
+        for keys, words in self.KEY_HINTS:
             said = _(words)
             caps = [shortcut_text(key) for key in keys]
             wide = sum(paint.key_width(theme, cap) + 5 for cap in caps) + paint.width_of(font, said)
@@ -100,7 +100,7 @@ class _Foot(QWidget):
         painter.end()
 
 
-class Palette(Overlay):
+class CommandPalette(Overlay):
     """Command palette, 640 px wide and 128 px below the top of the window.
 
     Args:
@@ -131,7 +131,7 @@ class Palette(Overlay):
         self.rows = EntryList(theme, _("Matches"))
         self.nothing = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.nothing.setContentsMargins(20, 14, 20, 16)
-        self.foot = _Foot(theme)
+        self.foot = _Footer(theme)
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 1, 1, 1)
         column.setSpacing(0)
@@ -182,7 +182,7 @@ class Palette(Overlay):
             found, count = self._finder.find(query, MAX_RESULTS)
             self.foot.counted = _("{shown} of {count}").format(shown=count, count=len(self._finder.entries))
             for each in found:
-                heading = Heading(_(TITLES[each.entry.kind]))
+                heading = Heading(_(GROUP_TITLES[each.entry.kind]))
                 if heading not in lines:
                     lines.append(heading)
                 lines.append(each)
@@ -198,7 +198,7 @@ class Palette(Overlay):
         entries = self._finder.entries
         known = {entry.id: entry for entry in entries if entry.id in self.last}
         last = [known[id] for id in self.last if id in known][:MAX_LAST_SHOWN]
-        lines: list[Line] = [Heading(_(TITLES["recent"])), *map(Match, last)] if last else []
+        lines: list[Line] = [Heading(_(GROUP_TITLES["recent"])), *map(Match, last)] if last else []
         kinds: dict[str, list[Match]] = {}
         for entry in entries:
             of_kind = kinds.setdefault(entry.kind, [])
@@ -206,7 +206,7 @@ class Palette(Overlay):
                 of_kind.append(Match(entry))
         for kind, of_kind in kinds.items():
             if of_kind:
-                lines += [Heading(_(TITLES[kind])), *of_kind]
+                lines += [Heading(_(GROUP_TITLES[kind])), *of_kind]
         self.foot.counted = ngettext("{count} result", "{count} results", len(entries)).format(
             count=len(entries)
         )
@@ -253,7 +253,7 @@ class Palette(Overlay):
             self._rebind(entry.name)
 
 
-TITLES = {
+GROUP_TITLES = {
     "recent": lazy("Recently used"),
     "command": lazy("Commands"),
     "panel": lazy("Panels"),

@@ -43,7 +43,7 @@ from app.ui.widgets import Button, ElidedLabel, IconButton, label, paint
 from app.ui.widgets.file_dialogs import BEHAVIOURS, PICTURE_SUFFIXES, FileKind, pictures_folder, resolve_kind
 from app.ui.widgets.inputs.combo_box import ComboBox
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.i18n import _, lazy
 
 WIDTH, HEIGHT, PLACES_WIDTH, FOLDER_NAME_WIDTH = 860, 560, 190, 200
@@ -75,13 +75,17 @@ class FileQuestion:
     kinds: tuple[FileKind, ...] = (FileKind(BEHAVIOURS[0], SUFFIX),)
 
 
-OPEN = FileQuestion(lazy("Open a behaviour"), lazy("Open"), lazy("No behaviours or folders here."))
-SAVE = FileQuestion(lazy("Save behaviour"), lazy("Save"), lazy("This folder is empty."), is_saving=True)
-PICTURE = FileQuestion(
+OPEN_QUESTION = FileQuestion(lazy("Open a behaviour"), lazy("Open"), lazy("No behaviours or folders here."))
+SAVE_QUESTION = FileQuestion(
+    lazy("Save behaviour"), lazy("Save"), lazy("This folder is empty."), is_saving=True
+)
+IMAGE_QUESTION = FileQuestion(
     lazy("Choose an image"), lazy("Choose"), lazy("No images or folders here."),
     suffixes=PICTURE_SUFFIXES, icon="image",
 )  # fmt: skip
-FOLDER = FileQuestion(lazy("Choose a folder"), lazy("Use this folder"), "", suffixes=(), selects_folder=True)
+FOLDER_QUESTION = FileQuestion(
+    lazy("Choose a folder"), lazy("Use this folder"), "", suffixes=(), selects_folder=True
+)
 
 
 @dataclass(frozen=True)
@@ -103,8 +107,8 @@ def known_locations(studio: Path, recent: Iterable[Path]) -> tuple[FolderLocatio
     kinds = QStandardPaths.StandardLocation
     found = [
         FolderLocation(_("Home"), "house", Path.home()),
-        FolderLocation(_("Desktop"), "monitor", _standard(kinds.DesktopLocation)),
-        FolderLocation(_("Documents"), "file-text", _standard(kinds.DocumentsLocation)),
+        FolderLocation(_("Desktop"), "monitor", _standard_folder(kinds.DesktopLocation)),
+        FolderLocation(_("Documents"), "file-text", _standard_folder(kinds.DocumentsLocation)),
         FolderLocation(_("Images"), "image", Path(pictures_folder())),
         FolderLocation(_("Backed up by Studio"), "archive", studio),
         *(FolderLocation(path.parent.name or str(path.parent), "history", path.parent) for path in recent),
@@ -116,7 +120,7 @@ def known_locations(studio: Path, recent: Iterable[Path]) -> tuple[FolderLocatio
     return tuple(made)
 
 
-def _standard(kind: QStandardPaths.StandardLocation) -> Path:
+def _standard_folder(kind: QStandardPaths.StandardLocation) -> Path:
     return Path(QStandardPaths.writableLocation(kind) or Path.home())
 
 
@@ -164,7 +168,7 @@ class FileSheet(Overlay):
         self._scrim.pressed.disconnect(self.dismiss)  # a click outside must not discard a typed name
         self._places = places
         self._take: Callable[[Path], object] = lambda _path: None
-        self.question = OPEN
+        self.question = OPEN_QUESTION
         self.folder = Path.home()
         self.heading = label("", "heading")
         self.up = IconButton(theme, "arrow-up", _("Parent folder"), "Alt+Up")
@@ -186,7 +190,7 @@ class FileSheet(Overlay):
         self.folder_name.returnPressed.connect(self._create_folder)
         for field in (self.name, self.folder_name):
             field.setProperty("focusRadius", theme.radius("control"))
-            EditMenu(theme, field)
+            ContextMenuFilter(theme, field)
         self.ending = label(SUFFIX, "bodyLarge", role="textTertiary")
         self.kind = ComboBox(theme, name=_("File type"))
         self.kind.currentIndexChanged.connect(self._on_kind_changed)
@@ -259,7 +263,9 @@ class FileSheet(Overlay):
         column.addLayout(head)
         column.addLayout(middle, 1)
 
-    def ask_open(self, folder: Path, take: Callable[[Path], object], question: FileQuestion = OPEN) -> None:
+    def ask_open(
+        self, folder: Path, take: Callable[[Path], object], question: FileQuestion = OPEN_QUESTION
+    ) -> None:
         """Ask for a file to open.
 
         Args:
@@ -271,15 +277,15 @@ class FileSheet(Overlay):
 
     def ask_picture(self, folder: Path, take: Callable[[Path], object]) -> None:
         """Ask for an image file to open."""
-        self._ask(PICTURE, folder, take)
+        self._ask(IMAGE_QUESTION, folder, take)
 
     def ask_folder(self, folder: Path, take: Callable[[Path], object]) -> None:
         """Ask for a folder, which is the selected one or else the displayed one."""
-        self._ask(FOLDER, folder, take)
+        self._ask(FOLDER_QUESTION, folder, take)
 
     def ask_save(self, suggestion: Path, take: Callable[[Path], object]) -> None:
         """Ask for the folder and name to save a behaviour."""
-        self._ask_name(SAVE, suggestion, take)
+        self._ask_name(SAVE_QUESTION, suggestion, take)
 
     def ask_save_as(
         self,
@@ -298,7 +304,13 @@ class FileSheet(Overlay):
         """
         endings = tuple(dict.fromkeys(each.suffix for each in kinds))
         question = FileQuestion(
-            title, SAVE.verb, SAVE.empty, suffixes=endings, icon="image", is_saving=True, kinds=tuple(kinds)
+            title,
+            SAVE_QUESTION.verb,
+            SAVE_QUESTION.empty,
+            suffixes=endings,
+            icon="image",
+            is_saving=True,
+            kinds=tuple(kinds),
         )
         self._ask_name(question, suggestion, lambda path: take(*resolve_kind(path, self._kind, kinds)))
 

@@ -48,12 +48,12 @@ from app.ui.widgets import SearchField, label, paint
 from nep.i18n import ENGLISH, _, ngettext
 
 WIDE, HIGH, LIST_WIDTH = 920, 640, 220
-LINE_PERCENT = 115.0
-PICTURE_RATIO = 1.5
+LINE_HEIGHT_PERCENT = 115.0
+IMAGE_PIXEL_RATIO = 1.5
 """Pixels of an image file per logical pixel; greater than 1 for sharp images on high-DPI screens."""
-_PICTURE = re.compile(r"!\[([^\]]*)\]\(([a-z-]+)\)")
-_KEY = re.compile(r"\{key:([a-z_.]+)\}")
-_MARKS = re.compile(r"[*#|`_-]+")
+_IMAGE_PATTERN = re.compile(r"!\[([^\]]*)\]\(([a-z-]+)\)")
+_KEY_PATTERN = re.compile(r"\{key:([a-z_.]+)\}")
+_MARKUP_PATTERN = re.compile(r"[*#|`_-]+")
 
 
 @dataclass(frozen=True)
@@ -72,13 +72,13 @@ class GuidePage:
 
     def matches(self, words: str) -> bool:
         """Return True if the page contains all words of a query, also in alternative texts of images."""
-        said = _MARKS.sub(" ", _PICTURE.sub(r"\1", self.text)).casefold()
+        said = _MARKUP_PATTERN.sub(" ", _IMAGE_PATTERN.sub(r"\1", self.text)).casefold()
         return all(word in said for word in words.casefold().split())
 
     @property
     def pictures(self) -> tuple[tuple[str, str], ...]:
         """Images of the page, as pairs of name and alternative text."""
-        return tuple((name, words) for words, name in _PICTURE.findall(self.text))
+        return tuple((name, words) for words, name in _IMAGE_PATTERN.findall(self.text))
 
     def picture(self, name: str, *, dark: bool) -> Path | None:
         """Return the file of an image for the dark or the light theme, or None if it doesn't exist."""
@@ -99,7 +99,7 @@ def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tup
     for path in sorted((folder / ENGLISH).glob("*.md")):
         translated = own / path.name
         text = read_regular_file(translated if translated.is_file() else path).decode("utf-8")
-        text = _KEY.sub(lambda found: f"**{shortcut_text(key_of(found[1])) or '-'}**", text)
+        text = _KEY_PATTERN.sub(lambda found: f"**{shortcut_text(key_of(found[1])) or '-'}**", text)
         title = text.partition("\n")[0].lstrip("# ")
         made.append(GuidePage(title, text, (own, folder / ENGLISH)))
     return tuple(made)
@@ -136,15 +136,15 @@ class PageView(QTextBrowser):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        if self._laid_for and self._laid_for != self._room():
+        if self._laid_for and self._laid_for != self._available_width():
             self._again.start(0)
 
-    def _room(self) -> int:
+    def _available_width(self) -> int:
         return self.viewport().width() - 2 * round(self.document().documentMargin())
 
     def _fit_pictures(self) -> None:
         # Scales each image to device pixels, so that it stays sharp.
-        self._laid_for = self._room()
+        self._laid_for = self._available_width()
         document, ratio = self.document(), self.devicePixelRatioF()
         cursor = QTextCursor(document)
         for place in self._image_positions():
@@ -154,7 +154,7 @@ class PageView(QTextBrowser):
             whole = self.loadResource(QTextDocument.ResourceType.ImageResource.value, QUrl(look.name()))
             if not isinstance(whole, QImage) or whole.isNull():
                 continue
-            width = min(self._laid_for, round(whole.width() / PICTURE_RATIO))
+            width = min(self._laid_for, round(whole.width() / IMAGE_PIXEL_RATIO))
             plain_image = whole.convertToFormat(QImage.Format.Format_RGB32)
             pixels = plain_image.scaledToWidth(
                 round(width * ratio), Qt.TransformationMode.SmoothTransformation
@@ -195,7 +195,7 @@ class GuideSheet(Overlay):
         self._read = pages
         self._pages: tuple[GuidePage, ...] = ()
         self.search = SearchField(theme, _("Search the guide"))
-        self.search.textChanged.connect(self._filter)
+        self.search.textChanged.connect(self._apply_filter)
         self.search.installEventFilter(self)
         self.list = QListWidget()
         self.list.setAccessibleName(_("Pages of the guide"))
@@ -239,7 +239,7 @@ class GuideSheet(Overlay):
         place = max(0, self.list.currentRow())
         self._pages = tuple(self._read())
         self.search.clear()
-        self._filter("")
+        self._apply_filter("")
         self.list.setCurrentRow(place)
         super().open()
 
@@ -248,7 +248,7 @@ class GuideSheet(Overlay):
         """Pages that match the search."""
         return tuple(page for page in self._pages if page.matches(self.search.text()))
 
-    def _filter(self, words: str) -> None:
+    def _apply_filter(self, words: str) -> None:
         self.list.blockSignals(True)
         self.list.clear()
         self._left.setFixedWidth(round(self.theme.scaled(LIST_WIDTH)))
@@ -279,7 +279,7 @@ class GuideSheet(Overlay):
         self.page.show_page(self.matching_pages[row])
         for frame in document.rootFrame().childFrames():
             if isinstance(frame, QTextTable):
-                self._line(frame)
+                self._format_table(frame)
         self._set_text(document)
         found = self.search.text().split()
         if found:
@@ -300,7 +300,7 @@ class GuideSheet(Overlay):
                 look.setBottomMargin(self.theme.scaled(4 if block.textList() is not None else 10))
                 look.setTopMargin(self.theme.scaled(12 if heading > 1 else 6 if picture else 0))
                 # above an image the larger line height would look like a gap
-                percent = 100.0 if picture else LINE_PERCENT
+                percent = 100.0 if picture else LINE_HEIGHT_PERCENT
                 look.setLineHeight(percent, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
                 cursor.setBlockFormat(look)
             for part in [each.fragment() for each in cast("Iterable[QTextBlock.iterator]", block)]:
@@ -324,7 +324,7 @@ class GuideSheet(Overlay):
                 return True
         return super().eventFilter(watched, event)
 
-    def _line(self, table: QTextTable) -> None:
+    def _format_table(self, table: QTextTable) -> None:
         # Sets row lines, cell padding and full width of tables.
         look = table.format().toTableFormat()
         look.setBorderStyle(QTextFrameFormat.BorderStyle.BorderStyle_Solid)
@@ -336,4 +336,4 @@ class GuideSheet(Overlay):
 
     def _restyle(self) -> None:
         if self.isVisible():
-            self._filter(self.search.text())
+            self._apply_filter(self.search.text())

@@ -39,7 +39,7 @@ class _Tile(QWidget):
         painter.end()
 
 
-class MotionQuestion(QWidget):
+class MotionPermissionCard(QWidget):
     """Card that shows the pending question of `MotionPermission`. Esc cancels.
 
     "Cancel" has the initial focus, so that an Enter that was typed for another widget doesn't allow

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.i18n import _
 
 WIDTH = 420
@@ -29,7 +29,7 @@ class NameSheet(Overlay):
         self.heading = label("", "heading")
         self.field = QLineEdit()
         self.field.setProperty("focusRadius", theme.radius("control"))
-        EditMenu(theme, self.field)
+        ContextMenuFilter(theme, self.field)
         self.wrong = label("", "body", role="error", wrap=True)
         self.button = Button(theme, "", kind="primary", size="form")
         cancel = Button(theme, _("Cancel"), size="form")

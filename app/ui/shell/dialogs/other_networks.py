@@ -14,7 +14,7 @@ from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text.numbers import group_digits
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Separator, Switch, label, paint, set_role
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.errors import NepError
 from nep.i18n import _, lazy, ngettext
 
@@ -112,7 +112,7 @@ class NetworkRow(QWidget):
         self.switch = Switch(theme, kind.product_name)
         self.switch.setMinimumWidth(round(theme.scaled(SWITCH_WIDTH)))
         place = _(kind.address_label)
-        self.address = AddressField(theme, f"{kind.product_name}: {place}", kind.example, self.apply)
+        self.address = AddressField(theme, f"{kind.product_name}: {place}", kind.default_address, self.apply)
         said = label(place, "small", role="textTertiary")
         self.state = label("", "small", role="textSecondary", wrap=True)
         self._wrong = ""
@@ -195,7 +195,7 @@ class AddressField(QLineEdit):
         self.setProperty("focusRadius", theme.radius("control"))
         self.setMinimumWidth(round(theme.scaled(190)))
         self.setMaxLength(400)
-        EditMenu(theme, self)
+        ContextMenuFilter(theme, self)
 
     def set_invalid(self, *, wrong: bool) -> None:
         """Show the address as invalid if `wrong`, else as valid."""

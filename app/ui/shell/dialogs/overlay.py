@@ -26,7 +26,7 @@ from nep.i18n import _
 
 SHADOW_PX = 28
 SHADOW_OFFSET_PX = 10
-EDGE = 16
+EDGE_MARGIN = 16
 STOP_GAP = 5
 STOP_INSET = 4  # margin in px of the button around its body, for the focus ring
 
@@ -103,7 +103,7 @@ class Scrim(QWidget):
         self.setMask(whole)
         self.update()
 
-    def set_strength(self, strength: float) -> None:
+    def set_opacity(self, strength: float) -> None:
         """Set the opacity, from 0 (transparent) to 1."""
         self.strength = strength
         self.update()
@@ -141,7 +141,7 @@ class Overlay(QWidget):
     """
 
     closed = Signal()
-    top = EDGE
+    top = EDGE_MARGIN
     is_docked_right = False
     """True if the sheet is docked at the right edge of the window; toasts are placed to its left."""
     is_nested = False
@@ -156,7 +156,7 @@ class Overlay(QWidget):
         self._scrim.surface = self
         self._scrim.pressed.connect(self.dismiss)
         self._stops = StopButtonWatcher(window, self)
-        self._stops.changed.connect(self._stop_moved)
+        self._stops.changed.connect(self._on_stop_moved)
         self._before: QWidget | None = None
         self._opening = QVariantAnimation(self)
         self._opening.setStartValue(0.0)
@@ -197,7 +197,7 @@ class Overlay(QWidget):
             self._opening.setDuration(duration)
             self._opening.start()
         else:
-            self._scrim.set_strength(1.0)
+            self._scrim.set_opacity(1.0)
         self.show()
         self.raise_()
         self.first().setFocus(Qt.FocusReason.PopupFocusReason)
@@ -253,13 +253,15 @@ class Overlay(QWidget):
             self.setGeometry(place)
             self._scrim.cover()
 
-    def _stop_moved(self) -> None:
+    def _on_stop_moved(self) -> None:
         self.place()
         self._scrim.cover()
 
     def _geometry_at(self, top: int) -> QRect:
         window = self.covered_window()
-        size = self.preferred_size(QSize(window.width() - 2 * EDGE, window.height() - top - 2 * EDGE))
+        size = self.preferred_size(
+            QSize(window.width() - 2 * EDGE_MARGIN, window.height() - top - 2 * EDGE_MARGIN)
+        )
         return QRect(QPoint((window.width() - size.width()) // 2, top), size)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -310,11 +312,11 @@ class Overlay(QWidget):
 
     def _set_progress(self, share: object) -> None:
         strength = float(share) if isinstance(share, float) else 1.0
-        self._scrim.set_strength(strength)
+        self._scrim.set_opacity(strength)
         effect = self.graphicsEffect()
         if isinstance(effect, QGraphicsOpacityEffect):
             effect.setOpacity(max(0.01, strength))
 
     def _finish_opening(self) -> None:
         self.setGraphicsEffect(None)  # type: ignore[arg-type]  # None removes the effect
-        self._scrim.set_strength(1.0)
+        self._scrim.set_opacity(1.0)

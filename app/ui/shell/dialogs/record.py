@@ -20,7 +20,7 @@ from app.core.recording.choice import (
     RecordingChoice,
 )
 from app.core.recording.client import LOW_DISK_BYTES
-from app.ui.shell.dialogs.overlay import EDGE, Overlay
+from app.ui.shell.dialogs.overlay import EDGE_MARGIN, Overlay
 from app.ui.text.numbers import age_text, bandwidth_text, group_digits, length_text, rate_text, size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import (
@@ -32,13 +32,13 @@ from app.ui.widgets import (
     Separator,
     Switch,
     ValueBar,
+    assign_command,
     label,
-    name_command,
     set_role,
 )
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.pattern_field import PatternField
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
 from nep.errors import BadTopicError
@@ -51,13 +51,13 @@ if TYPE_CHECKING:
 
 WIDE, HIGH, SIDE = 640, 812, 20
 MIN_DOCKED_WIDTH = 1280  # px at 100 % text; in wider windows the sheet covers one column, without a scrim
-BELOW_BARS = 88
+TOP_OFFSET = 88
 REFRESH_MS = 300
 MIN_TABLE_HEIGHT = 170
 LABEL_WIDE, NUMBER_WIDE, BAR_WIDE = 80, 84, 120
 MAX_DISPLAYED_S = 2 * 86_400.0
 """Threshold in s; if the disk has space for a longer recording, the remaining time is not shown."""
-_GB = 1e9
+_BYTES_PER_GB = 1e9
 
 
 class RecordMeter(QWidget):
@@ -112,8 +112,8 @@ class RecordSheet(Overlay):
         self._speed: float | None = None
         self._make_meters()
         self._make_form()
-        self._make_ring(keep)
-        self._make_foot()
+        self._make_flight_recorder(keep)
+        self._make_footer()
         self._arrange()
         self._timer = QTimer(self)
         self._timer.setInterval(REFRESH_MS)
@@ -156,7 +156,7 @@ class RecordSheet(Overlay):
         self.model: TableModel[Topic] = TableModel(self._columns(), lambda topic: topic.name)
         self.table: TableView[Topic] = TableView(theme, self.model, "topic")
         self.table.setAccessibleName(_("Topics to record"))
-        self.table.opened.connect(self._toggle)
+        self.table.opened.connect(self._toggle_topic)
         self.table.order_changed.connect(self._show_topics)
         self.table.setMinimumHeight(MIN_TABLE_HEIGHT)
         self.later = label(
@@ -170,8 +170,8 @@ class RecordSheet(Overlay):
         self.ends_gb.setAccessibleName(_("Stop at (GB)"))
         for field, name in ((self.ends_min, "max_minutes"), (self.ends_gb, "max_gb")):
             field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
-            field.number.connect(lambda value, name=name: self._change(**{name: value}))
-            field.cleared.connect(lambda name=name: self._change(**{name: None}))
+            field.number.connect(lambda value, name=name: self._update_limits(**{name: value}))
+            field.cleared.connect(lambda name=name: self._update_limits(**{name: None}))
             field.problem_changed.connect(self._show_limits_problem)
         self.ends_words = label("", "small", role="textSecondary", wrap=True)
 
@@ -181,13 +181,13 @@ class RecordSheet(Overlay):
         made.setPlaceholderText(example)
         made.setProperty("focusRadius", self.theme.radius("control"))
         made.setMaxLength(400)
-        EditMenu(self.theme, made)
+        ContextMenuFilter(self.theme, made)
         return made
 
-    def _make_ring(self, keep: Callable[[], None]) -> None:
+    def _make_flight_recorder(self, keep: Callable[[], None]) -> None:
         theme = self.theme
         self.ring = Switch(theme, _("Flight recorder"))
-        self.ring.clicked.connect(self._switch_ring)
+        self.ring.clicked.connect(self._toggle_flight_recorder)
         self.seconds = NumberEdit(theme, MIN_S, MAX_S, _("s"))
         self.seconds.setAccessibleName(_("Seconds to keep"))
         self.seconds.number.connect(lambda value: self._update_flight_recorder(seconds=round(value)))
@@ -196,16 +196,16 @@ class RecordSheet(Overlay):
         self.size_gb.number.connect(lambda value: self._update_flight_recorder(size_gb=value))
         for field in (self.seconds, self.size_gb):
             field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
-            field.problem_changed.connect(self._show_ring_problem)
+            field.problem_changed.connect(self._show_flight_recorder_problem)
         self.ring_topics = PatternField(theme, _("Topics to keep"), _("all topics; or /arm/* *camera*"))
-        self.ring_topics.settled.connect(self._apply_ring_topics)
+        self.ring_topics.editing_finished.connect(self._apply_flight_recorder_topics)
         self.ring_bar = ValueBar(theme)
         self.ring_words = label("", "small", role="textSecondary", wrap=True)
         self.keep = Button(theme, "", "history", size="small")
-        name_command(self.keep, "recording.keep")
+        assign_command(self.keep, "recording.keep")
         self.keep.clicked.connect(keep)
 
-    def _make_foot(self) -> None:
+    def _make_footer(self) -> None:
         theme = self.theme
         self.foot = label(
             _("At most 1 s of data is lost in a power failure"), "small", role="textTertiary", wrap=True
@@ -213,7 +213,7 @@ class RecordSheet(Overlay):
         self.bookmark = Button(theme, _("Bookmark"), "bookmark", size="form")
         self.bookmark.clicked.connect(self._add_bookmark)
         self.record = Button(theme, _("Record"), "circle-dot", kind="primary", size="form")
-        name_command(self.record, "recording.toggle")
+        assign_command(self.record, "recording.toggle")
         self.record.clicked.connect(self._toggle_recording)
 
     def _form_rows(self) -> QGridLayout:
@@ -232,13 +232,13 @@ class RecordSheet(Overlay):
         form.addWidget(self.wrong, 4, 1)
         return form
 
-    def _ends_row(self) -> Flow:
+    def _limits_row(self) -> Flow:
         title = label(_("Stop"), "body", role="textSecondary")
         title.setMinimumWidth(round(self.theme.scaled(LABEL_WIDE)))
         words = [label(_("after")), label(_("or at"))]
         return _flow(title, words[0], self.ends_min, words[1], self.ends_gb, self.ends_words)
 
-    def _ring_box(self) -> Card:
+    def _flight_recorder_card(self) -> Card:
         box = Card(self.theme, fill="sunken")
         rows = QVBoxLayout(box)
         rows.setContentsMargins(12, 10, 12, 10)
@@ -262,8 +262,8 @@ class RecordSheet(Overlay):
         column.addLayout(self._form_rows())
         column.addWidget(self.table, 1)
         column.addWidget(self.later)
-        column.addLayout(self._ends_row())
-        column.addWidget(self._ring_box())
+        column.addLayout(self._limits_row())
+        column.addWidget(self._flight_recorder_card())
         area = QScrollArea()
         area.setWidgetResizable(True)
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -305,9 +305,9 @@ class RecordSheet(Overlay):
         if not self._is_docked():
             return super()._geometry_at(top)
         window = self.covered_window()
-        top = max(top, round(self.theme.scaled(BELOW_BARS)))
-        room = QSize(window.width() - 2 * EDGE, window.height() - top - 2 * EDGE)
-        return QRect(QPoint(EDGE // 2, top), self.preferred_size(room))
+        top = max(top, round(self.theme.scaled(TOP_OFFSET)))
+        room = QSize(window.width() - 2 * EDGE_MARGIN, window.height() - top - 2 * EDGE_MARGIN)
+        return QRect(QPoint(EDGE_MARGIN // 2, top), self.preferred_size(room))
 
     def place(self) -> None:
         super().place()
@@ -419,7 +419,7 @@ class RecordSheet(Overlay):
             field.setEnabled(not going)
         self._show_meters()
         self._show_topics()
-        self._show_ring()
+        self._show_flight_recorder()
         no_master = self._session.master.kind != "connected"
         self.foot.setText(
             _("Waiting for a master; recording starts when one appears")
@@ -446,11 +446,11 @@ class RecordSheet(Overlay):
         self.length.set_value(length_text(elapsed), _("starting") if begins else _("recording"), "error")
         written = _("{speed} written").format(speed=bandwidth_text(speed)) if speed is not None else ""
         self.size_so_far.set_value(size_text(state.size_bytes), written)
-        count = ngettext("{count} message", "{count} messages", state.unwritten)
+        count = ngettext("{count} message", "{count} messages", state.unwritten_count)
         self.unkept.set_value(
-            count.format(count=group_digits(state.unwritten)) if state.unwritten else _("none"),
-            _("the disk is too slow") if state.unwritten else _("all data written"),
-            "warn" if state.unwritten else "ok",
+            count.format(count=group_digits(state.unwritten_count)) if state.unwritten_count else _("none"),
+            _("the disk is too slow") if state.unwritten_count else _("all data written"),
+            "warn" if state.unwritten_count else "ok",
         )
         self._show_end(recordings.recorded.expected_end(elapsed, state.size_bytes, speed))
         free = state.free_bytes
@@ -499,7 +499,7 @@ class RecordSheet(Overlay):
         self.count.setText(words)
         self.later.setVisible(self.choice.mode != "chosen")
 
-    def _show_ring(self) -> None:
+    def _show_flight_recorder(self) -> None:
         recordings, state = self._recordings, self._recordings.client.state
         wish = recordings.wish
         self.keep.set_label(_("Save last {count} s").format(count=wish.seconds))
@@ -512,7 +512,7 @@ class RecordSheet(Overlay):
         words = _("{count} s buffered, {size} of {most}").format(
             count=round(min(state.ring_s, wish.seconds)),
             size=size_text(state.ring_bytes),
-            most=size_text(wish.size_gb * _GB),
+            most=size_text(wish.size_gb * _BYTES_PER_GB),
         )
         self.ring_words.setText(words)
 
@@ -525,7 +525,7 @@ class RecordSheet(Overlay):
         self._show_settings()
         self.show_state()
 
-    def _toggle(self, topic: str) -> None:
+    def _toggle_topic(self, topic: str) -> None:
         # Adds or removes the topic whose row was clicked.
         recordings = self._recordings
         if recordings.is_recording or recordings.choice.mode != "chosen":
@@ -537,7 +537,7 @@ class RecordSheet(Overlay):
         )
         self.show_state()
 
-    def _change(self, **changes: float | None) -> None:
+    def _update_limits(self, **changes: float | None) -> None:
         # Limits apply to the next recording.
         recordings = self._recordings
         choice = replace(recordings.choice, **changes)  # type: ignore[arg-type]
@@ -552,7 +552,7 @@ class RecordSheet(Overlay):
         self._recordings.set_choice(choice)
         self.show_state()
 
-    def _switch_ring(self) -> None:
+    def _toggle_flight_recorder(self) -> None:
         self._update_flight_recorder(is_on=self.ring.isChecked())
 
     def _update_flight_recorder(self, **changes: object) -> None:
@@ -560,18 +560,18 @@ class RecordSheet(Overlay):
         wish = replace(recordings.wish, **changes)  # type: ignore[arg-type]
         if wish != recordings.wish:
             recordings.set_ring_settings(wish)
-        self._show_ring()
+        self._show_flight_recorder()
 
-    def _apply_ring_topics(self) -> None:
+    def _apply_flight_recorder_topics(self) -> None:
         wanted, unwanted = self.ring_topics.patterns()
         problem = replace(self._recordings.wish, patterns=wanted, excluded=unwanted).problem
         self.ring_topics.set_invalid(bool(problem))
         if problem:
-            self._show_ring_problem(problem)
+            self._show_flight_recorder_problem(problem)
         else:
             self._update_flight_recorder(patterns=wanted, excluded=unwanted)
 
-    def _show_ring_problem(self, sentence: str) -> None:
+    def _show_flight_recorder_problem(self, sentence: str) -> None:
         self.ring_words.setText(sentence or self.ring_words.text())
 
     def _add_bookmark(self) -> None:

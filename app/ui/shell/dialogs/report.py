@@ -19,9 +19,9 @@ from app.core.reports.problem_report import (
     ReportedWork,
     ReportParts,
     ReportWriter,
+    create_report,
     describe_contents,
     file_name,
-    make_report,
     work_text,
 )
 from app.ui.other_programs import open_externally
@@ -30,13 +30,13 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Switch, label, paint, set_role
 from app.ui.widgets.file_dialogs import FileDialogs, FileKind
-from app.ui.widgets.inputs.fields import LongText
+from app.ui.widgets.inputs.fields import LongTextField
 from nep.i18n import _, lazy
 
 WIDE, SIDE, SCROLL_BAR = 620, 19, 10
 POLL_MS = 50
-ICON = 15
-ZIP = FileKind(lazy("Zip file"), FILE_SUFFIX)
+ICON_SIZE = 15
+ZIP_KIND = FileKind(lazy("Zip file"), FILE_SUFFIX)
 INTRODUCTION = lazy(
     "Studio writes a file that describes its state on this computer. Nothing is sent: you "
     "decide who gets the file."
@@ -49,7 +49,7 @@ EXCLUDED_PARTS = (
     lazy("Keys, passwords and access codes. Your home folder appears as ~"),
 )
 
-Behaviours = Callable[[], Sequence[ReportedWork]]
+ReportedWorkGetter = Callable[[], Sequence[ReportedWork]]
 
 
 def documents_folder() -> Path:
@@ -78,12 +78,12 @@ class ReportSheet(Overlay):
         super().__init__(theme, window, _("Report a problem"))
         self._asks, self._say, self._clock = asks, say, clock
         self._parts: ReportParts | None = None
-        self._behaviours: Behaviours = tuple
+        self._behaviours: ReportedWorkGetter = tuple
         self._writer: ReportWriter | None = None
         self.written: Path | None = None
         """Path of the last report, or None."""
         self.introduction = label(_(INTRODUCTION), "body", role="textSecondary", wrap=True)
-        self.happened = LongText(theme, _("What happened?"))
+        self.happened = LongTextField(theme, _("What happened?"))
         self.list = QVBoxLayout()
         self.list.setSpacing(4)
         self.work = Switch(theme, _("Include my open behaviours"))
@@ -94,7 +94,7 @@ class ReportSheet(Overlay):
         self.write = Button(theme, _("Write report"), "file-archive", kind="primary", size="form")
         self._looking = QTimer(self)
         self._looking.setInterval(POLL_MS)
-        self._looking.timeout.connect(self._check)
+        self._looking.timeout.connect(self._check_writer)
         self.write.clicked.connect(self._ask_path)
         self.show_file.clicked.connect(self._show_file)
         self._lay_out()
@@ -142,7 +142,7 @@ class ReportSheet(Overlay):
         inside.addWidget(label(_("Not included"), "title"))
         left_out = QVBoxLayout()
         left_out.setSpacing(4)
-        self._left_out = [_Line(self.theme, _(words), "x") for words in EXCLUDED_PARTS]
+        self._left_out = [_PartRow(self.theme, _(words), "x") for words in EXCLUDED_PARTS]
         for line in self._left_out:
             left_out.addWidget(line)
         inside.addLayout(left_out)
@@ -150,7 +150,7 @@ class ReportSheet(Overlay):
         inside.addWidget(self.work)
         inside.addWidget(self.names)
 
-    def show_for(self, parts: ReportParts, names: Sequence[str], behaviours: Behaviours) -> None:
+    def show_for(self, parts: ReportParts, names: Sequence[str], behaviours: ReportedWorkGetter) -> None:
         """Open the sheet.
 
         Args:
@@ -166,7 +166,7 @@ class ReportSheet(Overlay):
                 line.hide()
                 line.deleteLater()
         for words in describe_contents(parts):
-            self.list.addWidget(_Line(self.theme, words, "check"))
+            self.list.addWidget(_PartRow(self.theme, words, "check"))
         self._left_out[0].words.setText(_(NO_BEHAVIOURS_UNLESS if names else NO_BEHAVIOURS))
         self.work.setChecked(False)
         self.names.setText(work_text(names) if names else "")
@@ -207,7 +207,7 @@ class ReportSheet(Overlay):
 
     def _ask_path(self) -> None:
         suggestion = documents_folder() / file_name(self._clock())
-        self._asks.save_as(_("Write report"), suggestion, (ZIP,), lambda path, _kind: self._start(path))
+        self._asks.save_as(_("Write report"), suggestion, (ZIP_KIND,), lambda path, _kind: self._start(path))
 
     def _start(self, path: Path) -> None:
         parts = self._parts
@@ -217,11 +217,11 @@ class ReportSheet(Overlay):
         work = tuple(self._behaviours()) if self.work.isChecked() else ()
         # A copy, because settings may change while the thread reads them.
         still = replace(parts, settings=dict(parts.settings))
-        self._writer = ReportWriter(path, lambda: make_report(still, happened, work))
+        self._writer = ReportWriter(path, lambda: create_report(still, happened, work))
         self._set_status(_("Writing the report."))
         self._looking.start()
 
-    def _check(self) -> None:
+    def _check_writer(self) -> None:
         writer = self._writer
         if writer is None or not writer.is_done:
             return
@@ -246,7 +246,7 @@ class ReportSheet(Overlay):
                 self._say(_("The file is in {folder}").format(folder=folder))
 
 
-class _Line(QWidget):
+class _PartRow(QWidget):
     """Line that names a part of the report, with an icon for included or omitted."""
 
     def __init__(self, theme: Theme, words: str, icon: str) -> None:
@@ -254,11 +254,11 @@ class _Line(QWidget):
         self._theme, self._icon = theme, icon
         self.words: QLabel = label(words, "body", wrap=True)
         row = QHBoxLayout(self)
-        row.setContentsMargins(ICON + 8, 0, 0, 0)
+        row.setContentsMargins(ICON_SIZE + 8, 0, 0, 0)
         row.addWidget(self.words, 1)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         colour = self._theme.colour("ok" if self._icon == "check" else "textTertiary")
-        paint_icon(painter, QRectF(0, 2, ICON, ICON), self._icon, colour)
+        paint_icon(painter, QRectF(0, 2, ICON_SIZE, ICON_SIZE), self._icon, colour)
         painter.end()

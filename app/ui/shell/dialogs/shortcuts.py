@@ -8,8 +8,8 @@ from PySide6.QtCore import QEvent, QObject, QSize, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.ui.shell.actions.actions import STOP
-from app.ui.shell.actions.shortcuts import FIXED_KEYS, Shortcuts, key_of
+from app.ui.shell.actions.actions import STOP_COMMAND
+from app.ui.shell.actions.shortcuts import FIXED_KEYS, Shortcuts, format_key
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text.numbers import shortcut_text
 from app.ui.theme.theme import Theme
@@ -203,7 +203,7 @@ class ShortcutSheet(Overlay):
         return plain and self.rows.handle(key)
 
     def _assign(self, pressed: QKeyEvent) -> None:
-        name, key = self._waiting, key_of(pressed.keyCombination())
+        name, key = self._waiting, format_key(pressed.keyCombination())
         if pressed.key() == Qt.Key.Key_Escape:
             self._stop_recording()
             return
@@ -241,11 +241,13 @@ class ShortcutSheet(Overlay):
         entry = self.rows.entry
         if entry is None or entry.kind != "command" or not self._shortcuts.keys_of(entry.name):
             return
-        if entry.name == STOP and len(self._shortcuts.keys_of(STOP)) == 1:
+        if entry.name == STOP_COMMAND and len(self._shortcuts.keys_of(STOP_COMMAND)) == 1:
             self._set_status(_("F12 can't be removed: it always triggers Stop."))
             return
         said = _("“{command}” no longer has a shortcut.").format(command=entry.text)
-        self._stop_recording(_("F12 is now the only shortcut for Stop.") if entry.name == STOP else said)
+        self._stop_recording(
+            _("F12 is now the only shortcut for Stop.") if entry.name == STOP_COMMAND else said
+        )
         self._shortcuts.assign(entry.name, "")
 
     def _reset(self) -> None:

@@ -13,11 +13,11 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets.file_dialogs import LAYOUTS, FileKind, pictures_folder
 from nep.i18n import lazy
 
-RECORDING = FileQuestion(
+RECORDING_QUESTION = FileQuestion(
     lazy("Open a recording"), lazy("Open"), lazy("No recordings or folders here."),
     suffixes=(".mcap",), icon="film",
 )  # fmt: skip
-LAYOUT = FileQuestion(
+LAYOUT_QUESTION = FileQuestion(
     lazy("Open a layout"), lazy("Open"), lazy("No layouts or folders here."),
     suffixes=(LAYOUTS[1].lstrip("*"),), icon="layout-panel-left",
 )  # fmt: skip
@@ -54,11 +54,11 @@ class StudioDialogs:
 
     def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a recording to open."""
-        self._get_sheet().ask_open(_nearest_folder(folder), take, RECORDING)
+        self._get_sheet().ask_open(_nearest_folder(folder), take, RECORDING_QUESTION)
 
     def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a layout file to import."""
-        self._get_sheet().ask_open(_nearest_folder(folder), take, LAYOUT)
+        self._get_sheet().ask_open(_nearest_folder(folder), take, LAYOUT_QUESTION)
 
     def select_folder(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a folder."""
@@ -70,7 +70,7 @@ class StudioDialogs:
         return self._sheet
 
     def _locations(self) -> tuple[FolderLocation, ...]:
-        recent: list[RecentFile] = self._settings.recent
+        recent: list[RecentFile] = self._settings.recent_files
         return known_locations(home() / "kept", [file.path for file in recent])
 
 

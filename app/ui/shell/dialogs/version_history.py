@@ -31,7 +31,7 @@ NO_VERSIONS_TEXT = lazy(
     "Studio keeps the previous version of a file each time it is saved, saved under another "
     "name, or closed with unsaved work."
 )
-SAVE_FIRST = lazy(
+SAVE_FIRST_TEXT = lazy(
     "Save the behaviour to a file. From then on Studio keeps the previous version each time you save."
 )
 
@@ -85,7 +85,7 @@ class VersionHistorySheet(Overlay):
         self.hint = label(_(HINT), "body", role="textSecondary", wrap=True)
         self.button = Button(theme, _("Open a copy"), "file-plus", kind="primary", size="form")
         self._reading = QTimer(self)
-        self._reading.timeout.connect(self._read_one)
+        self._reading.timeout.connect(self._read_next)
         self._lay_out()
         self.rows.installEventFilter(self)
         self.rows.doubleClicked.connect(lambda _index: self.open_selected())
@@ -132,11 +132,11 @@ class VersionHistorySheet(Overlay):
         others = namesakes_of(path) if path is not None else []
         self._versions = {f"version:{each.copy}": each for each in (*own, *others)}
         self._unread = deque(self._versions)
-        lines: list[Line] = [self._line(each, moment) for each in own]
+        lines: list[Line] = [self._version_entry(each, moment) for each in own]
         if others:
             lines += [
                 Heading(_("Versions of other files named {name}").format(name=name)),
-                *(self._line(each, moment) for each in others),
+                *(self._version_entry(each, moment) for each in others),
             ]
         self.heading.setText(_("Earlier versions of {name}").format(name=title or name))
         self.setAccessibleName(self.heading.text())
@@ -149,13 +149,13 @@ class VersionHistorySheet(Overlay):
 
     def _show_empty_state(self, name: str, path: Path | None) -> None:
         if path is None:
-            self.empty.set_texts(_("{name} isn't saved to a file yet").format(name=name), _(SAVE_FIRST))
+            self.empty.set_texts(_("{name} isn't saved to a file yet").format(name=name), _(SAVE_FIRST_TEXT))
             self.empty.set_actions([EmptyAction(_("Save"), self._save_behaviour, "save", is_primary=True)])
         else:
             self.empty.set_texts(_("No earlier versions yet"), _(NO_VERSIONS_TEXT))
             self.empty.set_actions([EmptyAction(_("Close"), self.dismiss)])
 
-    def _line(self, version: Version, now: dt.datetime) -> Match:
+    def _version_entry(self, version: Version, now: dt.datetime) -> Match:
         then = dt.datetime.fromtimestamp(version.written_s, tz=now.tzinfo)
         return Match(Entry(f"version:{version.copy}", date_time_text(then, now), "history"))
 
@@ -172,7 +172,7 @@ class VersionHistorySheet(Overlay):
         high = rest + self.rows.content_height() + 8
         return QSize(wide, min(room.height(), round(scaled(MAX_HEIGHT)), high))
 
-    def _read_one(self) -> None:
+    def _read_next(self) -> None:
         if not self._unread or not self.isVisible():
             self._reading.stop()
             return

@@ -169,7 +169,7 @@ class Dock(QDockWidget):
         # `number` distinguishes docks of the same kind; `key` is the unique name in a workbench.
         super().__init__(numbered_title(_(description.title), number))
         self.description, self.panel = description, panel
-        self.number, self.key = number, key_of(description.name, number)
+        self.number, self.key = number, format_key(description.name, number)
         self.failed = False
         self.front = False
         self._seen_s = -SUSPEND_DELAY_S
@@ -177,7 +177,7 @@ class Dock(QDockWidget):
         self.setObjectName(f"panel.{self.key}")
         self.setAccessibleName(self.windowTitle())
         self._set_panel(panel)
-        self.visibilityChanged.connect(self._visibility)
+        self.visibilityChanged.connect(self._on_visibility_changed)
         theme.changed.connect(self._restyle)
 
     def _set_panel(self, panel: PanelWidget) -> None:
@@ -202,7 +202,7 @@ class Dock(QDockWidget):
         self.panel.setFont(self.panel.text_font())
         self.title.updateGeometry()
 
-    def _visibility(self, visible: bool) -> None:
+    def _on_visibility_changed(self, visible: bool) -> None:
         self.front = visible
 
     def is_displayed(self) -> bool:
@@ -370,7 +370,7 @@ class Dock(QDockWidget):
             menu.popup(QCursor.pos())
 
 
-def key_of(name: str, number: int) -> str:
+def format_key(name: str, number: int) -> str:
     """Return the key of a dock from the name of the panel and the dock's number, such as "plot#2".
 
     The first dock of a kind has the name as key.
@@ -381,7 +381,7 @@ def key_of(name: str, number: int) -> str:
 def parse_key(key: str) -> tuple[str, int]:
     """Split the key of a dock into name and number; a key in another format is a name with the number 1."""
     name, _sign, number = key.rpartition("#")
-    if name and number.isascii() and number.isdigit() and key_of(name, int(number[:9])) == key:
+    if name and number.isascii() and number.isdigit() and format_key(name, int(number[:9])) == key:
         return name, int(number)
     return key, 1
 
@@ -421,6 +421,6 @@ def dock_for_kinds(docks: Mapping[str, Dock], names: Iterable[str], kinds: set[s
     there = [docks[name] for name in names]
     for wanted in (kinds, {ANY_TYPE}):
         for dock in there:
-            if wanted & set(dock.description.accepts):
+            if wanted & set(dock.description.accepted_types):
                 return dock
     return None

@@ -17,7 +17,7 @@ from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _
 
 ICON, GAP = 16, 7
-BADGE = 18
+BADGE_SIZE = 18
 MIN_NAME_WIDTH = 56  # px at 100 %; if there is less room, the front panel is shown as an icon too
 
 
@@ -61,7 +61,7 @@ class TitleTab(PaintedButton):
 
     def _badge_width(self) -> float:
         words = self.badge[0] if self.badge else ""
-        return max(self._theme.scaled(BADGE), paint.width_of(self._theme.font("caption"), words) + 10)
+        return max(self._theme.scaled(BADGE_SIZE), paint.width_of(self._theme.font("caption"), words) + 10)
 
     def icon_only_width(self) -> int:
         """Return the width in px with the icon only."""
@@ -98,7 +98,7 @@ class TitleTab(PaintedButton):
             self._paint_badge(painter, rect, *self.badge)
 
     def _paint_badge(self, painter: QPainter, rect: QRectF, words: str, status: str) -> None:
-        theme, high, wide = self._theme, self._theme.scaled(BADGE), self._badge_width()
+        theme, high, wide = self._theme, self._theme.scaled(BADGE_SIZE), self._badge_width()
         left = max(rect.left() + 1, rect.right() - wide - 8)  # the badge is never clipped
         place = QRectF(left, rect.center().y() - high / 2, min(wide, rect.width() - 2), high)
         look = theme.status(status)
@@ -211,7 +211,7 @@ class DockTitle(QWidget):
             self.updateGeometry()
         else:
             right = self._row.contentsMargins().right()
-            self._row.setContentsMargins(5 if names else self._left(), 1, right, 1)
+            self._row.setContentsMargins(5 if names else self._left_margin(), 1, right, 1)
         self.fit_tabs()
 
     @property
@@ -280,7 +280,7 @@ class DockTitle(QWidget):
             self.fit_tabs()
         return super().eventFilter(watched, event)
 
-    def _left(self) -> int:
+    def _left_margin(self) -> int:
         if self._whole is not None:
             return 6
         return 13 if self._density == "comfortable" else 11

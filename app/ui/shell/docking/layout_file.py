@@ -12,7 +12,7 @@ from app.core.storage import deep_json
 from app.errors import AppError
 from app.ui.shell.docking.dock import parse_key
 from app.ui.shell.docking.layouts import LAYOUTS
-from app.ui.shell.docking.saved_layouts import MAX_LENGTH
+from app.ui.shell.docking.saved_layouts import MAX_NAME_LENGTH
 from nep.i18n import _
 from nep.version import __version__
 
@@ -38,10 +38,10 @@ class LayoutFile:
     name: str
     base: str
     saved: Mapping[str, object]
-    unknown: tuple[str, ...] = ()
+    unknown_panels: tuple[str, ...] = ()
 
 
-def layout_bytes(name: str, base: str, saved: Mapping[str, object]) -> bytes:
+def encode_layout(name: str, base: str, saved: Mapping[str, object]) -> bytes:
     """Encode a layout file.
 
     Args:
@@ -56,18 +56,18 @@ def layout_bytes(name: str, base: str, saved: Mapping[str, object]) -> bytes:
         "name": name,
         "base": base,
         "arrangement": dict(saved),
-        "sum": _sum(saved),
+        "sum": _checksum(saved),
     }
     return orjson.dumps(plain, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
 
 
-def _sum(saved: Mapping[str, object]) -> str:
+def _checksum(saved: Mapping[str, object]) -> str:
     # A checksum is needed because Qt doesn't validate its part of the state and may crash if it is damaged.
     plain = orjson.dumps(dict(saved), option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
     return hashlib.sha256(plain).hexdigest()
 
 
-def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
+def decode_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
     """Parse a layout file.
 
     Args:
@@ -95,7 +95,7 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
     opened = saved.get("open") if isinstance(saved, dict) else None
     if not isinstance(saved, dict) or not isinstance(opened, list) or not isinstance(saved.get("docks"), str):
         raise LayoutFileError(_("the file is damaged"))
-    if told.get("sum") != _sum(saved):
+    if told.get("sum") != _checksum(saved):
         raise LayoutFileError(_("the file is damaged"))
     keys = list(dict.fromkeys(key for key in opened if isinstance(key, str)))
     known = [key for key in keys if parse_key(key)[0] in panels]
@@ -106,16 +106,18 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
         for key, each in (about if isinstance(about, dict) else {}).items()
         if parse_key(key)[0] in panels and isinstance(each, dict)
     }
-    return LayoutFile(_name(told.get("name"), stem), base, {**saved, "open": known, "panels": kept}, unknown)
+    return LayoutFile(
+        _layout_name(told.get("name"), stem), base, {**saved, "open": known, "panels": kept}, unknown
+    )
 
 
-def _name(told: object, stem: str) -> str:
+def _layout_name(told: object, stem: str) -> str:
     # Shortened to one line for menus.
     for each in (told, stem):
         letters = (
             letter if letter.isprintable() else " " for letter in (each if isinstance(each, str) else "")
         )
-        plain = " ".join("".join(letters).split())[:MAX_LENGTH].strip()
+        plain = " ".join("".join(letters).split())[:MAX_NAME_LENGTH].strip()
         if plain:
             return plain
     return _("Layout")

@@ -15,7 +15,7 @@ from app.ui.shell.window_state import WindowState
 from nep.i18n import _
 
 CUSTOM_PREFIX = "own:"
-MAX_LENGTH = 40
+MAX_NAME_LENGTH = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +68,8 @@ class SavedLayouts:
         name = name.strip()
         if not name:
             return _("Enter a name for the layout.")
-        if len(name) > MAX_LENGTH:
-            return _("The name is too long. Use at most {count} characters.").format(count=MAX_LENGTH)
+        if len(name) > MAX_NAME_LENGTH:
+            return _("The name is too long. Use at most {count} characters.").format(count=MAX_NAME_LENGTH)
         taken = {_(layout.title).lower() for layout in LAYOUTS} | {own.name.lower() for own in self.all()}
         is_taken = name.lower() in taken - {but.lower()}
         return _("“{name}” already exists.").format(name=name) if is_taken else ""
@@ -143,11 +143,11 @@ class SavedLayouts:
             The name of the layout, with a number appended if the name was taken or invalid, and True if
             the layout was saved.
         """
-        name = name.strip()[:MAX_LENGTH].strip()
+        name = name.strip()[:MAX_NAME_LENGTH].strip()
         free, number = name, 2
         while self.rejection_reason(free):
             ending = f" {number}"
-            free, number = f"{name[: MAX_LENGTH - len(ending)]}{ending}", number + 1
+            free, number = f"{name[: MAX_NAME_LENGTH - len(ending)]}{ending}", number + 1
         return free, self._state.save_layouts({CUSTOM_PREFIX + free: {**saved, "base": base}})
 
     def rename(self, old: str, new: str) -> None:

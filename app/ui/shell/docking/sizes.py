@@ -66,7 +66,7 @@ def fit(
     for column in layout.columns:
         there = []
         for names, height in column.rows:
-            dock = _first(bench, docks, [name for name in names if name not in folded])
+            dock = _first_dock(bench, docks, [name for name in names if name not in folded])
             if dock is not None and not any(dock in bench.tabifiedDockWidgets(b) for b in before):
                 before.append(dock)
                 shared = [dock, *bench.tabifiedDockWidgets(dock)]
@@ -133,7 +133,9 @@ def shrink_above(
         bench.resizeDocks(column, heights, Qt.Orientation.Vertical)
 
 
-def _first(bench: QMainWindow, docks: Mapping[str, QDockWidget], names: Sequence[str]) -> QDockWidget | None:
+def _first_dock(
+    bench: QMainWindow, docks: Mapping[str, QDockWidget], names: Sequence[str]
+) -> QDockWidget | None:
     # Skips a panel that is being moved to another place.
     for name in names:
         dock = docks.get(name)

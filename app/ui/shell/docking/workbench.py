@@ -11,7 +11,7 @@ from PySide6.QtGui import QHideEvent, QMouseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget, numbered_title
-from app.ui.shell.docking.dock import Dock, key_of, make_dock, parse_key
+from app.ui.shell.docking.dock import Dock, format_key, make_dock, parse_key
 from app.ui.shell.docking.layouts import Fold, Layout
 from app.ui.shell.docking.sizes import fit, shrink_above
 from app.ui.theme.theme import Theme
@@ -21,10 +21,10 @@ HORIZONTAL = Qt.Orientation.Horizontal
 VERTICAL = Qt.Orientation.Vertical
 MAIN_AREA = Qt.DockWidgetArea.LeftDockWidgetArea
 BOTTOM_AREA = Qt.DockWidgetArea.BottomDockWidgetArea
-MAX_BELOW_SHARE = 0.42
+MAX_BOTTOM_SHARE = 0.42
 """Maximum height of a panel below all columns, as a share of the workbench's height."""
 STATE_VERSION = 1  # when it changes, app.core.storage.settings.FORMAT must change, too
-MAX_PER_KIND = 8
+MAX_PANELS_PER_KIND = 8
 
 
 class Workbench(QMainWindow):
@@ -80,7 +80,7 @@ class Workbench(QMainWindow):
         self._fold_timer = QTimer(self)
         self._fold_timer.setSingleShot(True)
         self._fold_timer.timeout.connect(self._update_folds)
-        theme.changed.connect(self._text_changed)
+        theme.changed.connect(self._on_text_size_changed)
 
     def preload(self, name: str) -> None:
         """Create a panel in advance to avoid a delay when it is opened. The panel is suspended until then."""
@@ -175,7 +175,7 @@ class Workbench(QMainWindow):
             ):
                 continue
             high = self._heights.get(name) if self._moved else None
-            high = high or round(min(height * scale, MAX_BELOW_SHARE * self.height()))
+            high = high or round(min(height * scale, MAX_BOTTOM_SHARE * self.height()))
             self.resizeDocks([dock], [high], VERTICAL)
             return high
         return 0
@@ -191,7 +191,7 @@ class Workbench(QMainWindow):
             return self.docks[key]
         name, number = parse_key(key)
         description = self._panels.get(name)
-        if description is None or number > (MAX_PER_KIND if description.allows_multiple else 1):
+        if description is None or number > (MAX_PANELS_PER_KIND if description.allows_multiple else 1):
             return None
         dock = self._ahead.pop(key, None)
         dock = dock or make_dock(description, self._context, self._layout.density, number)
@@ -248,15 +248,19 @@ class Workbench(QMainWindow):
             The new dock, or None if the maximum number of panels is open.
         """
         name = parse_key(key)[0]
-        free = (number for number in range(1, MAX_PER_KIND + 1) if not self._is_open(key_of(name, number)))
+        free = (
+            number
+            for number in range(1, MAX_PANELS_PER_KIND + 1)
+            if not self._is_open(format_key(name, number))
+        )
         number = next(free, 0)
         if not number:
             said = _("The maximum of {count} panels of this kind is already open")
-            self._context.toast(said.format(count=MAX_PER_KIND))
+            self._context.show_toast(said.format(count=MAX_PANELS_PER_KIND))
             return None
         if number == 1:
             return self.open(name)
-        dock = self._dock(key_of(name, number))
+        dock = self._dock(format_key(name, number))
         if dock is None:
             return None
         old = self.docks.get(key)
@@ -304,7 +308,7 @@ class Workbench(QMainWindow):
                 again.restore_state(state)
 
         title = numbered_title(_(dock.description.title), dock.number)
-        self._context.toast(_("Closed {panel}").format(panel=title), _("Undo"), reopen)
+        self._context.show_toast(_("Closed {panel}").format(panel=title), _("Undo"), reopen)
 
     def _delete_dock(self, dock: Dock) -> None:
         self.docks.pop(dock.key, None)
@@ -341,7 +345,7 @@ class Workbench(QMainWindow):
             else:
                 dock.title.set_tabs(
                     [
-                        (other.panel.title(), other.description.icon, other is dock, _raiser(other))
+                        (other.panel.title(), other.description.icon, other is dock, _make_raiser(other))
                         for other in together
                     ]
                 )
@@ -352,7 +356,7 @@ class Workbench(QMainWindow):
         self._update_folds()
         self._resize_docks()
 
-    def _text_changed(self) -> None:
+    def _on_text_size_changed(self) -> None:
         # Larger text leaves less room.
         self._update_folds()
         self._size_timer.start(0)
@@ -532,12 +536,12 @@ class Workbench(QMainWindow):
             dock.dispose()
 
 
-def _raiser(dock: Dock) -> Callable[[], object]:
-    def bring() -> None:
+def _make_raiser(dock: Dock) -> Callable[[], object]:
+    def raise_dock() -> None:
         dock.raise_()
         dock.panel.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    return bring
+    return raise_dock
 
 
 def insert_dock(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock) -> None:
@@ -557,7 +561,7 @@ def insert_dock(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], d
     if name in layout.bottom_heights:
         bench.addDockWidget(BOTTOM_AREA, dock)
         return
-    above = _above(layout, name)
+    above = _panel_above(layout, name)
     home = name if dock.number > 1 else layout.tab_targets.get(name, "")
     if above in placed and not placed[above].isHidden() and not bench.tabifiedDockWidgets(placed[above]):
         bench.splitDockWidget(placed[above], dock, Qt.Orientation.Vertical)
@@ -603,7 +607,7 @@ def insert_beside(
     other.raise_()
 
 
-def _above(layout: Layout, name: str) -> str:
+def _panel_above(layout: Layout, name: str) -> str:
     # Panel in the row above that of a panel which opens later.
     if name in layout.deferred_panels:
         for column in layout.columns:

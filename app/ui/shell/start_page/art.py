@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPainterPath, QPaintEvent, QPen, QPixmap, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
+from app.ui.robot_drawing.scene import PREVIEW_STATE, RobotDrawing
 from app.ui.shell.start_page.preview import block_path, paint_grid
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
@@ -73,7 +73,7 @@ class RobotArt(Art):
             pixmap.fill(Qt.GlobalColor.transparent)
             inner = QPainter(pixmap)
             inner.setRenderHint(QPainter.RenderHint.Antialiasing)
-            self._drawing.paint(inner, room.translated(-area.topLeft()), PREVIEW, dark=self._theme.dark)
+            self._drawing.paint(inner, room.translated(-area.topLeft()), PREVIEW_STATE, dark=self._theme.dark)
             inner.end()
             self._made = (key, pixmap)
         return self._made[1]
@@ -110,9 +110,9 @@ class EmptyPageArt(Art):
         painter.drawPath(block_path(place, radius=5, notch=12))
         colour = theme.colour("textSecondary")
         paint.text_line(painter, place, words, quiet, colour, paint.CENTRE)
-        self._mouse(painter, QPointF(place.right() - 18, place.bottom() + 8))
+        self._paint_mouse_pointer(painter, QPointF(place.right() - 18, place.bottom() + 8))
 
-    def _mouse(self, painter: QPainter, tip: QPointF) -> None:
+    def _paint_mouse_pointer(self, painter: QPainter, tip: QPointF) -> None:
         shape = ((0, 0), (0, 17), (4, 13.3), (6.8, 19.5), (9.6, 18.2), (6.9, 12.2), (12.3, 12))
         arrow = QPolygonF([QPointF(tip.x() + x, tip.y() + y) for x, y in shape])
         painter.setPen(QPen(self._theme.colour("panel"), 1.2))

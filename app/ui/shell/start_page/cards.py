@@ -20,9 +20,9 @@ from app.ui.widgets import Button, Card, Chip, ElidedLabel, label, paint
 from app.ui.widgets.buttons import LinkButton, PaintedButton
 from nep.i18n import _
 
-EXAMPLE_ART = 112
+EXAMPLE_ART_HEIGHT = 112
 RECENT_HEIGHT = 48
-TILE = 30
+TILE_SIZE = 30
 
 
 class CardTitle(QLabel):
@@ -42,7 +42,7 @@ class CardTitle(QLabel):
         return QSize(wide, self.heightForWidth(wide))
 
 
-class BigCard(Card):
+class StartCard(Card):
     """Card with an illustration, a heading with an optional chip, text, and buttons."""
 
     def __init__(self, theme: Theme, art: Art, title: str, text: str, buttons: list[Button]) -> None:
@@ -99,13 +99,13 @@ class ExampleCard(PaintedButton):
 
     def sizeHint(self) -> QSize:
         title, text = self._fonts()
-        return QSize(240, EXAMPLE_ART + round(title + text) + 33)
+        return QSize(240, EXAMPLE_ART_HEIGHT + round(title + text) + 33)
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
         edge = "borderStrong" if self.is_highlighted else "border"
         paint.box(painter, rect, theme.radius("card"), theme.colour("panel"), theme.colour(edge))
-        art = QRectF(1, 1, rect.width() - 2, EXAMPLE_ART)
+        art = QRectF(1, 1, rect.width() - 2, EXAMPLE_ART_HEIGHT)
         painter.save()
         painter.setClipPath(upper_corners(art, theme.radius("card") - 1))
         painter.fillRect(art, theme.colour("workspace"))
@@ -138,7 +138,7 @@ class RecentRow(PaintedButton):
         theme = self._theme
         if self.is_highlighted:
             paint.box(painter, rect, theme.radius("panel"), theme.colour("hover"))
-        tile = QRectF(12, rect.center().y() - TILE / 2, TILE, TILE)
+        tile = QRectF(12, rect.center().y() - TILE_SIZE / 2, TILE_SIZE, TILE_SIZE)
         paint.box(painter, tile, theme.radius("control"), theme.block_colour("robot"))
         icon = tile.adjusted(7, 7, -7, -7)
         paint_icon(painter, icon, theme.icon_name("behaviour"), theme.block_text("robot"))
@@ -150,7 +150,7 @@ class RecentRow(PaintedButton):
         paint.text_line(painter, area, self._when, small, theme.colour("textTertiary"), paint.RIGHT)
 
 
-class _Key(QWidget):
+class _CommandLabel(QWidget):
     """Label for a shell command, painted like a key cap."""
 
     def __init__(self, theme: Theme, text: str) -> None:
@@ -196,7 +196,7 @@ class DevelopersLine(QWidget):
         row.addWidget(question)
         row.addWidget(link)
         row.addWidget(label(_("or type"), "body", role="textSecondary"))
-        row.addWidget(_Key(theme, "nep topic list"))
+        row.addWidget(_CommandLabel(theme, "nep topic list"))
         row.addStretch(1)
 
     def paintEvent(self, _event: QPaintEvent) -> None:

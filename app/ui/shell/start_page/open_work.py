@@ -19,7 +19,7 @@ from nep.i18n import _
 
 HEIGHT, TILE, LEFT = 56, 30, 54
 COLUMNS = 3
-DOT = 7.0
+DOT_SIZE = 7.0
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,14 @@ class OpenRow(PaintedButton):
         name, state = theme.font("label"), theme.font("body")
         high = paint.height_of(name)
         top = room.center().y() - (high + paint.height_of(state)) / 2
-        line = QRectF(room.left(), top, room.width() - (DOT + 8 if work.is_unsaved else 0), high)
+        line = QRectF(room.left(), top, room.width() - (DOT_SIZE + 8 if work.is_unsaved else 0), high)
         paint.text_line(painter, line, work.name, name, theme.colour("text"))
         if work.is_unsaved:
             left = room.left() + min(paint.width_of(name, work.name), line.width()) + 8
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(theme.colour("textSecondary"))
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            painter.drawEllipse(QRectF(left, line.center().y() - DOT / 2, DOT, DOT))
+            painter.drawEllipse(QRectF(left, line.center().y() - DOT_SIZE / 2, DOT_SIZE, DOT_SIZE))
         line = QRectF(room.left(), top + high, room.width(), paint.height_of(state))
         paint.text_line(painter, line, self._state, state, theme.colour("textTertiary"))
 

@@ -27,7 +27,7 @@ from app.core.documents.examples import ABOUT, NAME
 from app.core.storage.atomic_file import read_regular_file
 from app.core.storage.settings import RecentFile
 from app.ui.shell.start_page.art import EmptyPageArt, RobotArt, StepsArt
-from app.ui.shell.start_page.cards import BigCard, DevelopersLine, ExampleCard, RecentRow
+from app.ui.shell.start_page.cards import DevelopersLine, ExampleCard, RecentRow, StartCard
 from app.ui.shell.start_page.open_work import OpenWork, OpenWorkList
 from app.ui.shell.start_page.preview import Row, rows
 from app.ui.theme.theme import Theme
@@ -36,7 +36,7 @@ from app.ui.widgets.buttons import LinkButton
 from nep.i18n import _, lazy, ngettext, translate
 
 WIDTH, MARGIN, CARD_GAP = 1080, 24, 16
-TOP = 35
+TOP_MARGIN = 35
 BANNER_ROOM, HIGH, BANNER_GAP, BANNER_LINE = 40, 640, 6, 29
 """Space above the question for an alert, so that it covers no text; a low page has space for one line.
 
@@ -55,11 +55,11 @@ ALL_EXAMPLES_TEXTS = {
 """Texts of the link to all examples, by the number of examples, which is spelled out."""
 MAX_RECENT = 3
 FIRST, OTHER = 408, 318  # relative widths of the first card and the others
-LEARN = (
+LEARN_TEXTS = (
     lazy("Learn in five minutes"),
     lazy("Six steps to a robot that speaks and turns. Each is checked off as you go."),
 )
-OFFER = (
+OFFER_TEXTS = (
     lazy("First steps (five minutes)"),
     lazy("New here? Six steps to a robot that speaks and turns. Each is checked off as you go."),
 )
@@ -134,14 +134,14 @@ class StartPage(QWidget):
         self._use.clicked.connect(self.virtual_robot_pressed)
         self._new = Button(theme, _("New behaviour"), size="large")
         self._new.clicked.connect(self.new_behaviour_pressed)
-        self.robot_card = BigCard(
+        self.robot_card = StartCard(
             theme,
             RobotArt(theme),
             _("Connect a robot"),
             _("A virtual Pepper comes with Studio. You can use it now and connect a real one later."),
             [self._use],
         )
-        self.new_card = BigCard(
+        self.new_card = StartCard(
             theme,
             EmptyPageArt(theme),
             _("Create a behaviour"),
@@ -153,8 +153,8 @@ class StartPage(QWidget):
         self._not_now = Button(theme, _("Cancel"), kind="ghost", size="large")
         self._not_now.clicked.connect(self._decline)
         self._not_now.hide()
-        title, text = LEARN
-        self.learn_card = BigCard(theme, StepsArt(theme), _(title), _(text), [self._learn, self._not_now])
+        title, text = LEARN_TEXTS
+        self.learn_card = StartCard(theme, StepsArt(theme), _(title), _(text), [self._learn, self._not_now])
         self._offers = False
         self._shows_all = False
         self._recent_box = QWidget()
@@ -175,7 +175,7 @@ class StartPage(QWidget):
         content.setProperty("bare", "true")
         content.setMaximumWidth(WIDTH)
         column = self._content = QVBoxLayout(content)
-        column.setContentsMargins(0, TOP, 0, 24)
+        column.setContentsMargins(0, TOP_MARGIN, 0, 24)
         column.setSpacing(0)
         self._banner_room = QSpacerItem(0, 0, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
         column.addSpacerItem(self._banner_room)
@@ -188,26 +188,26 @@ class StartPage(QWidget):
         column.addWidget(self.open_work)
         cards = self._cards = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         cards.setSpacing(CARD_GAP)
-        for place, card in enumerate(self._order_of_cards()):
+        for place, card in enumerate(self._ordered_cards()):
             cards.addWidget(card, OTHER if place else FIRST)
         column.addLayout(cards)
         column.addSpacing(26)
         self._all = LinkButton(self._theme, all_examples_text(len(examples)), "arrow-right")
         self._all.clicked.connect(lambda: self.show_all(not self._shows_all))
-        head = self._head(label(_("Open an example"), "heading"), self._open)
+        head = self._heading_row(label(_("Open an example"), "heading"), self._open)
         head.addSpacing(8)
         head.addWidget(self._all)
         column.addLayout(head)
         column.addSpacing(10)
-        column.addLayout(self._examples(examples))
+        column.addLayout(self._example_grid(examples))
         column.addSpacing(22)
         recent = QVBoxLayout(self._recent_box)
         recent.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self._recent_box)
         column.addStretch(1)
-        self._frame(content)
+        self._add_scroll_area(content)
 
-    def _frame(self, content: QWidget) -> None:
+    def _add_scroll_area(self, content: QWidget) -> None:
         # Centred in a scroll area, with the line for developers below it.
         middle = QWidget()
         middle.setProperty("bare", "true")
@@ -232,7 +232,7 @@ class StartPage(QWidget):
 
     def banner_area(self) -> QRect:
         """Return the area for an alert, above the heading of the page."""
-        high = TOP + self._banner_room.sizeHint().height() - 2 * BANNER_GAP
+        high = TOP_MARGIN + self._banner_room.sizeHint().height() - 2 * BANNER_GAP
         return QRect(BANNER_GAP, BANNER_GAP, self.width() - 2 * BANNER_GAP, high)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -247,7 +247,7 @@ class StartPage(QWidget):
         return done
 
     def _fit_room(self) -> None:
-        least = round(self._theme.scaled(BANNER_LINE)) + 2 * BANNER_GAP - TOP
+        least = round(self._theme.scaled(BANNER_LINE)) + 2 * BANNER_GAP - TOP_MARGIN
         room = max(BANNER_ROOM if self.height() >= HIGH else 0, least)
         if room != self._banner_room.sizeHint().height():
             self._banner_room.changeSize(0, room, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
@@ -265,7 +265,7 @@ class StartPage(QWidget):
         for card in cards:
             card.art.setVisible(beside or self.height() >= HIGH)
 
-    def _order_of_cards(self) -> list[BigCard]:
+    def _ordered_cards(self) -> list[StartCard]:
         # The first card is the widest and has the primary button.
         cards = [self.robot_card, self.new_card]
         cards.insert(0 if self._offers else len(cards), self.learn_card)
@@ -284,11 +284,11 @@ class StartPage(QWidget):
         had = self._not_now.hasFocus()
         self._learn.set_kind("primary" if offers else "plain")
         self._use.set_kind("plain" if offers else "primary")
-        title, text = OFFER if offers else LEARN
+        title, text = OFFER_TEXTS if offers else LEARN_TEXTS
         self.learn_card.set_texts(_(title), _(text))
         self.learn_card.border = "accent" if offers else "border"
         paint.show_when(self._not_now, offers)
-        cards = self._order_of_cards()
+        cards = self._ordered_cards()
         for place, card in enumerate(cards):
             self._cards.removeWidget(card)
             self._cards.insertWidget(place, card, OTHER if place else FIRST)
@@ -302,7 +302,7 @@ class StartPage(QWidget):
     def _decline(self) -> None:
         self.offer_first_steps(False)
 
-    def _head(self, title: QLabel, button: Button | None = None) -> QHBoxLayout:
+    def _heading_row(self, title: QLabel, button: Button | None = None) -> QHBoxLayout:
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(title)
@@ -311,7 +311,7 @@ class StartPage(QWidget):
             row.addWidget(button)
         return row
 
-    def _examples(self, examples: Sequence[Example]) -> QGridLayout:
+    def _example_grid(self, examples: Sequence[Example]) -> QGridLayout:
         grid = QGridLayout()
         grid.setSpacing(16)
         self.example_cards: list[ExampleCard] = []
@@ -369,7 +369,7 @@ class StartPage(QWidget):
         other = Button(self._theme, _("Open a file"), "folder-open", kind="ghost")
         other.clicked.connect(self.open_pressed)
         head = QWidget()
-        head.setLayout(self._head(label(_("Recent"), "heading"), other))
+        head.setLayout(self._heading_row(label(_("Recent"), "heading"), other))
         layout.addWidget(head)
         holder = QWidget()
         row = QHBoxLayout(holder)

@@ -11,7 +11,7 @@ from PySide6.QtGui import QPainter, QPainterPath, QPen
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 
-ROW = 27.0
+ROW_HEIGHT = 27.0
 GAP = 1.0
 INDENT = 16.0
 MAX_DEPTH = 6
@@ -123,12 +123,12 @@ def paint_rows(painter: QPainter, area: QRectF, theme: Theme, found: tuple[Row, 
             break
         left = area.left() + row.depth * INDENT
         width = 58.0 + 8.0 * row.text_length + 38.0 * row.values
-        rect = QRectF(left, top, min(width, area.right() - left), ROW)
+        rect = QRectF(left, top, min(width, area.right() - left), ROW_HEIGHT)
         painter.setPen(QPen(theme.block_colour(row.category, "tertiary"), 0.75))
         painter.setBrush(theme.block_colour(row.category))
         painter.drawPath(block_path(rect))
         _paint_content(painter, rect, theme, row)
-        top += ROW + GAP
+        top += ROW_HEIGHT + GAP
 
 
 def _paint_content(painter: QPainter, rect: QRectF, theme: Theme, row: Row) -> None:

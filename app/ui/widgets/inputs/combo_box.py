@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QComboBox, QStyledItemDelegate
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.menus import cut, make_round
+from app.ui.widgets.menus import cut, set_round_corners
 
 MAX_VISIBLE_ITEMS = 12
 
@@ -31,7 +31,7 @@ class ComboBox(QComboBox):
             self.addItem(words, value)
         self.setItemDelegate(QStyledItemDelegate(self))  # lets the style sheet set the padding of items
         self.setMaxVisibleItems(MAX_VISIBLE_ITEMS)
-        make_round(self.view().window())
+        set_round_corners(self.view().window())
 
     @property
     def value(self) -> str:

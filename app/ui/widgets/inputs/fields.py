@@ -10,8 +10,8 @@ from app.robots.description.typed_number import parse_number
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.keyboard import is_plain
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.keyboard import has_no_modifiers
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.i18n import _
 from nep.i18n import number as number_text
 
@@ -33,7 +33,7 @@ class SearchField(QLineEdit):
         self.setProperty("quiet", "true")
         self.setProperty("focusRadius", theme.radius("control"))
         self.setMinimumHeight(26)
-        EditMenu(theme, self)
+        ContextMenuFilter(theme, self)
         self._arrange()
         theme.changed.connect(self._arrange)
 
@@ -69,7 +69,9 @@ class FilterField(SearchField):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape and self.text():
             self.clear()
-        elif event.key() in {Qt.Key.Key_Down, Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
+        elif event.key() in {Qt.Key.Key_Down, Qt.Key.Key_Return, Qt.Key.Key_Enter} and has_no_modifiers(
+            event
+        ):
             self.exited.emit()
         else:
             super().keyPressEvent(event)
@@ -109,7 +111,7 @@ class NumberEdit(QLineEdit):
         self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.setMinimumHeight(theme.size("control", "form") - 2)
         self.setProperty("focusRadius", theme.radius("control"))
-        self.editingFinished.connect(self._read)
+        self.editingFinished.connect(self._parse_text)
         theme.changed.connect(self._arrange)
         self._arrange()
 
@@ -126,7 +128,7 @@ class NumberEdit(QLineEdit):
         """Format a number with the decimals of the field."""
         return number_text(value, f".{self._decimals}f")
 
-    def _read(self) -> None:
+    def _parse_text(self) -> None:
         if self._may_be_empty and not self.text().strip():
             self._set_problem("")
             self.cleared.emit()
@@ -137,14 +139,14 @@ class NumberEdit(QLineEdit):
             self._set_problem(str(error))
             return
         if self._minimum is not None and value < self._minimum:
-            self._set_problem(_("The minimum is {value}.").format(value=self._limit(self._minimum)))
+            self._set_problem(_("The minimum is {value}.").format(value=self._limit_text(self._minimum)))
         elif self._maximum is not None and value > self._maximum:
-            self._set_problem(_("The maximum is {value}.").format(value=self._limit(self._maximum)))
+            self._set_problem(_("The maximum is {value}.").format(value=self._limit_text(self._maximum)))
         else:
             self._set_problem("")
             self.number.emit(value)
 
-    def _limit(self, value: float) -> str:
+    def _limit_text(self, value: float) -> str:
         return f"{number_text(value)} {self._unit}".rstrip()
 
     def _set_problem(self, sentence: str) -> None:
@@ -170,7 +172,7 @@ class NumberEdit(QLineEdit):
         painter.end()
 
 
-class _Text(QPlainTextEdit):
+class _MultiLineEdit(QPlainTextEdit):
     """Multi-line text edit in which Tab moves the focus."""
 
     exited = Signal()
@@ -203,7 +205,7 @@ class _Text(QPlainTextEdit):
             super().keyPressEvent(event)
 
 
-class LongText(QWidget):
+class LongTextField(QWidget):
     """Multi-line text field; `finished` is emitted when the field loses the focus."""
 
     changed = Signal()
@@ -216,9 +218,9 @@ class LongText(QWidget):
         self.setAccessibleName(name)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setProperty("focusRadius", theme.radius("control"))
-        self.edit = _Text()
+        self.edit = _MultiLineEdit()
         self.edit.setAccessibleName(name)
-        EditMenu(theme, self.edit)
+        ContextMenuFilter(theme, self.edit)
         self.setFocusProxy(self.edit)
         row = QHBoxLayout(self)
         row.setContentsMargins(3, 2, 3, 1)

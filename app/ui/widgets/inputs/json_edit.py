@@ -24,21 +24,23 @@ from PySide6.QtWidgets import QFrame, QPlainTextEdit, QTextEdit, QVBoxLayout, QW
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.menus import ContextMenuFilter
 
 INDENT = 2
 # The first matching rule applies: strings before their contents, keys before strings.
-_RULES: tuple[tuple[str, str], ...] = (
+_HIGHLIGHT_RULES: tuple[tuple[str, str], ...] = (
     ("textSecondary", r'"(?:\\.|[^"\\])*"(?=\s*:)'),
     ("ok", r'"(?:\\.|[^"\\])*"?'),
     ("accentText", r"\{ ?[^\W\d][\w ]* ?\}"),
     ("changed", r"\b(?:true|false|null)\b"),
     ("warn", r"-?\b\d+(?:\.\d+)?(?:[eE][+-]?\d+)?\b"),
 )
-_PATTERN = re.compile("|".join(f"(?P<r{place}>{rule})" for place, (_role, rule) in enumerate(_RULES)))
+_TOKEN_PATTERN = re.compile(
+    "|".join(f"(?P<r{place}>{rule})" for place, (_role, rule) in enumerate(_HIGHLIGHT_RULES))
+)
 
 
-class _JsonColours(QSyntaxHighlighter):
+class _JsonHighlighter(QSyntaxHighlighter):
     def __init__(self, document: QTextDocument, theme: Theme) -> None:
         super().__init__(document)
         self._theme = theme
@@ -47,8 +49,8 @@ class _JsonColours(QSyntaxHighlighter):
     def highlightBlock(self, text: str) -> None:
         if not self.is_on:
             return
-        for found in _PATTERN.finditer(text):
-            role = _RULES[int((found.lastgroup or "r0")[1:])][0]
+        for found in _TOKEN_PATTERN.finditer(text):
+            role = _HIGHLIGHT_RULES[int((found.lastgroup or "r0")[1:])][0]
             shown = QTextCharFormat()
             shown.setForeground(self._theme.colour(role))
             if role == "accentText":
@@ -56,7 +58,7 @@ class _JsonColours(QSyntaxHighlighter):
             self.setFormat(found.start(), found.end() - found.start(), shown)
 
 
-class _JsonLines(QWidget):
+class _LineNumberArea(QWidget):
     """Line numbers to the left of the text."""
 
     def __init__(self, text: JsonLinesEdit) -> None:
@@ -85,11 +87,11 @@ class JsonLinesEdit(QPlainTextEdit):
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setTabChangesFocus(True)
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
-        self.colours = _JsonColours(self.document(), theme)
-        self._numbers = _JsonLines(self)
-        EditMenu(theme, self)
+        self.colours = _JsonHighlighter(self.document(), theme)
+        self._numbers = _LineNumberArea(self)
+        ContextMenuFilter(theme, self)
         self.blockCountChanged.connect(self._update_margins)
-        self.updateRequest.connect(self._scrolled)
+        self.updateRequest.connect(self._on_scrolled)
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -99,7 +101,7 @@ class JsonLinesEdit(QPlainTextEdit):
         self.setFont(font)
         self.colours.rehighlight()
         self._update_margins()
-        self.mark(self.wrong_line)
+        self.mark_line(self.wrong_line)
 
     def _margin_width(self) -> int:
         digits = max(2, len(str(self.blockCount())))
@@ -113,7 +115,7 @@ class JsonLinesEdit(QPlainTextEdit):
         inside = self.contentsRect()
         self._numbers.setGeometry(QRect(inside.left(), inside.top(), self._margin_width(), inside.height()))
 
-    def _scrolled(self, rect: QRect, dy: int) -> None:
+    def _on_scrolled(self, rect: QRect, dy: int) -> None:
         if dy:
             self._numbers.scroll(0, dy)
         else:
@@ -144,7 +146,7 @@ class JsonLinesEdit(QPlainTextEdit):
             self.textCursor().insertText("\n" + " " * deep)
             self.ensureCursorVisible()
 
-    def mark(self, line: int) -> None:
+    def mark_line(self, line: int) -> None:
         """Mark a line, counted from 1, as invalid; 0 removes the marker."""
         self.wrong_line = line
         marks = []
@@ -234,21 +236,21 @@ class JsonEdit(QWidget):
         cursor.setPosition(block.position() + min(column - 1, max(0, block.length() - 1)))
         self.edit.setTextCursor(cursor)
 
-    def set_coloured(self, is_json: bool) -> None:
+    def set_highlighting(self, is_json: bool) -> None:
         """Enable syntax highlighting if the text is JSON, else disable it."""
         if self.edit.colours.is_on != is_json:
             self.edit.colours.is_on = is_json
             self.edit.colours.rehighlight()
 
-    def mark(self, line: int) -> None:
+    def mark_line(self, line: int) -> None:
         """Mark a line, counted from 1, as invalid; 0 removes the marker."""
         if line != self.edit.wrong_line or bool(line) != self._is_wrong:
             self._is_wrong = bool(line)
-            self.edit.mark(line)
+            self.edit.mark_line(line)
             self.update()
 
     @property
-    def wrong_line(self) -> int:
+    def invalid_line(self) -> int:
         """Number of the line that is marked as invalid, or 0."""
         return self.edit.wrong_line
 

@@ -48,7 +48,7 @@ class PatternField(TokenField):
             self.edit.setText(rest)
         self.changed.emit()
         if not self.edit.text().strip():
-            self.settled.emit()
+            self.editing_finished.emit()
 
     def _end_typing(self) -> None:
         text = self.edit.text()
@@ -58,7 +58,7 @@ class PatternField(TokenField):
         self.edit.clear()
         self._add(wanted, unwanted)
         self.changed.emit()
-        self.settled.emit()
+        self.editing_finished.emit()
 
     def _add(self, wanted: Sequence[str], unwanted: Sequence[str]) -> None:
         there = {(each.entry, each.is_left_out) for each in self._tokens}

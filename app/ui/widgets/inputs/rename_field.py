@@ -9,8 +9,8 @@ from PySide6.QtGui import QFocusEvent, QKeyEvent
 from PySide6.QtWidgets import QLineEdit, QWidget
 
 from app.ui.theme.theme import Theme
-from app.ui.widgets.keyboard import is_plain
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.keyboard import has_no_modifiers
+from app.ui.widgets.menus import ContextMenuFilter
 
 
 class RenameField(QLineEdit):
@@ -35,7 +35,7 @@ class RenameField(QLineEdit):
         self._take, self._is_over = take, False
         self.setAccessibleName(said)
         self.setProperty("focusRadius", theme.radius("control"))
-        EditMenu(theme, self)
+        ContextMenuFilter(theme, self)
         self.setGeometry(rect)
         self.selectAll()
         self.show()
@@ -44,7 +44,7 @@ class RenameField(QLineEdit):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             self.close_field()
-        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and has_no_modifiers(event):
             if self._take(self.text()):
                 self.close_field()
         else:

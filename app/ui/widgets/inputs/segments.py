@@ -63,12 +63,12 @@ class _Segment(PaintedButton):
         font.setWeight(font.Weight.Medium)
         return font
 
-    def _side(self) -> int:
+    def _icon_side(self) -> int:
         return round(self._theme.scaled(16))
 
     def _icons_width(self) -> int:
         shown = int(self._icon is not None) + int(self._check) + int(self.has_dot) / 2
-        return round((self._side() + GAP) * shown) - (GAP if self._bare else 0)
+        return round((self._icon_side() + GAP) * shown) - (GAP if self._bare else 0)
 
     def sizeHint(self) -> QSize:
         width = paint.width_of(self._font(), self.displayed_text()) + 2 * self._padding + self._icons_width()
@@ -88,7 +88,7 @@ class _Segment(PaintedButton):
         ink = theme.colour("text" if chosen else "textSecondary" if self.isEnabled() else "textDisabled")
         shown = [name for name in ("check" if self._check and chosen else None, self._icon) if name]
         text_width = paint.width_of(self._font(), self.displayed_text()) - (GAP if self._bare else 0)
-        side = self._side()
+        side = self._icon_side()
         dot = (side + GAP) / 2 if self._dot else 0.0
         left = max(6.0, rect.center().x() - (text_width + len(shown) * (side + GAP) + dot) / 2)
         for name in shown:

@@ -18,7 +18,7 @@ FIELD_WIDTH = 104
 PAGE_STEPS = 10
 
 
-class Track(QSlider):
+class SliderTrack(QSlider):
     """Slider with a 4 px track and a 20 px handle; its values are numbers of steps.
 
     Ignores the mouse wheel without focus.
@@ -131,7 +131,7 @@ class SliderWithUnit(QWidget):
         self._default = default if default is not None else value if value is not None else minimum
         self._value = minimum
         digits = decimals_of(step)
-        self.track = Track(theme, steps)
+        self.track = SliderTrack(theme, steps)
         self.field = NumberEdit(theme, minimum, maximum, unit, digits)
         self.field.setFixedWidth(FIELD_WIDTH)
         self._digits = digits

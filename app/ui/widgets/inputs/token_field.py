@@ -14,12 +14,12 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.flow_layout import Flow
-from app.ui.widgets.keyboard import is_plain
-from app.ui.widgets.menus import EditMenu
+from app.ui.widgets.keyboard import has_no_modifiers
+from app.ui.widgets.menus import ContextMenuFilter
 from nep.i18n import _
 
 HIGH, PAD, GAP, CROSS, MIN_VALUE = 22, 7, 5, 10, 40
-MAX_LETTERS = 400
+MAX_TEXT_LENGTH = 400
 
 
 class Token(PaintedButton):
@@ -47,7 +47,7 @@ class Token(PaintedButton):
         return self.sizeHint()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and is_plain(event):
+        if event.key() in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and has_no_modifiers(event):
             self.click()
         else:
             super().keyPressEvent(event)
@@ -91,7 +91,7 @@ class _TokenEdit(QLineEdit):
         return QSize(MIN_VALUE, super().minimumSizeHint().height())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        plain = is_plain(event)
+        plain = has_no_modifiers(event)
         if plain and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and self.text().strip():
             self.completed.emit()
         elif plain and event.key() == Qt.Key.Key_Backspace and not self.text():
@@ -124,7 +124,7 @@ class TokenField(QWidget):
     """
 
     changed = Signal()
-    settled = Signal()
+    editing_finished = Signal()
 
     def __init__(self, theme: Theme, name: str, example: str, add: str = "") -> None:
         super().__init__()
@@ -134,10 +134,10 @@ class TokenField(QWidget):
         self.edit = _TokenEdit(self)
         self.edit.setAccessibleName(name)
         self.edit.setPlaceholderText(example)
-        self.edit.setMaxLength(MAX_LETTERS)
+        self.edit.setMaxLength(MAX_TEXT_LENGTH)
         self.edit.setProperty("bare", "true")
         self.edit.setProperty("ownFocus", True)
-        EditMenu(theme, self.edit)
+        ContextMenuFilter(theme, self.edit)
         self.edit.textEdited.connect(self._on_edited)
         self.edit.textChanged.connect(self.edit.updateGeometry)
         self.edit.completed.connect(self._end_typing)
@@ -174,7 +174,7 @@ class TokenField(QWidget):
         self.edit.setFocus(Qt.FocusReason.OtherFocusReason)
         self._delete_token(token)
         self.changed.emit()
-        self.settled.emit()
+        self.editing_finished.emit()
 
     # ---- inside
 

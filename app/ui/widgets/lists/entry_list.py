@@ -214,7 +214,7 @@ class EntryList(QListView):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.setMouseTracking(True)
-        self.clicked.connect(self._clicked)
+        self.clicked.connect(self._on_clicked)
 
     def show_lines(self, lines: Sequence[Line], chosen: str = "") -> None:
         """Replace all headings and entries, and select an entry.
@@ -285,7 +285,7 @@ class EntryList(QListView):
         self.scrollTo(index)
         self.selection_moved.emit()
 
-    def _clicked(self, index: QModelIndex) -> None:
+    def _on_clicked(self, index: QModelIndex) -> None:
         if isinstance(self.lines.lines[index.row()], Match):
             self._select_row(index.row())
             self.row_activated.emit()

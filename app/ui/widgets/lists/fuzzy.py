@@ -113,7 +113,7 @@ def _match_spread(piece: str, text: str) -> tuple[float, list[Span]] | None:
         if places and at < len(text) and text[at] == letter:
             place, well = at, True
         else:
-            place = _word_beginning(letter, text, at)
+            place = _word_start(letter, text, at)
             well = place >= 0
             if not well:
                 place = text.find(letter, at)
@@ -128,7 +128,7 @@ def _match_spread(piece: str, text: str) -> tuple[float, list[Span]] | None:
     return SPREAD * share - min(15.0, (places[-1] - places[0]) / 10), [(place, place + 1) for place in places]
 
 
-def _word_beginning(letter: str, text: str, start: int) -> int:
+def _word_start(letter: str, text: str, start: int) -> int:
     place = text.find(letter, start)
     while place > 0 and text[place - 1].isalnum():
         place = text.find(letter, place + 1)

@@ -9,7 +9,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets.labels import Separator
 
 LIST_SHARE = 0.4
-NO_LIMIT = 16_777_215
+QWIDGETSIZE_MAX = 16_777_215
 """Qt's constant for an unlimited widget size (QWIDGETSIZE_MAX)."""
 
 
@@ -66,5 +66,7 @@ class ListDetailView(QWidget):
         self._upright.setVisible(beside)
         wide = round(min(self._theme.scaled(self._list_px), self.width() * LIST_SHARE))
         self._side.setMinimumWidth(wide if beside else 0)
-        self._side.setMaximumWidth(wide if beside else NO_LIMIT)
-        self._side.setMaximumHeight(NO_LIMIT if beside else round(self._theme.scaled(self._list_high_px)))
+        self._side.setMaximumWidth(wide if beside else QWIDGETSIZE_MAX)
+        self._side.setMaximumHeight(
+            QWIDGETSIZE_MAX if beside else round(self._theme.scaled(self._list_high_px))
+        )

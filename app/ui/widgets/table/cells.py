@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QHeaderView, QStyle, QStyledItemDelegate, QStyleOp
 
 from app.ui.theme.icons import paint_cached_icon, paint_icon
 from app.ui.theme.theme import Theme
-from app.ui.widgets.indicators import SPARK, paint_sparkline
+from app.ui.widgets.indicators import SPARKLINE_SIZE, paint_sparkline
 from app.ui.widgets.paint import box as paint_box
 from app.ui.widgets.table.model import Cell, Column, Order
 
@@ -29,12 +29,12 @@ class TableAppearance(Protocol):
     Attributes:
         row_height: Height of the rows in px.
         hovered_row: Row under the mouse pointer, or -1.
-        last_shown: Index of the last visible column.
+        last_visible_column: Index of the last visible column.
     """
 
     row_height: int
     hovered_row: int
-    last_shown: int  # index of the last visible column
+    last_visible_column: int  # index of the last visible column
 
     @property
     def all_columns(self) -> Sequence[Column[Any]]:
@@ -67,16 +67,21 @@ def padded_rect(rect: QRect, column: int, last: int) -> QRectF:
     return QRectF(rect.adjusted(left, 0, -right, 0))
 
 
-def head_font(theme: Theme) -> QFont:
+def header_font(theme: Theme) -> QFont:
     """Return the font of the header."""
     font = theme.font("small")
     font.setWeight(QFont.Weight.Medium)
     return font
 
 
-def head_width(theme: Theme, column: Column[Any]) -> int:
+def header_width(theme: Theme, column: Column[Any]) -> int:
     """Return the width in px that the header of a column needs, including its padding."""
-    return math.ceil(QFontMetricsF(head_font(theme)).horizontalAdvance(column.head)) + EDGE + PADDING + 1
+    return (
+        math.ceil(QFontMetricsF(header_font(theme)).horizontalAdvance(column.translated_title))
+        + EDGE
+        + PADDING
+        + 1
+    )
 
 
 class CellDelegate(QStyledItemDelegate):
@@ -111,7 +116,7 @@ class CellDelegate(QStyledItemDelegate):
         if chosen and column == 0:
             painter.fillRect(QRect(rect.left(), rect.top(), 2, rect.height()), theme.colour("accent"))
         figures = self._view.all_columns[column].is_numeric
-        inside = padded_rect(rect, column, self._view.last_shown)
+        inside = padded_rect(rect, column, self._view.last_visible_column)
         if cell.overflows_left:
             inside.setLeft(inside.left() - self._blank_before(row, column))
         role = "selectedText" if chosen and cell.role == "text" else cell.role
@@ -131,7 +136,12 @@ class CellDelegate(QStyledItemDelegate):
     def _paint_cell(self, painter: QPainter, box: QRectF, cell: Cell, role: str, *, figures: bool) -> None:
         theme = self._theme
         if cell.curve:
-            place = QRectF(box.left(), box.center().y() - SPARK.height() / 2, box.width(), SPARK.height())
+            place = QRectF(
+                box.left(),
+                box.center().y() - SPARKLINE_SIZE.height() / 2,
+                box.width(),
+                SPARKLINE_SIZE.height(),
+            )
             paint_sparkline(painter, place, cell.curve, theme.colour(role))
             return
         if cell.mark is not None:
@@ -206,12 +216,14 @@ class TableHeader(QHeaderView):
         painter.fillRect(rect, theme.colour("panel"))
         painter.setPen(theme.colour("border"))
         painter.drawLine(rect.bottomLeft(), rect.bottomRight())
-        font = head_font(theme)
-        box = padded_rect(rect, section, self._view.last_shown)
+        font = header_font(theme)
+        box = padded_rect(rect, section, self._view.last_visible_column)
         ordered = self._view.sort_order.column is column
         metrics = QFontMetricsF(font)
         arrow = 16.0 if ordered else 0.0
-        text = metrics.elidedText(column.head, Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow))
+        text = metrics.elidedText(
+            column.translated_title, Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow)
+        )
         advance = metrics.horizontalAdvance(text)
         x = box.right() - advance - arrow if column.is_numeric else box.left()
         painter.setFont(font)

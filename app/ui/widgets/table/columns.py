@@ -78,7 +78,7 @@ class ColumnChoice:
         """
         menu.clear()
 
-        def set_shown(name: str, shown: bool) -> None:
+        def set_visible(name: str, shown: bool) -> None:
             self.show(name, shown)
             changed()
 
@@ -92,7 +92,7 @@ class ColumnChoice:
             action = menu.addAction(column.display_name)
             action.setCheckable(True)
             action.setChecked(self.should_show(column))
-            action.toggled.connect(lambda on, name=column.name: set_shown(name, on))
+            action.toggled.connect(lambda on, name=column.name: set_visible(name, on))
         menu.addSeparator()
         again = menu.addAction(_("Default columns"))
         again.setEnabled(self.changed)

@@ -61,7 +61,7 @@ class Cell:
     role: str = "text"
     mono: bool = False
     bold: bool = False
-    struck: bool = False
+    is_struck_out: bool = False
     chip: str | None = None
     elide_middle: bool = False
     curve: Sequence[float] = ()
@@ -111,17 +111,17 @@ class Column(Generic[Row]):
     is_hidden_by_default: bool = False
     label: str = ""
     is_available: Callable[[], bool] | None = None
-    verbatim: bool = False
+    is_verbatim: bool = False
 
     @property
-    def head(self) -> str:
+    def translated_title(self) -> str:
         """Translated title."""
-        return self.title if self.verbatim else _(self.title) if self.title else ""
+        return self.title if self.is_verbatim else _(self.title) if self.title else ""
 
     @property
     def display_name(self) -> str:
         """Translated name, which columns with an empty title also have."""
-        return _(self.label) if self.label else self.head
+        return _(self.label) if self.label else self.translated_title
 
 
 @dataclass(slots=True)
@@ -182,7 +182,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         if role == Qt.ItemDataRole.ToolTipRole:
             return plain.tip(column.tip(row)) if column.tip is not None else None
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            cell, head = column.cell(row), column.head or column.display_name
+            cell, head = column.cell(row), column.translated_title or column.display_name
             return ", ".join(part for part in (head, cell.text or cell.accessible_text, cell.chip) if part)
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(column.is_numeric)
@@ -195,7 +195,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
             return None
         column = self.columns[section]
         if role == Qt.ItemDataRole.DisplayRole:
-            return column.head
+            return column.translated_title
         if role == Qt.ItemDataRole.ToolTipRole:  # shown if the title is cut off
             return plain.tip(column.display_name) or None
         if role == Qt.ItemDataRole.TextAlignmentRole:
@@ -228,7 +228,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
             self._rows.rows = list(rows)
             return
         wanted = set(keys)
-        runs = _runs([place for place, key in enumerate(self._rows.keys) if key not in wanted])
+        runs = _consecutive_runs([place for place, key in enumerate(self._rows.keys) if key not in wanted])
         if len(runs) > MAX_RUNS:
             self.beginResetModel()
             self._rows = _Rows(list(rows), keys)
@@ -275,7 +275,7 @@ def _alignment(figures: bool) -> int:
     return int(side | Qt.AlignmentFlag.AlignVCenter)
 
 
-def _runs(places: Sequence[int]) -> list[tuple[int, int]]:
+def _consecutive_runs(places: Sequence[int]) -> list[tuple[int, int]]:
     # Groups consecutive numbers to (first, last).
     runs: list[tuple[int, int]] = []
     for place in places:

@@ -24,7 +24,7 @@ class TwoLines:
     """
 
     name: str
-    below: str
+    second_line: str
     mono: bool = False
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
@@ -41,4 +41,4 @@ class TwoLines:
         row = QRectF(box.left(), top, box.width(), first)
         paint.text_line(painter, row, self.name, name, theme.colour("text"))
         row = QRectF(box.left(), top + first + 2, box.width(), second)
-        paint.text_line(painter, row, self.below, below, theme.colour("textSecondary"))
+        paint.text_line(painter, row, self.second_line, below, theme.colour("textSecondary"))

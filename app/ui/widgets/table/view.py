@@ -36,7 +36,7 @@ from PySide6.QtWidgets import (
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
-from app.ui.widgets.table.cells import CellDelegate, TableHeader, head_width
+from app.ui.widgets.table.cells import CellDelegate, TableHeader, header_width
 from app.ui.widgets.table.columns import ColumnChoice
 from app.ui.widgets.table.model import Cell, Column, Order, TableModel
 
@@ -73,7 +73,7 @@ class TableView(QTableView, Generic[Row]):
         self.columns: tuple[Column[Row], ...] = model.columns
         self.order: Order[Row] = Order(next((c for c in self.columns if c.name == key), None))
         self.choice = ColumnChoice(self.columns)
-        self.last_shown = len(self.columns) - 1
+        self.last_visible_column = len(self.columns) - 1
         self.row_height = 26
         self.hovered_row = -1
         self.keyboard = False
@@ -87,7 +87,7 @@ class TableView(QTableView, Generic[Row]):
         head = self.horizontalHeader()
         head.sectionClicked.connect(self._sort)
         head.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        head.customContextMenuRequested.connect(lambda at: self._show_columns(head.mapToGlobal(at)))
+        head.customContextMenuRequested.connect(lambda at: self._show_column_menu(head.mapToGlobal(at)))
         self.verticalHeader().hide()
         self.setShowGrid(False)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
@@ -131,7 +131,7 @@ class TableView(QTableView, Generic[Row]):
 
     def cell_font(self, cell: Cell) -> QFont:
         """Return the font for a cell."""
-        key = (cell.mono, cell.bold, cell.struck)
+        key = (cell.mono, cell.bold, cell.is_struck_out)
         if key not in self._fonts:
             font = self.theme.font("bodyLarge" if self._large else "body")
             if cell.mono:
@@ -140,7 +140,7 @@ class TableView(QTableView, Generic[Row]):
                 font = mono
             if cell.bold:
                 font.setWeight(QFont.Weight.Bold)
-            font.setStrikeOut(cell.struck)
+            font.setStrikeOut(cell.is_struck_out)
             self._fonts[key] = font
         return self._fonts[key]
 
@@ -250,7 +250,7 @@ class TableView(QTableView, Generic[Row]):
         shown = self.choice.fitting_columns(scaled, room)
         spare = room - sum(scaled[place] for place in shown)
         for place in sorted(shown):  # translations may be longer; they get the remaining space
-            more = head_width(self.theme, self.columns[place]) - scaled[place]
+            more = header_width(self.theme, self.columns[place]) - scaled[place]
             if not self.columns[place].stretch and more > 0 and spare > 0:
                 scaled[place] += min(more, spare)
                 spare -= min(more, spare)
@@ -258,7 +258,7 @@ class TableView(QTableView, Generic[Row]):
         for place, column in enumerate(self.columns):
             self.setColumnHidden(place, place not in shown)
             self.setColumnWidth(place, max(scaled[place], rest) if column.stretch else scaled[place])
-        self.last_shown = max(shown)
+        self.last_visible_column = max(shown)
         wide = sum(scaled[place] for place in shown) > room
         policy = Qt.ScrollBarPolicy.ScrollBarAsNeeded if wide else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
         self.setHorizontalScrollBarPolicy(policy)
@@ -271,7 +271,7 @@ class TableView(QTableView, Generic[Row]):
         """Replace the entries of a menu by entries to show and hide columns."""
         self.choice.fill(menu, self.fit_columns)
 
-    def _show_columns(self, at: QPoint) -> None:
+    def _show_column_menu(self, at: QPoint) -> None:
         menu = self.column_menu()
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(at)

@@ -20,7 +20,7 @@ from nep.backends.ros2.names import dds_service, dds_type, encode_user_data
 from nep.backends.ros2.participant import DdsEndpoint, Participant, policy_classes
 from nep.backends.ros2.services.definitions import request_type_of, response_type_of
 from nep.backends.ros2.topics import create_sample
-from nep.backends.services import CALLS_MAX
+from nep.backends.services import MAX_CALLS
 from nep.backends.typed_services import TypedService
 from nep.errors import DecodeError, WireError
 from nep.i18n import _
@@ -35,7 +35,7 @@ _MAX_WRITERS = 1024
 _MAX_BLOCKING_NS = 100_000_000
 _READY_DELAY_S = 0.1
 """Time in seconds after discovery until programs without nep are assumed to be ready to receive."""
-_FAILURE_KINDS = (CallKind.ERROR, CallKind.REFUSED)
+_FAILURE_KINDS = (CallKind.ERROR, CallKind.REJECTED)
 
 
 class CallId(NamedTuple):
@@ -141,7 +141,7 @@ class ServiceChannel:
         return self.participant.qos(
             policies.Reliability.Reliable(_MAX_BLOCKING_NS),
             policies.Durability.Volatile,
-            policies.History.KeepLast(CALLS_MAX),
+            policies.History.KeepLast(MAX_CALLS),
             policies.DataRepresentation(use_cdrv0_representation=True),
             policies.Userdata(encode_user_data({"typehash": type_hash} | self._user_data)),
         )
@@ -285,8 +285,8 @@ class ServiceChannel:
         for reader in readers:
             found = [each for each in writers if each.participant == reader.participant]
             since = self._first_seen.setdefault(reader.gid, now) if found else now
-            if "nepid" not in reader.announced:
-                is_ready = bool(found) and (now - since >= _READY_DELAY_S or self._is_own(reader))
+            if "nepid" not in reader.user_data:
+                is_ready = bool(found) and (now - since >= _READY_DELAY_S or self._is_local(reader))
             else:
                 is_ready = bool(found) and self._is_confirmed(reader, writers, failing)
             self._is_all_ready = self._is_all_ready and is_ready
@@ -295,7 +295,7 @@ class ServiceChannel:
         self._first_seen = {each.gid: self._first_seen.get(each.gid, now) for each in readers}
         return frozenset(ready)
 
-    def _is_own(self, endpoint: DdsEndpoint) -> bool:
+    def _is_local(self, endpoint: DdsEndpoint) -> bool:
         return bool(endpoint.gid[:PREFIX_BYTES] == self.participant.gid[:PREFIX_BYTES])
 
     def _is_confirmed(
@@ -328,9 +328,9 @@ class ServiceChannel:
             for each in self._matched_endpoints(self._writers[0])
             if each.participant == client.participant
         ]
-        pair_id = client.announced.get("clientid")
+        pair_id = client.user_data.get("clientid")
         return any(
-            pair_id is None or each.announced.get("clientid") in {None, pair_id} for each in found_here
+            pair_id is None or each.user_data.get("clientid") in {None, pair_id} for each in found_here
         )
 
     # ---- closing

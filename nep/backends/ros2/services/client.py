@@ -19,10 +19,10 @@ from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import wait_for_matches
 from nep.backends.ros2.services.channel import CallId, ReceivedSample, ServiceChannel
 from nep.backends.ros2.services.definitions import find_service_type
-from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_calls
+from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_call_limits
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError
 from nep.i18n import _
-from nep.protocol.requests import SubscriberCount, SubscriberRecord, as_count
+from nep.protocol.requests import SubscriberCount, SubscriberRecord, clamp_count
 from nep.protocol.service_wire import SERVICE_TYPE, Reply, topic_of
 
 _logger = logging.getLogger("nep")
@@ -117,7 +117,7 @@ class Ros2Client(ClientCalls[_Call]):
     @property
     def counts(self) -> SubscriberCount:
         """Statistics shown in the graph."""
-        return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed))
+        return SubscriberCount(self.spec.id, clamp_count(self._answered), clamp_count(self._failed))
 
     @property
     def is_connected(self) -> bool:
@@ -140,7 +140,7 @@ class Ros2Client(ClientCalls[_Call]):
         with self._lock:
             if self.is_closed:
                 raise self._closed_error()
-            check_calls(self.spec.service, len(self._calls), self._bytes, len(data))
+            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
             call = _Call(next(self._numbers), data, timeout_s, deadline, then)
             self._calls[call.number] = call
             self._bytes += len(data)

@@ -81,8 +81,8 @@ def find_service_type(types: MessageTypes, name: str) -> TypedService:
                 variable=FOLDERS_VARIABLE,
             )
         )
-    types.add_part(request_type_of(name), texts[0])
-    types.add_part(response_type_of(name), texts[1])
+    types.add_service_part(request_type_of(name), texts[0])
+    types.add_service_part(response_type_of(name), texts[1])
     return TypedService(
         name,
         _BodyCodec(types, request_type_of(name)),
@@ -133,6 +133,6 @@ def service_type_for(types: MessageTypes, msg_type: str) -> TypedService:
     return find_service_type(types, NEP_CALL)
 
 
-def codec_of_calls(msg_type: str) -> Codec:
+def call_codec_for(msg_type: str) -> Codec:
     """Return the codec for a client's calls. ROS types use msgpack, which supports bytes and NaN."""
     return CODECS["msgpack"] if service_type_name(msg_type) is not None else codecs.codec_for(msg_type)

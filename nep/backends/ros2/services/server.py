@@ -14,7 +14,7 @@ from nep.backends.services import (
     CallQueue,
     IncomingCall,
     ServerSpec,
-    Tally,
+    ServerStats,
     limit_reply_size,
     rejection_reply,
 )
@@ -41,7 +41,7 @@ class Ros2Server:
     ) -> None:
         self.spec = spec
         self.calls = CallQueue()
-        self.tally = Tally()
+        self.stats = ServerStats()
         self.is_closed = False
         self.endpoints = ("ros2",)
         self._on_close = on_close
@@ -67,7 +67,7 @@ class Ros2Server:
     @property
     def counts(self) -> PublisherCount:
         """Statistics shown in the graph."""
-        tally = self.tally
+        tally = self.stats
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def _handle_request(self, part: ReceivedSample) -> None:
@@ -77,7 +77,7 @@ class Ros2Server:
         except NepError as error:
             if self._refusals.add(str(error)):
                 _logger.warning("malformed call to '%s': %s", self.spec.service, error)
-            self._reply(part, error_reply(CallKind.REFUSED, "", str(error)))
+            self._reply(part, error_reply(CallKind.REJECTED, "", str(error)))
             return
         deadline = None if request.timeout_s is None else time.monotonic() + request.timeout_s
         incoming = IncomingCall(
@@ -88,12 +88,12 @@ class Ros2Server:
 
     def _reply(self, part: ReceivedSample, reply: Reply) -> bool:
         cdr: bytes | None = None
-        if self._type.is_nep or reply.kind == CallKind.ANSWER:
+        if self._type.is_nep or reply.kind == CallKind.REPLY:
             try:
                 cdr = self._type.encode_reply(reply)
             except NepError as error:  # the callback's result doesn't fit the type
                 reply = error_reply(CallKind.ERROR, type(error).__name__, str(error))
-        self.tally.add(reply)
+        self.stats.add(reply)
         if self._channel.is_closed:
             return False
         self._wait_for_match(part)
@@ -112,7 +112,7 @@ class Ros2Server:
 
     def _wait_for_match(self, part: ReceivedSample) -> None:
         # The client's reader may be discovered later than its writer.
-        if part.writer is None or "nepid" in part.writer.announced:
+        if part.writer is None or "nepid" in part.writer.user_data:
             return  # disconnected, or a nep client, which waits for the match itself
         deadline = time.monotonic() + _MATCH_TIMEOUT_S
         with self._participant.changed:

@@ -17,7 +17,7 @@ from typing import Protocol
 
 import zmq
 
-from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
+from nep.backends.services import ClientSpec, OpenCall, Outcome, check_call_limits
 from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.sockets import RejectionLog, is_remote
 from nep.errors import (
@@ -29,12 +29,12 @@ from nep.errors import (
     WireError,
 )
 from nep.i18n import _
-from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
+from nep.protocol.requests import RemotePublisher, SubscriberCount, clamp_count
 from nep.protocol.service_wire import ORIGINAL, ORIGINAL_CODEC, Framing
 
 _logger = logging.getLogger("nep")
 
-_READ_MAX = 100
+_MAX_READS_PER_TURN = 100
 _MIN_RETRY_S, _MAX_RETRY_S = 0.1, 2.0
 _PENDING_RETRY_S = 0.8
 """Maximum interval in seconds between connection attempts while calls are waiting."""
@@ -68,7 +68,7 @@ class Connection(Protocol):
     """Delay in seconds before reconnecting after the connection has ended."""
 
     @property
-    def is_over(self) -> bool:
+    def has_ended(self) -> bool:
         """True if the connection was open and has ended. Earlier replies can still be read."""
 
     @property
@@ -153,7 +153,7 @@ class SocketClient:
         self._retry_at = 0.0
         self._refusals = RejectionLog()
         self._is_closed = False
-        self._answered = self._failed = self._late = 0
+        self._replied = self._failed = self._late = 0
 
     # ---- calling, in any thread
 
@@ -201,7 +201,7 @@ class SocketClient:
             if self._is_closed:
                 raise ClosedError(_("client of '{service}'").format(service=self.spec.service))
             count = max(len(self._calls), len(self._unanswered))
-            check_calls(self._name, count, max(self._bytes, self._unanswered_bytes), call.size)
+            check_call_limits(self._name, count, max(self._bytes, self._unanswered_bytes), call.size)
             self._calls[number] = call
             self._bytes += call.size
             if self._connection is not None:
@@ -310,7 +310,7 @@ class SocketClient:
     def counts(self) -> SubscriberCount:
         """Return the statistics that a renewal reports."""
         problem = self._refusals.recent_message()
-        return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed), problem)
+        return SubscriberCount(self.spec.id, clamp_count(self._replied), clamp_count(self._failed), problem)
 
     # ---- in the I/O thread: the socket
 
@@ -335,7 +335,7 @@ class SocketClient:
             for call in [each for each in self._calls.values() if not each.is_sent]:
                 self._send_locked(call)
             self._expire(now, outcomes)
-            due = self._next_due()
+            due = self._next_deadline()
             # zmq_send may consume input, and ZMQ_FD is edge-triggered: check again
             has_more = has_more or (self._connection is not None and self._connection.has_input)
         self._run_callbacks(outcomes)
@@ -345,7 +345,7 @@ class SocketClient:
         # Returns True if there may be more replies.
         if self._connection is None:
             return False
-        for _turn in range(_READ_MAX):
+        for _turn in range(_MAX_READS_PER_TURN):
             number: int | None = None
             outcome: Outcome
             try:
@@ -366,17 +366,17 @@ class SocketClient:
             if call is None:
                 self._late += 1
                 continue
-            self._answered += 1
+            self._replied += 1
             outcomes.append((call.callback, outcome))
         return True
 
     def _check_connection(self, now: float, outcomes: _Outcomes) -> None:
         # Call when all replies are read.
         connection = self._connection
-        if connection is not None and connection.is_over:
+        if connection is not None and connection.has_ended:
             self._fail_sent_calls(outcomes)
             self._attempts, self._retry_at = 0, now + connection.reconnect_delay_s
-        elif connection is not None and self._has_moved():
+        elif connection is not None and self._has_endpoint_changed():
             self._switch_server(outcomes)  # the old connection would stay silent for long
         elif connection is not None and connection.is_open:
             self._attempts = 0
@@ -387,7 +387,7 @@ class SocketClient:
         if not self.is_connected and now >= self._retry_at:
             self._connect_next(now)
 
-    def _has_moved(self) -> bool:
+    def _has_endpoint_changed(self) -> bool:
         # True if an endpoint of the connection has changed.
         known = None if self._current is None else self._servers.get(self._current)
         return known not in {None, self._connected_endpoint} and (
@@ -455,7 +455,7 @@ class SocketClient:
             )
             outcomes.append((call.callback, error))
 
-    def _next_due(self) -> float:
+    def _next_deadline(self) -> float:
         due = min((each.deadline for each in self._calls.values()), default=math.inf)
         if self.is_connected and any(not each.is_sent for each in self._calls.values()):
             due = min(due, self._leave_at)

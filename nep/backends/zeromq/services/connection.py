@@ -14,8 +14,8 @@ from collections.abc import Callable, Sequence
 import zmq
 
 from nep.backends.zeromq.io_thread import IoThread, PollState, SharedContext
-from nep.backends.zeromq.sockets import Part, Socket, keep_alive
-from nep.protocol.service_wire import PAYLOAD_MAX_BYTES
+from nep.backends.zeromq.sockets import Part, Socket, enable_keep_alive
+from nep.protocol.service_wire import MAX_PAYLOAD_BYTES
 
 FDS_PER_CONNECTION = 4
 """Number of file descriptors per connection, including the descriptors that libzmq opens."""
@@ -41,7 +41,7 @@ class ServerConnection:
         self, shared: SharedContext, service: str, endpoint: str, serve: Callable[[float], PollState]
     ) -> None:
         self.endpoint = endpoint
-        self.is_open = self.is_over = False
+        self.is_open = self.has_ended = False
         self.reconnect_delay_s = 0.0
         self._io: IoThread = shared.io
         what = f"a client of '{service}'"
@@ -62,9 +62,9 @@ class ServerConnection:
     def _connect(self, monitor: Socket) -> None:
         self._socket.setsockopt(zmq.RECONNECT_IVL, _NO_RECONNECT_MS)
         self._socket.setsockopt(zmq.SNDHWM, 0)  # the client limits its calls
-        self._socket.setsockopt(zmq.MAXMSGSIZE, PAYLOAD_MAX_BYTES)
+        self._socket.setsockopt(zmq.MAXMSGSIZE, MAX_PAYLOAD_BYTES)
         self._socket.copy_threshold = _LARGE_BYTES
-        keep_alive(self._socket, self.endpoint)
+        enable_keep_alive(self._socket, self.endpoint)
         name = f"inproc://nep-service-{next(_monitor_numbers)}"
         self._socket.monitor(name, zmq.EVENT_HANDSHAKE_SUCCEEDED | zmq.EVENT_DISCONNECTED)
         monitor.connect(name)
@@ -74,8 +74,8 @@ class ServerConnection:
         """Update `is_open` and `is_over` from the monitor's events."""
         while self._monitor is not None and _has_input(self._monitor):
             event, _value = _EVENT_HEADER.unpack(self._monitor.recv_multipart(zmq.DONTWAIT)[0])
-            self.is_over = self.is_over or event == zmq.EVENT_DISCONNECTED
-            self.is_open = not self.is_over
+            self.has_ended = self.has_ended or event == zmq.EVENT_DISCONNECTED
+            self.is_open = not self.has_ended
 
     @property
     def has_input(self) -> bool:
@@ -102,7 +102,7 @@ class ServerConnection:
         sides, self._sides = self._sides, ()
         for side in sides:
             self._io.remove(side)
-        self.is_open, self.is_over = False, True
+        self.is_open, self.has_ended = False, True
         if not self._socket.closed:
             self._socket.disable_monitor()
             self._socket.close(0)

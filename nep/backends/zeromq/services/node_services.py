@@ -63,7 +63,7 @@ class ZeromqServices:
             return self._create_direct_server(spec, spec.configuration)
         session = self._session(spec.configuration.master)
         session.wait_for_address(spec.wait_s)
-        server = self._new_server(spec, NATIVE, lambda: session.remove_publisher(spec.id, server.tally.calls))
+        server = self._new_server(spec, NATIVE, lambda: session.remove_publisher(spec.id, server.stats.calls))
         with _release_on_error(server):
             endpoints = server.move(session.hosts)
             self._add(server)

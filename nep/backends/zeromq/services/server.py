@@ -19,7 +19,7 @@ from nep.backends.services import (
     CallQueue,
     IncomingCall,
     ServerSpec,
-    Tally,
+    ServerStats,
     limit_reply_size,
     rejection_reply,
 )
@@ -27,16 +27,16 @@ from nep.backends.zeromq.bindings import Bindings
 from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.sockets import RejectionLog, Socket
 from nep.errors import WireError
-from nep.protocol.requests import PublisherCount, as_count
-from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, Framing, Reply
+from nep.protocol.requests import PublisherCount, clamp_count
+from nep.protocol.service_wire import MAX_PAYLOAD_BYTES, Framing, Reply
 
 _logger = logging.getLogger("nep")
 
-_READ_MAX = 100
+_MAX_READS_PER_TURN = 100
 """Maximum number of calls read before other sockets are served."""
 _LARGE_BYTES = 65_536
 """Minimum size in bytes of replies that are sent without a copy, and tracked until libzmq has sent them."""
-_UNREAD_MAX_BYTES = 256 * 2**20
+_MAX_UNREAD_BYTES = 256 * 2**20
 _REPLY_HIGH_WATER_MARK = 1000
 """High-water mark: maximum number of replies queued for a client that doesn't read."""
 
@@ -47,11 +47,11 @@ class CallReader:
     Not thread-safe: guarded by the server's lock.
     """
 
-    def __init__(self, service: str, framing: Framing, tally: Tally) -> None:
+    def __init__(self, service: str, framing: Framing, tally: ServerStats) -> None:
         self._service = service
         self._framing = framing
-        self._tally = tally
-        self._refusals = RejectionLog()
+        self._stats = tally
+        self._rejections = RejectionLog()
 
     def read(
         self,
@@ -76,18 +76,18 @@ class CallReader:
 
     def reject(self, error: WireError) -> None:
         """Count a malformed call, and log it if due."""
-        self._tally.add_unreadable()
-        if self._refusals.add(error.reason):
+        self._stats.add_unreadable()
+        if self._rejections.add(error.reason):
             _logger.warning(
                 "malformed call to '%s' (%d so far): %s",
                 self._service,
-                self._refusals.count,
+                self._rejections.count,
                 error,
             )
 
     def recent_message(self) -> str:
         """Return the reason of the newest malformed call. See `RejectionLog.recent_message`."""
-        return self._refusals.recent_message()
+        return self._rejections.recent_message()
 
 
 class RouterServer:
@@ -115,7 +115,7 @@ class RouterServer:
     ) -> None:
         self.spec = spec
         self.calls = CallQueue()
-        self.tally = Tally()
+        self.stats = ServerStats()
         self.fixed: tuple[str, ...] = ()
         """Endpoint of a server without a master."""
         self.socket = socket
@@ -124,11 +124,11 @@ class RouterServer:
         self._unregister = unregister
         self._closer = closer
         self._lock = threading.Lock()
-        self._reader = CallReader(spec.service, framing, self.tally)
+        self._reader = CallReader(spec.service, framing, self.stats)
         self._unread: deque[tuple[zmq.MessageTracker, int]] = deque()
         self._is_closed = False
         socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # raise an error when a client has disconnected
-        socket.setsockopt(zmq.MAXMSGSIZE, PAYLOAD_MAX_BYTES)
+        socket.setsockopt(zmq.MAXMSGSIZE, MAX_PAYLOAD_BYTES)
         socket.setsockopt(zmq.SNDHWM, _REPLY_HIGH_WATER_MARK)
         socket.setsockopt(zmq.TCP_KEEPALIVE, 1)
         socket.copy_threshold = _LARGE_BYTES
@@ -157,9 +157,11 @@ class RouterServer:
 
     def counts(self) -> PublisherCount:
         """Return the statistics that a renewal reports."""
-        tally = self.tally
-        calls, problem = as_count(tally.calls), self._reader.recent_message()
-        return PublisherCount(self.spec.id, calls, as_count(tally.bytes), calls, None, problem, tally.errors)
+        tally = self.stats
+        calls, problem = clamp_count(tally.calls), self._reader.recent_message()
+        return PublisherCount(
+            self.spec.id, calls, clamp_count(tally.bytes), calls, None, problem, tally.errors
+        )
 
     # ---- in the I/O thread
 
@@ -177,7 +179,7 @@ class RouterServer:
 
     def _read_locked(self, calls: list[IncomingCall], now: float) -> bool:
         # Returns True if there may be more: ZMQ_FD is edge-triggered.
-        for _turn in range(_READ_MAX):
+        for _turn in range(_MAX_READS_PER_TURN):
             try:
                 route, *parts = self.socket.recv_multipart(zmq.DONTWAIT)
             except zmq.Again:
@@ -191,7 +193,7 @@ class RouterServer:
 
     def _reply(self, route: bytes, number: int, reply: Reply) -> bool:
         reply = limit_reply_size(reply)
-        self.tally.add(reply)
+        self.stats.add(reply)
         with self._lock:
             if self._is_closed:
                 return False
@@ -223,7 +225,7 @@ class RouterServer:
     def _has_room(self, size: int) -> bool:
         while self._unread and self._unread[0][0].done:
             self._unread.popleft()
-        return not self._unread or sum(each for _tracker, each in self._unread) + size <= _UNREAD_MAX_BYTES
+        return not self._unread or sum(each for _tracker, each in self._unread) + size <= _MAX_UNREAD_BYTES
 
     # ---- closing
 

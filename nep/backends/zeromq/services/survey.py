@@ -11,7 +11,7 @@ from nep.backends.services import ClientSpec, OpenCall, Outcome
 from nep.backends.zeromq.services.client import SocketClient
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
-from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
+from nep.protocol.requests import RemotePublisher, SubscriberCount, clamp_count
 
 _logger = logging.getLogger("nep")
 
@@ -50,7 +50,7 @@ class SurveyClient:
         self._clients: dict[int, SocketClient] = {}
         self._leaving: list[SocketClient] = []
         """Clients of respondents that are no longer listed; their last replies are still accepted."""
-        self._answered = self._failed = self._late = 0
+        self._replied = self._failed = self._late = 0
         """Statistics of closed clients."""
 
     # ---- calling, in any thread
@@ -70,7 +70,7 @@ class SurveyClient:
         self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
     ) -> list[OpenCall]:
         """Send a request to all listed respondents. See `SurveyTransport.start_survey`."""
-        self._close_idle_leaving()
+        self._close_idle_removed_clients()
         with self._lock:
             if self.is_closed:
                 raise self._closed_error()
@@ -96,7 +96,7 @@ class SurveyClient:
     def _all_clients(self) -> list[SocketClient]:
         return [*self._clients.values(), *self._leaving]
 
-    def _close_idle_leaving(self) -> None:
+    def _close_idle_removed_clients(self) -> None:
         with self._lock:
             ended = [each for each in self._leaving if not each.is_busy]
             self._leaving = [each for each in self._leaving if each not in ended]
@@ -107,7 +107,7 @@ class SurveyClient:
             client.close()
             counts = client.counts()
             with self._lock:
-                self._answered += counts.received or 0
+                self._replied += counts.received or 0
                 self._failed += counts.lost or 0
                 self._late += client.late
 
@@ -169,10 +169,10 @@ class SurveyClient:
         """Return the statistics that a renewal reports."""
         with self._lock:
             counts = [each.counts() for each in self._all_clients()]
-            answered = self._answered + sum(each.received or 0 for each in counts)
+            answered = self._replied + sum(each.received or 0 for each in counts)
             failed = self._failed + sum(each.lost or 0 for each in counts)
         problem = next((each.problem for each in counts if each.problem), "")
-        return SubscriberCount(self.spec.id, as_count(answered), as_count(failed), problem)
+        return SubscriberCount(self.spec.id, clamp_count(answered), clamp_count(failed), problem)
 
     # ---- closing
 

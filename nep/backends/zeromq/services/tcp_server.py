@@ -16,13 +16,13 @@ from nep.backends.services import (
     CallQueue,
     IncomingCall,
     ServerSpec,
-    Tally,
+    ServerStats,
     limit_reply_size,
     rejection_reply,
 )
 from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.backends.zeromq.services.server import CallReader
-from nep.backends.zeromq.services.tcp_stream import TcpStream, keep_alive
+from nep.backends.zeromq.services.tcp_stream import TcpStream, enable_keep_alive
 from nep.backends.zeromq.sockets import wait_until
 from nep.errors import AddressInUseError, WireError
 from nep.protocol.service_wire import NATIVE, Reply
@@ -34,9 +34,9 @@ _logger = logging.getLogger("nep")
 
 _BACKLOG = 128
 """Maximum number of connections that the system queues until they are accepted."""
-_PEERS_MAX = 1000
-_READ_MAX = 100
-_UNREAD_MAX_BYTES = 256 * 2**20
+_MAX_PEERS = 1000
+_MAX_READS_PER_TURN = 100
+_MAX_UNREAD_BYTES = 256 * 2**20
 """Maximum number of bytes queued for a client that doesn't read; further replies are dropped."""
 _FDS_PER_LISTENER = 2
 _ACCEPT_PAUSE_S = 0.5
@@ -58,12 +58,12 @@ class TcpServer:
     ) -> None:
         self.spec = spec
         self.calls = CallQueue()
-        self.tally = Tally()
+        self.stats = ServerStats()
         self.is_closed = False
         self._io = io
         self._closer = closer
         self._changed = threading.Condition(threading.Lock())
-        self._reader = CallReader(spec.service, NATIVE, self.tally)
+        self._reader = CallReader(spec.service, NATIVE, self.stats)
         self._peers: set[_Peer] = set()
         self._rejected = 0
         self._listener = _create_listener(address, spec.service)
@@ -75,7 +75,7 @@ class TcpServer:
 
     def serve(self, now: float) -> PollState:
         """Accept connections. See `Pollable.serve`."""
-        for _turn in range(_READ_MAX):
+        for _turn in range(_MAX_READS_PER_TURN):
             if self.is_closed:
                 return PollState()
             try:
@@ -86,7 +86,7 @@ class TcpServer:
                 if error.errno in {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}:
                     return PollState(pause_reading=True, due=now + _ACCEPT_PAUSE_S)
                 continue
-            if len(self._peers) >= _PEERS_MAX or not has_free_descriptors(_FDS_PER_LISTENER):
+            if len(self._peers) >= _MAX_PEERS or not has_free_descriptors(_FDS_PER_LISTENER):
                 self._reject_connection(connected)
                 continue
             self._accept(connected, f"{host}:{port}")
@@ -105,7 +105,7 @@ class TcpServer:
     def _accept(self, connected: socket.socket, address: str) -> None:
         connected.setblocking(False)
         with suppress(OSError):  # it may have ended already
-            keep_alive(connected, address)
+            enable_keep_alive(connected, address)
         peer = _Peer(connected, self)
         with self._changed:
             self._peers.add(peer)
@@ -119,7 +119,7 @@ class TcpServer:
                 return PollState(pause_reading=True)
             peer.stream.flush()
             has_more = self._read(peer, calls, now)
-            is_over = peer.stream.is_over and not has_more
+            is_over = peer.stream.has_ended and not has_more
             if is_over and (peer.stream.is_broken or not (peer.waiting or peer.stream.backlog)):
                 # otherwise the client has only shut down its sending side and still reads replies
                 self._disconnect_locked(peer)
@@ -134,7 +134,7 @@ class TcpServer:
 
     def _read(self, peer: _Peer, calls: list[IncomingCall], now: float) -> bool:
         # Returns True if there may be more.
-        for turn in range(_READ_MAX):
+        for turn in range(_MAX_READS_PER_TURN):
             try:
                 parts = peer.stream.next()
                 if (
@@ -164,19 +164,19 @@ class TcpServer:
 
     def _reply(self, peer: _Peer, number: int, reply: Reply) -> bool:
         reply = limit_reply_size(reply)
-        self.tally.add(reply)
+        self.stats.add(reply)
         with self._changed:
             stream = peer.stream
             peer.waiting -= 1
             if peer not in self._peers or stream.is_broken:
                 return False
-            if stream.backlog + len(reply.data) > _UNREAD_MAX_BYTES and stream.backlog:
+            if stream.backlog + len(reply.data) > _MAX_UNREAD_BYTES and stream.backlog:
                 _logger.warning(
                     "dropped a reply of '%s': the client doesn't read its replies", self.spec.service
                 )
                 return False
             stream.send(NATIVE.reply(number, reply))
-            is_served = stream.backlog > 0 or stream.is_over
+            is_served = stream.backlog > 0 or stream.has_ended
         if is_served:
             self._io.serve_soon(peer)
         return True

@@ -14,7 +14,7 @@ from contextlib import suppress
 from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.errors import WireError
 from nep.i18n import _
-from nep.protocol.service_wire import HEADER_BYTES, PAYLOAD_MAX_BYTES
+from nep.protocol.service_wire import HEADER_BYTES, MAX_PAYLOAD_BYTES
 from nep.system.addresses import host_of, is_loopback
 
 _SIZE = struct.Struct("<I")
@@ -33,7 +33,7 @@ class TcpStream:
     def __init__(self, connected: socket.socket) -> None:
         self._socket = connected
         self.fd = connected.fileno()
-        self.is_over = False
+        self.has_ended = False
         """True if no more data will be received."""
         self.is_broken = False
         """True if no more data can be sent."""
@@ -50,7 +50,7 @@ class TcpStream:
     def read(self) -> bool:
         """Receive a limited amount of the available data; return True if there was any."""
         was = len(self._input)
-        while not self.is_over and len(self._input) - was < _TURN_BYTES:
+        while not self.has_ended and len(self._input) - was < _TURN_BYTES:
             try:
                 data = self._socket.recv(_CHUNK_BYTES)
             except (BlockingIOError, InterruptedError):
@@ -59,7 +59,7 @@ class TcpStream:
                 data = b""
                 self._abort()
             if not data:
-                self.is_over = True
+                self.has_ended = True
             self._input += data
         return len(self._input) > was
 
@@ -74,9 +74,9 @@ class TcpStream:
             self._check_end(available)
             return None
         (size,) = _SIZE.unpack_from(self._input, self._start)
-        if not HEADER_BYTES <= size <= HEADER_BYTES + PAYLOAD_MAX_BYTES:
+        if not HEADER_BYTES <= size <= HEADER_BYTES + MAX_PAYLOAD_BYTES:
             self._clear_input()
-            self.is_over = True
+            self.has_ended = True
             self._abort()
             reason = _("invalid call size: {size} bytes").format(size=size)
             raise WireError(reason, code="call-size")
@@ -98,7 +98,7 @@ class TcpStream:
         return pair
 
     def _check_end(self, available: int) -> None:
-        if self.is_over and available:
+        if self.has_ended and available:
             self._clear_input()
             raise WireError(_("the message is incomplete"), code="call-end")
 
@@ -149,7 +149,7 @@ class TcpStream:
 
     def close(self) -> None:
         """Close the socket. The I/O thread must have stopped serving it."""
-        self.is_over = True
+        self.has_ended = True
         self._abort()
         self._socket.close()
 
@@ -158,7 +158,7 @@ class TcpStream:
 
         `nep.system.forks` closes the inherited file descriptor, which it finds by its address.
         """
-        self.is_over = self.is_broken = True
+        self.has_ended = self.is_broken = True
         self._socket.detach()
 
 
@@ -180,7 +180,7 @@ class TcpConnection:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
             self._socket.setblocking(False)
-            keep_alive(self._socket, address)
+            enable_keep_alive(self._socket, address)
             self._stream = TcpStream(self._socket)
             self.fd = self._stream.fd
             self._socket.connect_ex((host_of(address), int(address.rpartition(":")[2])))
@@ -190,9 +190,9 @@ class TcpConnection:
         io.add(self)
 
     @property
-    def is_over(self) -> bool:
+    def has_ended(self) -> bool:
         """True if the connection was open and has ended."""
-        return self.is_open and self._stream.is_over
+        return self.is_open and self._stream.has_ended
 
     @property
     def has_input(self) -> bool:
@@ -215,7 +215,7 @@ class TcpConnection:
     def serve(self, now: float) -> PollState:
         """Send queued calls and receive replies. See `Pollable.serve`."""
         rest = self._serve(now)
-        pause_reading = self._is_dead or self._stream.is_over
+        pause_reading = self._is_dead or self._stream.has_ended
         return PollState(pause_reading, rest.due, wants_write=not self.is_open or self._stream.backlog > 0)
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
@@ -245,7 +245,7 @@ class TcpConnection:
         self._stream.forked()
 
 
-def keep_alive(connected: socket.socket, address: str) -> None:
+def enable_keep_alive(connected: socket.socket, address: str) -> None:
     """Set socket options that detect within a dozen seconds that the peer's computer has vanished.
 
     See `nep.backends.zeromq.sockets.keep_alive`.

@@ -6,8 +6,8 @@ from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.rules.messages import connected_publisher
-from nep.programs.conformance.verdict import broken_rule, expect
+from nep.programs.conformance.rules.messages import connect_publisher
+from nep.programs.conformance.verdict import broken_rule_error, expect
 from nep.protocol.requests import RemovePublisher
 from nep.protocol.wire import BYE
 
@@ -23,7 +23,7 @@ def _close_without_bye(bench: Bench, publisher: ScriptedPublisher, last_seq: int
     bench.master.submit(RemovePublisher(publisher.node.id, publisher.id, last_seq))
     bench.wait(wait_s)
     if not _is_connected(publisher):
-        raise broken_rule(_("the subscriber disconnected before the bye"))
+        raise broken_rule_error(_("the subscriber disconnected before the bye"))
 
 
 @rule(
@@ -32,14 +32,14 @@ def _close_without_bye(bench: Bench, publisher: ScriptedPublisher, last_seq: int
     _SECTION,
 )
 def _bye(bench: Bench) -> None:
-    topic, pub, subscriber = connected_publisher(bench)
+    topic, pub, subscriber = connect_publisher(bench)
     bench.call("publish", pub=pub, value={"a": 1}, count=5)
     number = bench.adapter.send_request("close_publisher", pub=pub)
     bench.discard_opened()
     bench.require(lambda: bool(subscriber.byes), "bye")
     header = subscriber.byes[0].header
     expect("bye.seq", header.seq, 5)
-    id = bench.record("publisher", topic)["id"]
+    id = bench.latest_record("publisher", topic)["id"]
     expect("bye.publisher", header.publisher, id)
     expect("received", len(subscriber.messages), 5)
     expect("publisher-.last_seq", bench.wait_for_request("publisher-", "id", id).fields.get("last_seq"), 5)
@@ -49,7 +49,7 @@ def _bye(bench: Bench) -> None:
 
 @rule("bye-again", lazy("A publisher repeats its bye until no hello remains, and then closes."), _SECTION)
 def _bye_repeats(bench: Bench) -> None:
-    _topic, pub, subscriber = connected_publisher(bench)
+    _topic, pub, subscriber = connect_publisher(bench)
     number = bench.adapter.send_request("close_publisher", pub=pub)
     bench.discard_opened()
     bench.require(lambda: len(subscriber.byes) >= 3, "bye again")
@@ -58,7 +58,7 @@ def _bye_repeats(bench: Bench) -> None:
 
 @rule("bye-disconnects", lazy("A subscriber disconnects after reading the bye."), _SECTION)
 def _bye_disconnects(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
     publisher.send_byes()
     # The master still lists the publisher, so a renewal may make the adapter connect again.
@@ -72,7 +72,7 @@ def _bye_disconnects(bench: Bench) -> None:
     _SECTION,
 )
 def _closed_publisher_is_read(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     _close_without_bye(bench, publisher, 3, 0.3)
     for _number in range(3):
         publisher.send(b'{"a":1}')
@@ -87,7 +87,7 @@ def _closed_publisher_is_read(bench: Bench) -> None:
     _SECTION,
 )
 def _closed_publisher_is_disconnected(bench: Bench) -> None:
-    publisher, _sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, _sub = bench.create_subscribed_publisher(bench.new_topic())
     _close_without_bye(bench, publisher, 0, 1.5)
     bench.require(lambda: not _is_connected(publisher), "disconnect", 10.0)
 
@@ -98,7 +98,7 @@ def _closed_publisher_is_disconnected(bench: Bench) -> None:
     _SECTION,
 )
 def _lapsed_publisher_stays_connected(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     bench.master.drop(publisher.node.id)
     bench.wait(0.5)
     publisher.send(b'{"a":1}')
@@ -113,9 +113,9 @@ def _lapsed_publisher_stays_connected(bench: Bench) -> None:
 )
 def _subscriber_closes(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher, sub = bench.subscribed_publisher(topic)
+    publisher, sub = bench.create_subscribed_publisher(topic)
     bench.close_sub(sub)
-    bench.wait_for_request("subscriber-", "id", bench.record("subscriber", topic)["id"])
+    bench.wait_for_request("subscriber-", "id", bench.latest_record("subscriber", topic)["id"])
     bench.require(lambda: not _is_connected(publisher), "disconnect")
 
 
@@ -126,7 +126,7 @@ def _subscriber_closes(bench: Bench) -> None:
     is_last=True,
 )
 def _node_leaves(bench: Bench) -> None:
-    _topic, pub, subscriber = connected_publisher(bench)
+    _topic, pub, subscriber = connect_publisher(bench)
     bench.call("publish", pub=pub, value={"a": 1}, count=4)
     count = len(bench.master.received)
     number = bench.adapter.send_request("close")
@@ -138,7 +138,7 @@ def _node_leaves(bench: Bench) -> None:
     requests = bench.master.received[count:]
     first = next(each for each in requests if each.do in {"renew", "leave", "publisher-"})
     if first.do == "leave":
-        raise broken_rule(_("'leave' was sent without a preceding renewal"))
+        raise broken_rule_error(_("'leave' was sent without a preceding renewal"))
     if first.do == "renew":
         seqs = [each.get("last_seq") for each in first.fields.get("publishers", ())]
         expect("renew.publishers.last_seq", 4 in seqs, True)

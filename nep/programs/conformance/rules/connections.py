@@ -8,7 +8,7 @@ from nep.i18n import lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.rules.messages import connected_subscriber, messages_of
+from nep.programs.conformance.rules.messages import connect_subscriber, messages_of
 from nep.programs.conformance.verdict import expect, time_limit
 from nep.protocol.requests import AddPublisher
 
@@ -31,7 +31,7 @@ def _expect_next(bench: Bench, publisher: ScriptedPublisher, sub: int) -> None:
     "the-handshake",
 )
 def _connect_once(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     bench.master.repeat_pushes(bench.node_id, publisher.record, publisher.node)
     bench.wait(0.2)
     _expect_next(bench, publisher, sub)
@@ -45,8 +45,8 @@ def _connect_once(bench: Bench) -> None:
     _SECTION,
 )
 def _several_publishers(bench: Bench) -> None:
-    first, sub = bench.subscribed_publisher(bench.new_topic())
-    second = bench.publisher(first.topic)
+    first, sub = bench.create_subscribed_publisher(bench.new_topic())
+    second = bench.create_publisher(first.topic)
     bench.require(lambda: bool(second.hellos), "hello")
     for publisher in (first, second):
         publisher.send(b'{"a":1}')
@@ -65,7 +65,7 @@ def _several_publishers(bench: Bench) -> None:
     _SECTION,
 )
 def _reconnect(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
     bench.require(lambda: bool(bench.events(sub)), "message")
     publisher.bind_again()
@@ -84,7 +84,7 @@ def _reconnect(bench: Bench) -> None:
 def _other_socket_at_publisher(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
-    publisher = bench.publisher(topic, is_listed=False)
+    publisher = bench.create_publisher(topic, is_listed=False)
     publisher.socket.close(0)
     bench.register_publisher(publisher)
     bench.fail_handshake("PULL", publisher.record.endpoints[0])
@@ -99,7 +99,7 @@ def _other_socket_at_publisher(bench: Bench) -> None:
     "other-computers",
 )
 def _endpoint_change(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
     bench.require(lambda: bool(bench.events(sub)), "message")
     publisher.bind_elsewhere()
@@ -116,9 +116,9 @@ def _endpoint_change(bench: Bench) -> None:
     "the-master",
 )
 def _unusable_endpoint(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     for endpoints in (("nanomsg://127.0.0.1:4000/4001",), ("tcp://there is none:1",), ("",), ()):
-        made = bench.publisher(publisher.topic, is_listed=False)
+        made = bench.create_publisher(publisher.topic, is_listed=False)
         made.record = replace(made.record, endpoints=endpoints)
         bench.master.submit(AddPublisher(made.node, made.record))
     bench.wait(0.2)
@@ -133,7 +133,7 @@ def _unusable_endpoint(bench: Bench) -> None:
 def _subscriber_lost(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    killed, other = connected_subscriber(bench, topic, 3), connected_subscriber(bench, topic, 3)
+    killed, other = connect_subscriber(bench, topic, 3), connect_subscriber(bench, topic, 3)
     bench.call("publish", pub=pub, value={"a": 1}, count=10)
     killed.socket.close(0)
     bench.call("publish", pub=pub, value={"a": 1}, count=10)

@@ -6,8 +6,8 @@ from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.rules.messages import connected_subscriber
-from nep.programs.conformance.verdict import broken_rule, expect, printable, time_limit
+from nep.programs.conformance.rules.messages import connect_subscriber
+from nep.programs.conformance.verdict import broken_rule_error, expect, printable, time_limit
 from nep.protocol.wire import LATCHED, hello_part, topic_part
 
 _SECTION = "the-handshake"
@@ -31,17 +31,17 @@ def _filters(publisher: ScriptedPublisher) -> list[bytes]:
 )
 def _hello_after_topic(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher, _sub = bench.subscribed_publisher(topic)
+    publisher, _sub = bench.create_subscribed_publisher(topic)
     filters = _filters(publisher)
     if topic_part(topic) not in filters:
-        raise broken_rule(
+        raise broken_rule_error(
             _("the subscriptions are {seen}, without {wanted}").format(
                 seen=printable(filters), wanted=printable(topic_part(topic))
             )
         )
     hello = next(iter(publisher.hellos))
     if filters.index(hello) < filters.index(topic_part(topic)):
-        raise broken_rule(_("the subscriber subscribed to the hello before the topic"))
+        raise broken_rule_error(_("the subscriber subscribed to the hello before the topic"))
 
 
 @rule(
@@ -54,10 +54,10 @@ def _hello_after_topic(bench: Bench) -> None:
 )
 def _hello_form(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher, _sub = bench.subscribed_publisher(topic)
+    publisher, _sub = bench.create_subscribed_publisher(topic)
     level = level_of(bench)
     wanted = hello_part(
-        int(bench.record("subscriber", topic)["id"]),
+        int(bench.latest_record("subscriber", topic)["id"]),
         topic,
         one_part=level == 1,
         tells=level == 2,
@@ -75,8 +75,8 @@ def _echo(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
     bench.call("publish", pub=pub, value={"a": 1}, count=3)
-    record = bench.record("publisher", topic)
-    subscriber = connected_subscriber(bench, topic, 3)
+    record = bench.latest_record("publisher", topic)
+    subscriber = connect_subscriber(bench, topic, 3)
     header = subscriber.echoes[0].header
     expect("echo.seq", header.seq, 3)
     expect("echo.publisher", header.publisher, record["id"])
@@ -91,13 +91,13 @@ def _echo(bench: Bench) -> None:
 def _foreign_hello(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
-    subscriber = connected_subscriber(bench, topic, 3)
+    subscriber = connect_subscriber(bench, topic, 3)
     other = hello_part(subscriber.record.id, f"{topic}/other", batches=True)
     subscriber.socket.subscribe(other)
     subscriber.socket.subscribe(hello_part(7, topic))
     bench.require(lambda: any(parts[0] == hello_part(7, topic) for parts in subscriber.received), "echo")
     if any(parts[0] == other for parts in subscriber.received):
-        raise broken_rule(_("the publisher answered the hello {hello}").format(hello=printable(other)))
+        raise broken_rule_error(_("the publisher answered the hello {hello}").format(hello=printable(other)))
 
 
 @rule(
@@ -107,7 +107,7 @@ def _foreign_hello(bench: Bench) -> None:
 )
 def _first_message(bench: Bench) -> None:
     topic = bench.new_topic()
-    subscriber = bench.subscriber(topic)
+    subscriber = bench.create_subscriber(topic)
     bench.connect_delay_s = 0.15
     pub = bench.new_pub(topic)
     bench.call("publish", pub=pub, value={"n": 1})
@@ -124,7 +124,7 @@ def _first_message(bench: Bench) -> None:
 )
 def _new_pub_bounded(bench: Bench) -> None:
     topic = bench.new_topic()
-    bench.subscriber(topic)
+    bench.create_subscriber(topic)
     bench.connect_delay_s = None
     with time_limit(_MAX_WAIT_S):
         bench.new_pub(topic)
@@ -137,11 +137,13 @@ def _new_pub_bounded(bench: Bench) -> None:
 )
 def _missing_hello_is_reported(bench: Bench) -> None:
     topic = bench.new_topic()
-    subscriber = bench.subscriber(topic)
+    subscriber = bench.create_subscriber(topic)
     bench.connect_delay_s = None
     reply = bench.call("publisher", topic=topic, type="json")
     expect("publisher.missing", reply.get("missing"), [subscriber.node.name])
-    what = bench.wait_for_request("missing", "publisher_id", bench.record("publisher", topic)["id"]).fields
+    what = bench.wait_for_request(
+        "missing", "publisher_id", bench.latest_record("publisher", topic)["id"]
+    ).fields
     expect("missing.subscriber_ids", list(what.get("subscriber_ids", ())), [subscriber.record.id])
     bench.call("close_publisher", pub=reply.get("pub"))
 
@@ -153,7 +155,7 @@ def _missing_hello_is_reported(bench: Bench) -> None:
 )
 def _new_sub_waits(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher = bench.publisher(topic, echoes=False)
+    publisher = bench.create_publisher(topic, echoes=False)
     number = bench.adapter.send_request("subscriber", topic=topic, type="json")
     bench.require(lambda: bool(publisher.hellos), "hello")
     bench.wait(0.15)
@@ -162,7 +164,7 @@ def _new_sub_waits(bench: Bench) -> None:
         publisher.send_echo(hello)
     bench.close_sub(int(bench.finish(number, "subscriber")["sub"]))
     if has_returned:
-        raise broken_rule(_("'new_sub' returned before the echo"))
+        raise broken_rule_error(_("'new_sub' returned before the echo"))
 
 
 @rule(
@@ -172,7 +174,7 @@ def _new_sub_waits(bench: Bench) -> None:
 )
 def _new_sub_bounded(bench: Bench) -> None:
     topic = bench.new_topic()
-    bench.publisher(topic, echoes=False)
+    bench.create_publisher(topic, echoes=False)
     with time_limit(_MAX_WAIT_S):
         bench.new_sub(topic)
 
@@ -185,7 +187,7 @@ def _new_sub_bounded(bench: Bench) -> None:
 def _push_connects(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
-    publisher = bench.publisher(topic)
+    publisher = bench.create_publisher(topic)
     bench.require(lambda: bool(publisher.hellos), "hello")
     publisher.send(b'{"n":1}')
     bench.require(lambda: bool(bench.events(sub)), "message")
@@ -202,14 +204,14 @@ def _push_connects(bench: Bench) -> None:
 def _latched(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic, latched=True)
-    expect("publisher.latched", bench.record("publisher", topic).get("latched"), True)
+    expect("publisher.latched", bench.latest_record("publisher", topic).get("latched"), True)
     bench.call("publish", pub=pub, value={"n": 1})
     bench.call("publish", pub=pub, value={"n": 2})
-    subscriber = connected_subscriber(bench, topic, 3)
+    subscriber = connect_subscriber(bench, topic, 3)
     before = [each for each in subscriber.notices if each.at <= subscriber.echoes[0].at]
     latched = before[0]
     if latched.payload is None:
-        raise broken_rule(_("the publisher sent no message before the echo"))
+        raise broken_rule_error(_("the publisher sent no message before the echo"))
     expect("latched.seq", latched.header.seq, 2)
     expect("latched.flags", latched.header.flags, LATCHED)
 
@@ -223,9 +225,9 @@ def _latched(bench: Bench) -> None:
 def _history(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic, history=3, latched=True)
-    expect("publisher.history", bench.record("publisher", topic).get("history"), 3)
+    expect("publisher.history", bench.latest_record("publisher", topic).get("history"), 3)
     bench.call("publish", pub=pub, value={"a": 1}, count=5)
-    subscriber = connected_subscriber(bench, topic, 3)
+    subscriber = connect_subscriber(bench, topic, 3)
     count = next(place for place, each in enumerate(subscriber.notices) if each.payload is None)
     seqs = [each.header.seq for each in subscriber.notices[:count] if each.payload is not None]
     expect("history", seqs, [3, 4, 5])

@@ -9,9 +9,9 @@ import msgpack  # type: ignore[import-untyped]
 from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.rules.messages import connected_publisher, messages_of
+from nep.programs.conformance.rules.messages import connect_publisher, messages_of
 from nep.programs.conformance.scripted_master import RecordedRequest
-from nep.programs.conformance.verdict import broken_rule, expect
+from nep.programs.conformance.verdict import broken_rule_error, expect
 
 _SECTION = "leases-and-a-master-that-starts-again"
 
@@ -35,13 +35,13 @@ def _renew(bench: Bench) -> None:
     first = bench.wait_for_renewal(len(bench.master.received))
     second = bench.wait_for_renewal(bench.master.received.index(first) + 1)
     if second.at - first.at > 2.5 * max(bench.scale, 0.4):
-        raise broken_rule(
+        raise broken_rule_error(
             _("the interval between two renewals was {seconds:.1f} s").format(seconds=second.at - first.at)
         )
     expect("renew.epoch", second.fields.get("epoch"), bench.master.graph.epoch)
     expect("renew.node_id", second.fields.get("node_id"), bench.node_id)
     for kind in ("publisher", "subscriber"):
-        expect(f"renew.{kind}s", bench.record(kind, topic)["id"] in _ids(second, f"{kind}s"), True)
+        expect(f"renew.{kind}s", bench.latest_record(kind, topic)["id"] in _ids(second, f"{kind}s"), True)
     member = bench.master.graph.members[bench.node_id]
     expect("renew.publishers", _ids(second, "publishers"), set(member.publishers))
     expect("renew.subscribers", _ids(second, "subscribers"), set(member.subscribers))
@@ -57,17 +57,17 @@ def _renew(bench: Bench) -> None:
     "statistics",
 )
 def _statistics(bench: Bench) -> None:
-    topic, pub, subscriber = connected_publisher(bench)
+    topic, pub, subscriber = connect_publisher(bench)
     bench.call("publish", pub=pub, value={"a": 1}, count=6)
     bench.require(lambda: len(messages_of(subscriber)) == 6, "message")
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
     bench.require(lambda: bool(bench.events(sub)), "message")
     bench.wait_for_renewal(len(bench.master.received))
     found = bench.wait_for_renewal(len(bench.master.received)).fields
     id, subscriber_id = (
-        bench.record("publisher", topic)["id"],
-        bench.record("subscriber", publisher.topic)["id"],
+        bench.latest_record("publisher", topic)["id"],
+        bench.latest_record("subscriber", publisher.topic)["id"],
     )
     (sent,) = (each for each in found["publishers"] if each.get("id") == id)
     expect("count", sent.get("count"), 6)
@@ -87,7 +87,7 @@ def _next_s(bench: Bench) -> None:
     first = bench.wait_for_renewal(len(bench.master.received))
     second = bench.wait_for_renewal(bench.master.received.index(first) + 1, 10.0)
     if second.at - first.at < 0.8 * wanted_s:
-        raise broken_rule(
+        raise broken_rule_error(
             _("the node renewed its lease after {seconds:.1f} s; 'next_s' was {wanted:g}").format(
                 wanted=wanted_s, seconds=second.at - first.at
             )
@@ -105,7 +105,7 @@ def _rejoin_on_request(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
     bench.new_sub(topic)
-    ids = bench.record("publisher", topic)["id"], bench.record("subscriber", topic)["id"]
+    ids = bench.latest_record("publisher", topic)["id"], bench.latest_record("subscriber", topic)["id"]
     count = len(bench.master.received)
     bench.master.drop(bench.node_id)
     bench.require(lambda: any(each.do == "join" for each in bench.master.received[count:]), "join")
@@ -122,8 +122,8 @@ def _rejoin_on_request(bench: Bench) -> None:
     _SECTION,
 )
 def _rejoin_restarted_master(bench: Bench) -> None:
-    _topic, pub, subscriber = connected_publisher(bench)
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    _topic, pub, subscriber = connect_publisher(bench)
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     bench.master.stop()
     bench.call("publish", pub=pub, value={"a": 1}, count=10)
     publisher.send(b'{"a":1}')
@@ -153,7 +153,7 @@ def _rejoin_restarted_master(bench: Bench) -> None:
 def _other_socket_at_master(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_sub(topic)
-    id = bench.record("subscriber", topic)["id"]
+    id = bench.latest_record("subscriber", topic)["id"]
     bench.master.stop()
     bench.fail_handshake("PUB", f"tcp://{bench.master.address}")
     count = len(bench.master.received)
@@ -171,7 +171,7 @@ def _other_socket_at_master(bench: Bench) -> None:
 def _renewed_topics(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
-    publisher = bench.publisher(topic, is_listed=False)
+    publisher = bench.create_publisher(topic, is_listed=False)
     entry = {
         "publisher": {
             "id": publisher.id,
@@ -213,7 +213,7 @@ def _unknown_replies(bench: Bench) -> None:
     ):
         bench.master.push(bench.node_id, body)
     bench.wait_for_renewal(len(bench.master.received))
-    publisher = bench.publisher(topic)
+    publisher = bench.create_publisher(topic)
     bench.require(lambda: bool(publisher.hellos), "hello")
     publisher.send(b'{"a":1}')
     bench.require(lambda: bool(bench.events(sub)), "message")

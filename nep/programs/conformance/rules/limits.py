@@ -11,20 +11,20 @@ from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.malformed import malformed_parts
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.rules.messages import connected_publisher, connected_subscriber, messages_of
-from nep.programs.conformance.verdict import broken_rule, expect, printable
+from nep.programs.conformance.rules.messages import connect_publisher, connect_subscriber, messages_of
+from nep.programs.conformance.verdict import broken_rule_error, expect, printable
 from nep.protocol.wire import Header, topic_part
 
 _NESTING_DEPTH = 100_000
 
 
-def _expect_working(bench: Bench, publisher: ScriptedPublisher, sub: int) -> None:
+def _expect_delivery(bench: Bench, publisher: ScriptedPublisher, sub: int) -> None:
     """Send a valid message and check that the adapter delivers it and no other."""
     publisher.send(b'{"good":1}', seq=1)
     bench.require(lambda: any(_seq(each) == 1 for each in bench.events(sub)), "message")
     others = [each for each in bench.events(sub) if each.get("publisher") != str(publisher.id)]
     if others:
-        raise broken_rule(_("the subscriber delivered {seen}").format(seen=printable(others[0])))
+        raise broken_rule_error(_("the subscriber delivered {seen}").format(seen=printable(others[0])))
 
 
 def _seq(event: object) -> int:
@@ -43,10 +43,10 @@ def _send_malformed(publisher: ScriptedPublisher) -> Iterator[str]:
     "order-of-checks",
 )
 def _malformed_messages(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     for _code in _send_malformed(publisher):
         bench.pump()
-    _expect_working(bench, publisher, sub)
+    _expect_delivery(bench, publisher, sub)
     lost = bench.counts(sub)[1] if "losses" in bench.features.get("features", ()) else 0
     expect("lost", lost, 0)
 
@@ -59,11 +59,11 @@ def _malformed_messages(bench: Bench) -> None:
 )
 def _malformed_messages_are_reported(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher, sub = bench.subscribed_publisher(topic)
+    publisher, sub = bench.create_subscribed_publisher(topic)
     head = Header(1, 0, 1, 1, 1).pack()
     publisher.socket.send_multipart([topic_part(topic), head[:31], b"{}"])
-    _expect_working(bench, publisher, sub)
-    id = bench.record("subscriber", topic)["id"]
+    _expect_delivery(bench, publisher, sub)
+    id = bench.latest_record("subscriber", topic)["id"]
     bench.wait_for_renewal(len(bench.master.received))
     found = bench.wait_for_renewal(len(bench.master.received)).fields
     (entry,) = (each for each in found.get("subscribers", ()) if each.get("id") == id)
@@ -78,7 +78,7 @@ def _deep_nesting(bench: Bench) -> None:
         ("json", b"[" * _NESTING_DEPTH + b"]" * _NESTING_DEPTH, b"[1]"),
         ("msgpack", b"\x91" * _NESTING_DEPTH + b"\xc0", msgpack.packb([1])),
     ):
-        publisher, sub = bench.subscribed_publisher(bench.new_topic(), msg_type)
+        publisher, sub = bench.create_subscribed_publisher(bench.new_topic(), msg_type)
         publisher.send(payload)
         publisher.send(payload[:1000])
         publisher.send(good)
@@ -88,7 +88,7 @@ def _deep_nesting(bench: Bench) -> None:
 @rule("undecodable", lazy("Payloads that can't be decoded don't stop a subscriber."), "messages")
 def _undecodable_payloads(bench: Bench) -> None:
     for msg_type, payload in (("json", b'{"a":'), ("string", b"\xff\xfe"), ("msgpack", b"\xc1")):
-        publisher, sub = bench.subscribed_publisher(bench.new_topic(), msg_type)
+        publisher, sub = bench.create_subscribed_publisher(bench.new_topic(), msg_type)
         publisher.send(payload)
         publisher.send(b"1" if msg_type != "msgpack" else b"\x01")
         bench.require(lambda: any(_seq(each) == 2 for each in bench.events(sub)), "message")  # noqa: B023
@@ -97,7 +97,7 @@ def _undecodable_payloads(bench: Bench) -> None:
 @rule("large", lazy("Messages of 8 MB are received intact."), "bounds")
 def _large_messages(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher, sub = bench.subscribed_publisher(topic, "bytes")
+    publisher, sub = bench.create_subscribed_publisher(topic, "bytes")
     publisher.send(bytes(8 * 2**20))
     bench.require(lambda: bool(bench.events(sub)), "message", 10.0)
     expect("payload", len(str(bench.events(sub)[0].get("payload"))), 4 * ((8 * 2**20 + 2) // 3))
@@ -109,8 +109,8 @@ def _large_messages(bench: Bench) -> None:
     "bounds",
 )
 def _unknown_filters(bench: Bench) -> None:
-    topic, pub, good = connected_publisher(bench)
-    bad = connected_subscriber(bench, topic, None)
+    topic, pub, good = connect_publisher(bench)
+    bad = connect_subscriber(bench, topic, None)
     for what in (
         b"\xff",
         b"\xffhello/",
@@ -124,6 +124,6 @@ def _unknown_filters(bench: Bench) -> None:
     bench.wait(0.2)
     bench.call("publish", pub=pub, value={"a": 1}, count=3)
     bench.require(lambda: len(messages_of(good)) == 3, "message")
-    other = connected_subscriber(bench, topic, 3)
+    other = connect_subscriber(bench, topic, 3)
     bench.call("publish", pub=pub, value={"a": 1})
     bench.require(lambda: len(messages_of(other)) == 1, "message")

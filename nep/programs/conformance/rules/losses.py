@@ -45,7 +45,7 @@ def _report_last_seq(bench: Bench, publisher: int, seq: int) -> None:
 )
 def _lost_gap(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher = bench.publisher(topic, echoes=False)
+    publisher = bench.create_publisher(topic, echoes=False)
     publisher.seq = 100
     sub = bench.new_sub(topic)
     publisher.send(b"1")
@@ -61,7 +61,7 @@ def _lost_gap(bench: Bench) -> None:
     "losses",
 )
 def _lost_echo(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     publisher.seq = 5
     publisher.send_echo(next(iter(publisher.hellos)))
@@ -76,7 +76,7 @@ def _lost_echo(bench: Bench) -> None:
     "losses",
 )
 def _lost_bye(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     publisher.seq = 4
     publisher.send_byes()
@@ -90,7 +90,7 @@ def _lost_bye(bench: Bench) -> None:
     "losses",
 )
 def _lost_last_seq(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     bench.require(lambda: bool(bench.events(sub)), "message")
     _report_last_seq(bench, publisher.id, 3)
@@ -119,7 +119,7 @@ def _lost_late(bench: Bench) -> None:
     "losses",
 )
 def _lost_seq_jump(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     publisher.send(b"1", seq=2**40)
     publisher.send(b"1", seq=2)
@@ -135,7 +135,10 @@ def _lost_seq_jump(bench: Bench) -> None:
 def _lost_from_new_publisher(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
-    new, rejoined = bench.publisher(topic, echoes=False), bench.publisher(topic, is_listed=False)
+    new, rejoined = (
+        bench.create_publisher(topic, echoes=False),
+        bench.create_publisher(topic, is_listed=False),
+    )
     bench.require(lambda: bool(new.hellos), "hello")
     new.send(b"1", seq=5)
     _expect_counts(bench, sub, 1, 4)
@@ -155,7 +158,7 @@ def _lost_from_new_publisher(bench: Bench) -> None:
 def _lost_unreachable(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
-    publisher = bench.publisher(topic, is_listed=False)
+    publisher = bench.create_publisher(topic, is_listed=False)
     with closed_port() as endpoint:
         publisher.record = replace(publisher.record, endpoints=(endpoint,))
         bench.register_publisher(publisher)

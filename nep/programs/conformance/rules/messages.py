@@ -15,7 +15,7 @@ from nep.messages.codecs import codec_for
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedSubscriber
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken_rule, expect, printable
+from nep.programs.conformance.verdict import broken_rule_error, expect, printable
 from nep.protocol.batch import read_parts
 from nep.protocol.wire import BATCH, Parts, topic_part, unpack_header_at
 
@@ -29,7 +29,7 @@ _SAMPLES: Mapping[str, tuple[dict[str, object], bytes]] = {
 }
 
 
-def connected_subscriber(
+def connect_subscriber(
     bench: Bench, topic: str, level: int | None, msg_type: str = "json"
 ) -> ScriptedSubscriber:
     """Create a subscriber of the tester that is connected to the adapter's publisher of a topic.
@@ -40,14 +40,14 @@ def connected_subscriber(
         level: Hello level; None to send no hello. Otherwise the function waits for the echo.
         msg_type: Message type.
     """
-    endpoint = bench.record("publisher", topic)["endpoints"][0]
-    subscriber = bench.subscriber(topic, msg_type, level=level, endpoint=endpoint)
+    endpoint = bench.latest_record("publisher", topic)["endpoints"][0]
+    subscriber = bench.create_subscriber(topic, msg_type, level=level, endpoint=endpoint)
     if level is not None:
         bench.require(lambda: bool(subscriber.echoes), "echo")
     return subscriber
 
 
-def connected_publisher(
+def connect_publisher(
     bench: Bench, level: int | None = 3, msg_type: str = "json"
 ) -> tuple[str, int, ScriptedSubscriber]:
     """Create a publisher of the adapter, and a subscriber of the tester that is connected to it.
@@ -57,7 +57,7 @@ def connected_publisher(
     """
     topic = bench.new_topic()
     pub = bench.new_pub(topic, msg_type)
-    return topic, pub, connected_subscriber(bench, topic, level, msg_type)
+    return topic, pub, connect_subscriber(bench, topic, level, msg_type)
 
 
 def messages_of(subscriber: ScriptedSubscriber) -> list[Parts]:
@@ -65,19 +65,19 @@ def messages_of(subscriber: ScriptedSubscriber) -> list[Parts]:
     try:
         return subscriber.messages
     except WireError as error:
-        raise broken_rule(
+        raise broken_rule_error(
             _("a message can't be parsed ({code}): {reason}").format(code=error.code, reason=error.reason)
         ) from error
 
 
-def _plain_subscriber(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
+def _connect_plain_subscriber(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
     """Return a subscriber that sends no hello, after it has received a message of the adapter's publisher."""
-    subscriber = connected_subscriber(bench, topic, None)
+    subscriber = connect_subscriber(bench, topic, None)
     for _turn in range(200):
         bench.call("publish", pub=pub, value={"warm": True})
         if bench.wait_until(lambda: bool(subscriber.received), 0.05):
             return subscriber
-    raise broken_rule(_("no '{what}' within {seconds:g} s").format(what="message", seconds=10.0))
+    raise broken_rule_error(_("no '{what}' within {seconds:g} s").format(what="message", seconds=10.0))
 
 
 @rule(
@@ -86,12 +86,12 @@ def _plain_subscriber(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
     "messages",
 )
 def _three_parts(bench: Bench) -> None:
-    topic, pub, other = connected_publisher(bench)
-    subscriber = _plain_subscriber(bench, topic, pub)
+    topic, pub, other = connect_publisher(bench)
+    subscriber = _connect_plain_subscriber(bench, topic, pub)
     count = len(subscriber.received)
     bench.call("publish", pub=pub, value={"a": 1}, count=_BURST)
     bench.require(lambda: len(subscriber.received) >= count + _BURST, "message")
-    for parts in subscriber.raw:
+    for parts in subscriber.raw_messages:
         expect("parts", len(parts), 3)
         expect("topic", parts[0], topic_part(topic))
     messages_of(subscriber)
@@ -104,13 +104,13 @@ def _three_parts(bench: Bench) -> None:
     "batches",
 )
 def _batches_to_readers(bench: Bench) -> None:
-    topic, pub, subscriber = connected_publisher(bench, 1)
-    connected_subscriber(bench, topic, 3)
+    topic, pub, subscriber = connect_publisher(bench, 1)
+    connect_subscriber(bench, topic, 3)
     bench.call("publish", pub=pub, value={"a": 1}, count=_BURST)
-    bench.require(lambda: bool(subscriber.raw) and _last_seq(subscriber) >= _BURST, "message")
-    for parts in subscriber.raw:
+    bench.require(lambda: bool(subscriber.raw_messages) and _last_seq(subscriber) >= _BURST, "message")
+    for parts in subscriber.raw_messages:
         if len(parts) == 1 and unpack_header_at(parts[0], len(topic_part(topic)))[0] >> 16 & BATCH:
-            raise broken_rule(_("the publisher sent a batch to a subscriber whose hello has level 1"))
+            raise broken_rule_error(_("the publisher sent a batch to a subscriber whose hello has level 1"))
 
 
 def _last_seq(subscriber: ScriptedSubscriber) -> int:
@@ -124,15 +124,15 @@ def _last_seq(subscriber: ScriptedSubscriber) -> int:
 )
 def _message_forms(bench: Bench) -> None:
     for level in (0, 1, 2, 3):
-        _topic, pub, subscriber = connected_publisher(bench, level)
+        _topic, pub, subscriber = connect_publisher(bench, level)
         bench.call("publish", pub=pub, value={"a": 1}, count=_BURST)
         bench.require(lambda: len(messages_of(subscriber)) >= _BURST, "message")  # noqa: B023 - called immediately
         seqs = [each.header.seq for each in messages_of(subscriber)]
         if seqs != list(range(1, _BURST + 1)):
-            raise broken_rule(_("the seqs are {seen}").format(seen=printable(seqs)))
+            raise broken_rule_error(_("the seqs are {seen}").format(seen=printable(seqs)))
         numbers = [json.loads(bytes(each.payload)).get("n") for each in messages_of(subscriber)]
         if numbers != list(range(1, _BURST + 1)):
-            raise broken_rule(_("the messages aren't in order: {seen}").format(seen=printable(numbers)))
+            raise broken_rule_error(_("the messages aren't in order: {seen}").format(seen=printable(numbers)))
 
 
 @rule(
@@ -142,14 +142,14 @@ def _message_forms(bench: Bench) -> None:
 )
 def _header(bench: Bench) -> None:
     for msg_type, (members, _payload) in _SAMPLES.items():
-        topic, pub, subscriber = connected_publisher(bench, 0, msg_type)
+        topic, pub, subscriber = connect_publisher(bench, 0, msg_type)
         bench.call("publish", pub=pub, **members)
-        bench.require(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called immediately
+        bench.require(lambda: bool(subscriber.raw_messages), "message")  # noqa: B023 - called immediately
         found = messages_of(subscriber)[0].header
         expect("header.codec", found.codec, codec_for(msg_type).number)
         expect("header.flags", found.flags, 0)
         expect("header.seq", found.seq, 1)
-        expect("header.publisher", found.publisher, bench.record("publisher", topic)["id"])
+        expect("header.publisher", found.publisher, bench.latest_record("publisher", topic)["id"])
 
 
 @rule(
@@ -159,10 +159,10 @@ def _header(bench: Bench) -> None:
 )
 def _payload(bench: Bench) -> None:
     for msg_type, (members, wanted) in _SAMPLES.items():
-        _topic, pub, subscriber = connected_publisher(bench, 0, msg_type)
+        _topic, pub, subscriber = connect_publisher(bench, 0, msg_type)
         bench.call("publish", pub=pub, **members)
-        bench.require(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called immediately
-        data = bytes(read_parts(subscriber.raw[0])[0].payload)
+        bench.require(lambda: bool(subscriber.raw_messages), "message")  # noqa: B023 - called immediately
+        data = bytes(read_parts(subscriber.raw_messages[0])[0].payload)
         try:
             if msg_type == "json":
                 expect("payload", json.loads(data.decode()), members["value"])
@@ -171,7 +171,7 @@ def _payload(bench: Bench) -> None:
             else:
                 expect("payload", data, wanted)
         except ValueError as error:
-            raise broken_rule(
+            raise broken_rule_error(
                 _("the payload {seen} isn't valid {msg_type}").format(seen=printable(data), msg_type=msg_type)
             ) from error
 
@@ -185,9 +185,9 @@ def _seq_without_subscribers(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
     bench.call("publish", pub=pub, value={"a": 1}, count=7)
-    subscriber = connected_subscriber(bench, topic, 0)
+    subscriber = connect_subscriber(bench, topic, 0)
     bench.call("publish", pub=pub, value={"a": 1})
-    bench.require(lambda: bool(subscriber.raw), "message")
+    bench.require(lambda: bool(subscriber.raw_messages), "message")
     expect("header.seq", messages_of(subscriber)[0].header.seq, 8)
 
 
@@ -197,12 +197,12 @@ def _seq_without_subscribers(bench: Bench) -> None:
     "messages",
 )
 def _stamp(bench: Bench) -> None:
-    _topic, pub, subscriber = connected_publisher(bench)
+    _topic, pub, subscriber = connect_publisher(bench)
     bench.call("publish", pub=pub, value={"a": 1}, count=20)
     bench.require(lambda: len(messages_of(subscriber)) >= 20, "message")
     stamps = [each.header.stamp_ns for each in messages_of(subscriber)]
     now = time.time_ns()
     if any(abs(now - each) > _STAMP_NS for each in stamps):
-        raise broken_rule(_("the stamp is {seen}; the time is {now}").format(seen=stamps[0], now=now))
+        raise broken_rule_error(_("the stamp is {seen}; the time is {now}").format(seen=stamps[0], now=now))
     if stamps != sorted(stamps):
-        raise broken_rule(_("the stamps are {seen}").format(seen=printable(stamps)))
+        raise broken_rule_error(_("the stamps are {seen}").format(seen=printable(stamps)))

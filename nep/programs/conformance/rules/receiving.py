@@ -10,7 +10,7 @@ import msgpack  # type: ignore[import-untyped]
 from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken_rule, expect, printable
+from nep.programs.conformance.verdict import broken_rule_error, expect, printable
 from nep.protocol.wire import LATCHED, parse_acknowledgement
 
 _SAMPLES: Mapping[str, tuple[bytes, object]] = {
@@ -32,7 +32,7 @@ def _expect_seqs(bench: Bench, sub: int, count: int, first: int = 1) -> None:
 @rule("reads-parts", lazy("A subscriber accepts three-part messages of every codec."), "messages")
 def _reads_parts(bench: Bench) -> None:
     for msg_type, (payload, value) in _SAMPLES.items():
-        publisher, sub = bench.subscribed_publisher(bench.new_topic(), msg_type)
+        publisher, sub = bench.create_subscribed_publisher(bench.new_topic(), msg_type)
         publisher.send(payload)
         _expect_seqs(bench, sub, 1)
         event = bench.events(sub)[0]
@@ -45,7 +45,7 @@ def _reads_parts(bench: Bench) -> None:
 
 @rule("reads-one-part", lazy("A subscriber accepts single-part messages."), "one-part", "hello1")
 def _reads_one_part(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     for form in ("one", "parts", "one", "one"):
         publisher.send(b'{"a":1}', form)
     _expect_seqs(bench, sub, 4)
@@ -53,7 +53,7 @@ def _reads_one_part(bench: Bench) -> None:
 
 @rule("reads-batches", lazy("A subscriber accepts batches of 1 to 256 messages."), "batches", "hello3")
 def _reads_batches(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     publisher.send_batch([b'{"a":1}', b'{"b":22}', b"[]"])
     publisher.send(b'{"a":1}', "one")
     publisher.send_batch([b"1"])
@@ -66,7 +66,7 @@ def _reads_batches(bench: Bench) -> None:
 
 @rule("reads-alone", lazy("A subscriber accepts messages whose first part is its hello."), "notices")
 def _reads_messages_under_hello(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     for form in ("alone", "parts", "alone"):
         publisher.send(b'{"a":1}', form)
     _expect_seqs(bench, sub, 3)
@@ -79,7 +79,7 @@ def _reads_messages_under_hello(bench: Bench) -> None:
     "latched",
 )
 def _latched_once(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}', "alone", flags=LATCHED)
     publisher.send(b'{"a":1}', "alone", seq=1, flags=LATCHED)
     publisher.send(b'{"a":2}', flags=LATCHED)
@@ -93,7 +93,7 @@ def _latched_once(bench: Bench) -> None:
     "messages",
 )
 def _other_topics(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     name = publisher.topic
     publisher.topic = f"{name}2"
     publisher.send(b'{"a":1}', seq=1)
@@ -110,10 +110,10 @@ def _other_topics(bench: Bench) -> None:
 )
 def _read_acknowledgement(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher, sub = bench.subscribed_publisher(topic)
+    publisher, sub = bench.create_subscribed_publisher(topic)
     before = [parse_acknowledgement(each.prefix) for each in publisher.filters]
     if any(each is not None for each in before):
-        raise broken_rule(_("the subscriber answered the first echo"))
+        raise broken_rule_error(_("the subscriber answered the first echo"))
     publisher.send(b'{"a":1}')
     publisher.send(b'{"a":1}')
     publisher.send_echo(next(iter(publisher.hellos)))
@@ -121,7 +121,7 @@ def _read_acknowledgement(bench: Bench) -> None:
     _expect_seqs(bench, sub, 2)
     answers = [each for each in publisher.filters if parse_acknowledgement(each.prefix) is not None]
     found = parse_acknowledgement(answers[0].prefix)
-    expect("read.subscriber", found and found.subscriber, bench.record("subscriber", topic)["id"])
+    expect("read.subscriber", found and found.subscriber, bench.latest_record("subscriber", topic)["id"])
     expect("read.publisher", found and found.publisher, publisher.id)
     expect("read.seq", found and found.seq, 2)
     bench.require(
@@ -136,10 +136,10 @@ def _read_acknowledgement(bench: Bench) -> None:
     "messages",
 )
 def _receives_in_order(bench: Bench) -> None:
-    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     for number in range(500):
         publisher.send(b'{"n":%d}' % number)
     bench.require(lambda: len(bench.events(sub)) >= 500, "message")
     seqs = [each.get("seq") for each in bench.events(sub)]
     if seqs != [str(number) for number in range(1, 501)]:
-        raise broken_rule(_("the seqs are {seen}").format(seen=printable(seqs)))
+        raise broken_rule_error(_("the seqs are {seen}").format(seen=printable(seqs)))

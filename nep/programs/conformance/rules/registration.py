@@ -10,8 +10,8 @@ from nep.i18n import _, lazy
 from nep.messages.codecs import codec_for
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken_rule, expect, printable
-from nep.protocol.requests import COUNT_MAX, id_from, node_id_from
+from nep.programs.conformance.verdict import broken_rule_error, expect, printable
+from nep.protocol.requests import MAX_COUNT, derive_id, derive_node_id
 
 _NODE_ID = re.compile(r"[0-9a-f]{16}")
 _ENDPOINT = re.compile(r"tcp://(.+):(\d+)")
@@ -21,7 +21,7 @@ _ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)
 def _text(what: str, record: Mapping[str, Any], name: str) -> str:
     value = record.get(name)
     if not isinstance(value, str):
-        raise broken_rule(
+        raise broken_rule_error(
             _("{what} is {seen}, expected {wanted}").format(
                 what=f"{what}.{name}", seen=printable(value), wanted="text"
             )
@@ -31,7 +31,7 @@ def _text(what: str, record: Mapping[str, Any], name: str) -> str:
 
 def _integer(what: str, value: object, least: int, most: int) -> int:
     if type(value) is not int or not least <= value <= most:
-        raise broken_rule(
+        raise broken_rule_error(
             _("{what} is {seen}, expected an integer from {least} to {most}").format(
                 what=what, seen=printable(value), least=least, most=most
             )
@@ -47,13 +47,13 @@ def _integer(what: str, value: object, least: int, most: int) -> int:
 def _node_record(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_sub(topic)
-    bench.record("subscriber", topic)
+    bench.latest_record("subscriber", topic)
     node = bench.requests("subscriber+")[-1].fields.get("node")
     if not isinstance(node, dict):
         expect("node", node, {})
         return
     if not _NODE_ID.fullmatch(_text("node", node, "id")):
-        raise broken_rule(
+        raise broken_rule_error(
             _("node.id is {seen}, expected 16 lowercase hexadecimal digits").format(
                 seen=printable(node["id"])
             )
@@ -75,18 +75,20 @@ def _node_record(bench: Bench) -> None:
 def _node_key(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
-    record = bench.record("publisher", topic)
+    record = bench.latest_record("publisher", topic)
     node = bench.requests("publisher+")[-1].fields["node"]
     key = _text("node", node, "key")
-    expect("node.id", node.get("id"), node_id_from(key))
-    number = _integer("publisher.number", record.get("number"), 1, COUNT_MAX)
-    expect("publisher.id", record.get("id"), id_from(key, number))
+    expect("node.id", node.get("id"), derive_node_id(key))
+    number = _integer("publisher.number", record.get("number"), 1, MAX_COUNT)
+    expect("publisher.id", record.get("id"), derive_id(key, number))
     bench.new_sub(topic)
-    subscriber = bench.record("subscriber", topic)
-    other = _integer("subscriber.number", subscriber.get("number"), 1, COUNT_MAX)
-    expect("subscriber.id", subscriber.get("id"), id_from(key, other))
+    subscriber = bench.latest_record("subscriber", topic)
+    other = _integer("subscriber.number", subscriber.get("number"), 1, MAX_COUNT)
+    expect("subscriber.id", subscriber.get("id"), derive_id(key, other))
     if other == number:
-        raise broken_rule(_("publisher and subscriber have the same number {number}").format(number=number))
+        raise broken_rule_error(
+            _("publisher and subscriber have the same number {number}").format(number=number)
+        )
 
 
 @rule(
@@ -98,8 +100,8 @@ def _publisher_record(bench: Bench) -> None:
     for msg_type in ("json", "string", "bytes", "msgpack"):
         topic = bench.new_topic()
         bench.new_pub(topic, msg_type)
-        record = bench.record("publisher", topic)
-        _integer("publisher.id", record.get("id"), 1, COUNT_MAX)
+        record = bench.latest_record("publisher", topic)
+        _integer("publisher.id", record.get("id"), 1, MAX_COUNT)
         expect("publisher.msg_type", record.get("msg_type"), msg_type)
         expect("publisher.codec", record.get("codec"), codec_for(msg_type).name)
         endpoints = record.get("endpoints")
@@ -116,10 +118,10 @@ def _publisher_record(bench: Bench) -> None:
 def _publisher_port(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
-    for endpoint in bench.record("publisher", topic).get("endpoints", ()):
+    for endpoint in bench.latest_record("publisher", topic).get("endpoints", ()):
         found = _ENDPOINT.fullmatch(str(endpoint))
         if found is not None and int(found.group(2)) in _ORIGINAL_PORTS:
-            raise broken_rule(
+            raise broken_rule_error(
                 _("the publisher's endpoint is {endpoint}").format(endpoint=printable(endpoint))
             )
 
@@ -132,8 +134,8 @@ def _publisher_port(bench: Bench) -> None:
 def _subscriber_record(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_sub(topic, "string")
-    record = bench.record("subscriber", topic)
-    _integer("subscriber.id", record.get("id"), 1, COUNT_MAX)
+    record = bench.latest_record("subscriber", topic)
+    _integer("subscriber.id", record.get("id"), 1, MAX_COUNT)
     expect("subscriber.msg_type", record.get("msg_type"), "string")
     expect("subscriber.pattern", record.get("pattern", False), False)
 
@@ -150,6 +152,6 @@ def _request_form(bench: Bench) -> None:
     calls: dict[tuple[str, int], object] = {}
     for each in bench.master.received:
         if each.problem:
-            raise broken_rule(_("a request is malformed: {problem}").format(problem=each.problem))
+            raise broken_rule_error(_("a request is malformed: {problem}").format(problem=each.problem))
         if calls.setdefault((each.sender, each.call), (each.do, each.fields)) != (each.do, each.fields):
-            raise broken_rule(_("two requests have the call number {call}").format(call=each.call))
+            raise broken_rule_error(_("two requests have the call number {call}").format(call=each.call))

@@ -16,7 +16,7 @@ from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import new_node
 from nep.programs.conformance.ports import bind_again, closed_port
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken_rule, expect, printable
+from nep.programs.conformance.verdict import broken_rule_error, expect, printable
 from nep.protocol.requests import AddPublisher, Leave, PublisherRecord
 from nep.protocol.service_wire import NATIVE, SERVICE_TYPE, CallKind, Reply, error_reply, topic_of
 from nep.protocol.wire import topic_part
@@ -57,7 +57,7 @@ def _replies(bench: Bench, socket: zmq.Socket[bytes], wanted: set[int]) -> dict[
 def _service_record(bench: Bench) -> None:
     name = bench.new_topic()
     bench.call("serve", service=name)
-    record = bench.record("publisher", topic_of(name))
+    record = bench.latest_record("publisher", topic_of(name))
     expect("publisher.msg_type", record.get("msg_type"), SERVICE_TYPE)
     expect("publisher.codec", record.get("codec"), SERVICE_TYPE)
 
@@ -72,11 +72,11 @@ def _service_reply(bench: Bench) -> None:
     name = bench.new_topic()
     bench.call("serve", service=name)
     with _socket(bench, zmq.DEALER) as socket:
-        socket.connect(bench.record("publisher", topic_of(name))["endpoints"][0])
+        socket.connect(bench.latest_record("publisher", topic_of(name))["endpoints"][0])
         for number in (7, 2**64 - 1):
             socket.send_multipart(NATIVE.call(number, _JSON, _CALL_S, b'{"a":1}'))
         for reply in _replies(bench, socket, {7, 2**64 - 1}).values():
-            expect("kind", int(reply.kind), int(CallKind.ANSWER))
+            expect("kind", int(reply.kind), int(CallKind.REPLY))
             expect("codec", reply.codec, _JSON)
             expect("payload", json.loads(bytes(reply.data)), {"a": 1})
 
@@ -92,14 +92,14 @@ def _service_malformed(bench: Bench) -> None:
     bench.call("serve", service=name)
     (head, payload) = NATIVE.call(1, _JSON, _CALL_S, b"{}")
     with _socket(bench, zmq.DEALER) as socket:
-        socket.connect(bench.record("publisher", topic_of(name))["endpoints"][0])
+        socket.connect(bench.latest_record("publisher", topic_of(name))["endpoints"][0])
         for parts in ([head], [head[:15], payload], [b"\2" + head[1:], payload], [head, payload, b""]):
             socket.send_multipart(parts)
         socket.send_multipart(NATIVE.call(2, _JSON, _CALL_S, b'{"a":'))
         socket.send_multipart(NATIVE.call(3, _JSON, _CALL_S, b"[]"))
         found = _replies(bench, socket, {2, 3})
         expect("answers", sorted(each or 0 for each in found), [2, 3])
-        expect("kind", int(found[2].kind), int(CallKind.REFUSED))
+        expect("kind", int(found[2].kind), int(CallKind.REJECTED))
 
 
 @contextmanager
@@ -129,9 +129,9 @@ def _reply_to_call(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: 
     call = NATIVE.read_call(parts)
     expect("call.codec", call.codec in {1, 4}, True)
     if call.timeout_s is None or not 0 < call.timeout_s <= 2 * _CALL_S:
-        raise broken_rule(_("the call's timeout is {seen}").format(seen=printable(call.timeout_s)))
-    data = reply.data if reply.kind != CallKind.ANSWER else call.data
-    answer = Reply(reply.kind, data, call.codec if reply.kind == CallKind.ANSWER else _JSON)
+        raise broken_rule_error(_("the call's timeout is {seen}").format(seen=printable(call.timeout_s)))
+    data = reply.data if reply.kind != CallKind.REPLY else call.data
+    answer = Reply(reply.kind, data, call.codec if reply.kind == CallKind.REPLY else _JSON)
     socket.send_multipart([sender, *NATIVE.reply(call.number, answer)])
     return bench.finish(number, "call").get("value")
 
@@ -146,7 +146,7 @@ def _service_call(bench: Bench) -> None:
     name = bench.new_topic()
     with _server(bench, name) as socket:
         number = bench.adapter.send_request("call", service=name, value={"a": [1, None]}, timeout_s=_CALL_S)
-        value = _reply_to_call(bench, socket, number, Reply(CallKind.ANSWER, b""))
+        value = _reply_to_call(bench, socket, number, Reply(CallKind.REPLY, b""))
         expect("value", value, {"a": [1, None]})
 
 
@@ -168,7 +168,7 @@ def _other_socket_at_server(bench: Bench) -> None:
         bench.fail_handshake("PUB", endpoint)
         with _socket(bench, zmq.ROUTER) as socket:
             bind_again(socket, endpoint)
-            value = _reply_to_call(bench, socket, number, Reply(CallKind.ANSWER, b""))
+            value = _reply_to_call(bench, socket, number, Reply(CallKind.REPLY, b""))
     expect("value", value, 1)
 
 
@@ -181,7 +181,7 @@ def _other_socket_at_server(bench: Bench) -> None:
 def _service_error(bench: Bench) -> None:
     name = bench.new_topic()
     with _server(bench, name) as socket:
-        for kind, error in ((CallKind.ERROR, "ValueError"), (CallKind.REFUSED, "")):
+        for kind, error in ((CallKind.ERROR, "ValueError"), (CallKind.REJECTED, "")):
             number = bench.adapter.send_request("call", service=name, value={}, timeout_s=_CALL_S)
             try:
                 value = _reply_to_call(
@@ -189,7 +189,9 @@ def _service_error(bench: Bench) -> None:
                 )
             except AdapterError:
                 continue
-            raise broken_rule(_("the client returned {seen} as the reply").format(seen=printable(value)))
+            raise broken_rule_error(
+                _("the client returned {seen} as the reply").format(seen=printable(value))
+            )
 
 
 @rule(
@@ -201,12 +203,14 @@ def _service_error(bench: Bench) -> None:
 def _pattern(bench: Bench) -> None:
     place = bench.new_topic()
     sub = bench.new_sub(f"{place}/*", pattern=True)
-    expect("subscriber.pattern", bench.record("subscriber", f"{place}/*").get("pattern"), True)
-    publishers = [bench.publisher(f"{place}/{name}") for name in ("one", "two")]
+    expect("subscriber.pattern", bench.latest_record("subscriber", f"{place}/*").get("pattern"), True)
+    publishers = [bench.create_publisher(f"{place}/{name}") for name in ("one", "two")]
     for publisher in publishers:
         bench.require(lambda: bool(publisher.hellos), "hello")  # noqa: B023 - called immediately
         if topic_part(publisher.topic) not in [each.prefix for each in publisher.filters]:
-            raise broken_rule(_("the subscriber didn't subscribe to {topic}").format(topic=publisher.topic))
+            raise broken_rule_error(
+                _("the subscriber didn't subscribe to {topic}").format(topic=publisher.topic)
+            )
         publisher.send(b'{"a":1}')
     bench.require(lambda: len(bench.events(sub)) >= 2, "message")
     topics = {each.get("topic") for each in bench.events(sub)}

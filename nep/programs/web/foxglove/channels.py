@@ -20,7 +20,7 @@ from nep.programs.web.foxglove.protocol import MAX_ID, message_frame
 from nep.programs.web.limits import MAX_TOPICS
 from nep.programs.web.messages.operations import Subscribe
 from nep.programs.web.messages.payloads import ros_type_of
-from nep.programs.web.outgoing import Frame, json_bytes
+from nep.programs.web.outgoing import Frame, encode_json
 from nep.programs.web.rosbridge.page_topics import read_messages, subscribed_topic
 from nep.programs.web.send_queue import Feed, QueuedMessage
 
@@ -196,7 +196,7 @@ class Channels:
         self._context.queue.remove(known.feed)
         await self._context.run_in_thread(known.subscriber.close)
 
-    async def frames_of(self, queued: QueuedMessage) -> list[Frame]:
+    async def encode_frames(self, queued: QueuedMessage) -> list[Frame]:
         """Encode a message for the client. Raises `NepError` if the message can't be decoded.
 
         Returns no frames if the client must subscribe again because the channel has changed.
@@ -231,7 +231,7 @@ def _readable_type(msg_type: str) -> str:
 def _readable_message(message: Message) -> Message:
     if message.codec != "msgpack":
         return message
-    data = json_bytes(message.payload)
+    data = encode_json(message.payload)
     return Message(message.topic, data, "json", "json", seq=message.seq, stamp_ns=message.stamp_ns)
 
 

@@ -36,7 +36,7 @@ class GraphUpdates:
         self._are_connections_wanted = False
         self._connections = _NO_CONNECTIONS
 
-    def set_connections_wanted(self, *, is_wanted: bool) -> None:
+    def set_connections_enabled(self, *, is_wanted: bool) -> None:
         """Enable or disable updates about publishers, subscribers and servers.
 
         After being enabled, the first update contains all of them.

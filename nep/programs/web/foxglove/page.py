@@ -29,7 +29,7 @@ from nep.programs.web.foxglove.graph import GraphUpdates
 from nep.programs.web.limits import MAX_TOPICS
 from nep.programs.web.messages import operations as op
 from nep.programs.web.messages.ros_definitions import JSON_TYPE
-from nep.programs.web.outgoing import Frame, json_bytes
+from nep.programs.web.outgoing import Frame, encode_json
 from nep.programs.web.rosbridge.page_services import PageServices
 from nep.programs.web.rosbridge.page_topics import PageTopics
 from nep.programs.web.rosbridge.rosapi import is_visible
@@ -155,8 +155,8 @@ class FoxglovePage(PageConnection):
             _logger.warning("page '%s': %s (%d so far)", self.name, error, self._rejected)
         self._send_status(error.level if isinstance(error, op.OperationError) else "error", str(error))
 
-    async def _frames_of(self, queued: QueuedMessage) -> list[Frame]:
-        return await self._channels.frames_of(queued)
+    async def _encode_frames(self, queued: QueuedMessage) -> list[Frame]:
+        return await self._channels.encode_frames(queued)
 
     # ---- the graph
 
@@ -203,7 +203,7 @@ class FoxglovePage(PageConnection):
     async def _execute(self, fields: Mapping[str, object]) -> None:
         name = str(fields.get("op"))
         if name in {"subscribeConnectionGraph", "unsubscribeConnectionGraph"}:
-            self._updates.set_connections_wanted(is_wanted=name == "subscribeConnectionGraph")
+            self._updates.set_connections_enabled(is_wanted=name == "subscribeConnectionGraph")
             return
         for operation, member, carry_out in (
             ("subscribe", "subscriptions", self._subscribe),
@@ -246,7 +246,7 @@ class FoxglovePage(PageConnection):
         topic, schema = fields.get("topic"), schema_name if isinstance(schema_name, str) else ""
         known = self._channels.ros_type(topic, schema) if isinstance(topic, str) else ""
         ros_type = known or _ROS_TYPES.get(schema, schema)
-        operation = op.operation_of({"op": "advertise", "topic": topic, "type": ros_type, "id": id_})
+        operation = op.parse_operation({"op": "advertise", "topic": topic, "type": ros_type, "id": id_})
         if isinstance(operation, op.Advertise):
             self._advertised[id_] = operation  # even if it is rejected: the robot may be allowed later
             await self._topics.advertise(operation)
@@ -289,7 +289,7 @@ class FoxglovePage(PageConnection):
     def _respond(self, operation: op.CallService, values: object, is_success: bool) -> None:
         service_id, call_id = map(int, str(operation.id).split(":"))
         if is_success:
-            self._queue.put([wire.response_frame(service_id, call_id, json_bytes(values))])
+            self._queue.put([wire.response_frame(service_id, call_id, encode_json(values))])
             return
         self._send_fields(
             {

@@ -15,7 +15,7 @@ import orjson
 
 from nep.errors import NepError
 from nep.i18n import _
-from nep.messages.nesting import json_is_too_deep
+from nep.messages.nesting import is_json_too_deep
 from nep.programs.web.outgoing import Frame
 
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
@@ -78,7 +78,7 @@ def parse(data: bytes) -> ClientMessage | ServiceRequest | Mapping[str, object]:
         begin = _SERVICE_REQUEST.size
         encoding = data[begin : begin + length].decode("utf-8", "replace")
         return ServiceRequest(service_id, call_id, encoding, data[begin + length :])
-    if not json_is_too_deep(data):
+    if not is_json_too_deep(data):
         with suppress(json.JSONDecodeError):  # the base class of orjson's error
             fields = orjson.loads(data)
             if isinstance(fields, dict):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from nep.i18n import _
-from nep.programs.web.limits import MAX_FRAGMENTED, MAX_MESSAGE_BYTES
+from nep.programs.web.limits import MAX_FRAGMENTED_OPERATIONS, MAX_MESSAGE_BYTES
 from nep.programs.web.messages.operations import Fragment, OperationError, OperationId, Png
 
 
@@ -37,7 +37,9 @@ class FragmentBuffer:
         parts = self._parts.setdefault(part.id, {})
         self._size += len(part.data) - len(parts.get(part.number, ""))
         parts[part.number] = part.data
-        while len(self._parts) > MAX_FRAGMENTED or (self._size > MAX_MESSAGE_BYTES and len(self._parts) > 1):
+        while len(self._parts) > MAX_FRAGMENTED_OPERATIONS or (
+            self._size > MAX_MESSAGE_BYTES and len(self._parts) > 1
+        ):
             self._discard(next(each for each in self._parts if each != part.id))
         if self._size > MAX_MESSAGE_BYTES:
             self._discard(part.id)

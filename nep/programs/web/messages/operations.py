@@ -14,7 +14,7 @@ import orjson
 
 from nep.errors import BadTopicError, NepError, did_you_mean
 from nep.i18n import _, format_list
-from nep.messages.nesting import json_is_too_deep, too_deep_reason
+from nep.messages.nesting import is_json_too_deep, too_deep_reason
 from nep.programs.web.limits import (
     CALL_TIMEOUT_S,
     MAX_CALL_TIMEOUT_S,
@@ -252,17 +252,17 @@ def parse(data: bytes) -> Operation:
     fields = parse_json(data)
     if not isinstance(fields, dict):
         raise OperationError(_("an operation must be a JSON object with an 'op'"))
-    return operation_of(fields, len(data))
+    return parse_operation(fields, len(data))
 
 
-def operation_of(fields: Mapping[str, object], size_bytes: int = 0) -> Operation:
+def parse_operation(fields: Mapping[str, object], size_bytes: int = 0) -> Operation:
     """Convert the fields of a message to an operation. Raises `OperationError`.
 
     Args:
         fields: Fields of the message.
         size_bytes: Size of the message in bytes.
     """
-    return _operation(_Fields(fields, size_bytes))
+    return _parse_fields(_Fields(fields, size_bytes))
 
 
 def parse_json(data: bytes) -> object:
@@ -273,7 +273,7 @@ def parse_json(data: bytes) -> object:
                 count=len(data), most=MAX_MESSAGE_BYTES
             )
         )
-    if json_is_too_deep(data):
+    if is_json_too_deep(data):
         raise OperationError(_("an operation was rejected: {reason}").format(reason=too_deep_reason()))
     if len(data) > MAX_VALUES and sum(map(data.count, (b",", b"[", b"{"))) > MAX_VALUES:
         raise OperationError(
@@ -337,7 +337,7 @@ class _Fields:
         except BadTopicError as error:
             raise self.error(_("'type' is invalid: {reason}").format(reason=error.reason)) from None
 
-    def own_name(self, name: str) -> str:
+    def unreserved_name(self, name: str) -> str:
         """Return the name of a topic or service that the page creates, which must not be reserved."""
         given = self.topic(name)
         if given.startswith(_RESERVED_PREFIX):
@@ -388,7 +388,7 @@ class _Fields:
             return None
         return max(MIN_FRAGMENT_SIZE, self.number("fragment_size", None, 1, _MAX_NUMBER))
 
-    def parts(self) -> tuple[int, int]:
+    def fragment_position(self) -> tuple[int, int]:
         """Return the index of a fragment, and the number of fragments."""
         total = self.number("total", 1, 1, MAX_FRAGMENTS)
         return self.number("num", 0, 0, total - 1), total
@@ -416,7 +416,7 @@ class _Fields:
         )
 
 
-def _operation(fields: _Fields) -> Operation:
+def _parse_fields(fields: _Fields) -> Operation:
     known = _PARSERS.get(fields.op)
     if known is None:
         said = did_you_mean(fields.op, tuple(_PARSERS))
@@ -426,16 +426,16 @@ def _operation(fields: _Fields) -> Operation:
     return known(fields)
 
 
-def _advertise(fields: _Fields) -> Operation:
+def _parse_advertise(fields: _Fields) -> Operation:
     is_latched = fields.get("latch") is True
-    return Advertise(fields.id, fields.own_name("topic"), fields.type_name(), is_latched)
+    return Advertise(fields.id, fields.unreserved_name("topic"), fields.type_name(), is_latched)
 
 
-def _publish(fields: _Fields) -> Operation:
-    return Publish(fields.id, fields.own_name("topic"), fields.get("msg", {}), fields.size_bytes)
+def _parse_publish(fields: _Fields) -> Operation:
+    return Publish(fields.id, fields.unreserved_name("topic"), fields.get("msg", {}), fields.size_bytes)
 
 
-def _subscribe(fields: _Fields) -> Operation:
+def _parse_subscribe(fields: _Fields) -> Operation:
     return Subscribe(
         fields.id,
         fields.topic("topic"),
@@ -447,7 +447,7 @@ def _subscribe(fields: _Fields) -> Operation:
     )
 
 
-def _call_service(fields: _Fields) -> Operation:
+def _parse_call_service(fields: _Fields) -> Operation:
     service, mark, id_in_name = fields.topic("service").partition("#")
     args = fields.get("args")
     timeout = fields.get("timeout")
@@ -462,7 +462,7 @@ def _call_service(fields: _Fields) -> Operation:
     )
 
 
-def _service_response(fields: _Fields) -> Operation:
+def _parse_service_response(fields: _Fields) -> Operation:
     is_success = fields.get("result", True)
     if not isinstance(is_success, bool):
         raise fields.invalid_field("result", _("true or false"))
@@ -470,22 +470,22 @@ def _service_response(fields: _Fields) -> Operation:
     return ServiceResponse(fields.id, fields.topic("service"), {} if values is None else values, is_success)
 
 
-def _fragment(fields: _Fields) -> Operation:
-    number, total = fields.parts()
+def _parse_fragment(fields: _Fields) -> Operation:
+    number, total = fields.fragment_position()
     return Fragment(fields.id, fields.text("data", most=MAX_MESSAGE_BYTES), number, total)
 
 
-def _png(fields: _Fields) -> Operation:
-    number, total = fields.parts()
+def _parse_png(fields: _Fields) -> Operation:
+    number, total = fields.fragment_position()
     return Png(fields.id, fields.text("data", most=MAX_MESSAGE_BYTES), number, total)
 
 
-def _status(fields: _Fields) -> Operation:
+def _parse_status(fields: _Fields) -> Operation:
     level = cast("Level", fields.choice("level", "info", LEVELS))
     return PageStatus(fields.id, level, fields.text("msg", "", most=MAX_MESSAGE_BYTES))
 
 
-def _auth(fields: _Fields) -> Operation:
+def _parse_auth(fields: _Fields) -> Operation:
     return Auth(
         fields.id,
         fields.text("mac"),
@@ -499,20 +499,20 @@ def _auth(fields: _Fields) -> Operation:
 
 
 _PARSERS = {
-    "advertise": _advertise,
+    "advertise": _parse_advertise,
     "unadvertise": lambda fields: Unadvertise(fields.id, fields.topic("topic")),
-    "publish": _publish,
-    "subscribe": _subscribe,
+    "publish": _parse_publish,
+    "subscribe": _parse_subscribe,
     "unsubscribe": lambda fields: Unsubscribe(fields.id, fields.topic("topic")),
-    "call_service": _call_service,
+    "call_service": _parse_call_service,
     "advertise_service": lambda fields: AdvertiseService(
-        fields.id, fields.own_name("service"), fields.type_name("")
+        fields.id, fields.unreserved_name("service"), fields.type_name("")
     ),
     "unadvertise_service": lambda fields: UnadvertiseService(fields.id, fields.topic("service")),
-    "service_response": _service_response,
-    "fragment": _fragment,
-    "png": _png,
+    "service_response": _parse_service_response,
+    "fragment": _parse_fragment,
+    "png": _parse_png,
     "set_level": lambda fields: SetLevel(fields.id, cast("Level", fields.choice("level", None, LEVELS))),
-    "status": _status,
-    "auth": _auth,
+    "status": _parse_status,
+    "auth": _parse_auth,
 }

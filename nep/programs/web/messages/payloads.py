@@ -34,22 +34,22 @@ from nep.programs.web.messages.ros_definitions import (
     MSGPACK_TYPE,
     bare_type,
     definition_of,
-    full_text,
+    full_definition_text,
 )
 from nep.text import bounded_str, escaped
 
-_STRING = "std_msgs/String"
-_BYTES = "std_msgs/UInt8MultiArray"
-_COMPRESSED_IMAGE = "sensor_msgs/CompressedImage"
-_RAW_IMAGE = "sensor_msgs/Image"
+_STRING_TYPE = "std_msgs/String"
+_BYTES_TYPE = "std_msgs/UInt8MultiArray"
+_COMPRESSED_IMAGE_TYPE = "sensor_msgs/CompressedImage"
+_RAW_IMAGE_TYPE = "sensor_msgs/Image"
 _ROS_TYPES = {
-    "string": _STRING,
-    "bytes": _BYTES,
-    "image": _COMPRESSED_IMAGE,
+    "string": _STRING_TYPE,
+    "bytes": _BYTES_TYPE,
+    "image": _COMPRESSED_IMAGE_TYPE,
     "json": JSON_TYPE,
     "msgpack": MSGPACK_TYPE,
 }
-_CODECS = {**{ros_type: codec for codec, ros_type in _ROS_TYPES.items()}, _RAW_IMAGE: "image"}
+_CODECS = {**{ros_type: codec for codec, ros_type in _ROS_TYPES.items()}, _RAW_IMAGE_TYPE: "image"}
 _UNKNOWN_TYPES = frozenset({"", "*"})
 _STAMP = struct.Struct("<II")
 _NS_PER_S = 1_000_000_000
@@ -116,7 +116,7 @@ def to_ros(message: Message, *, as_pixels: bool = False) -> object:
     if message.codec == "bytes":
         return {"layout": {"dim": [], "data_offset": 0}, "data": message.payload}
     if message.codec == "image":
-        ros_type = _RAW_IMAGE if as_pixels else _COMPRESSED_IMAGE
+        ros_type = _RAW_IMAGE_TYPE if as_pixels else _COMPRESSED_IMAGE_TYPE
         definition = definition_of(ros_type)
         shape = definition.decode(_image_bytes(message, ros_type)) if definition is not None else {}
         header = cast("dict[str, object]", shape["header"])
@@ -131,26 +131,26 @@ def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
     The arguments and exceptions are those of `to_ros`.
     """
     if message.codec == "image":
-        return _image_bytes(message, _RAW_IMAGE if as_pixels else _COMPRESSED_IMAGE)
+        return _image_bytes(message, _RAW_IMAGE_TYPE if as_pixels else _COMPRESSED_IMAGE_TYPE)
     if message.codec in {"string", "bytes"}:
         ros_type = _ROS_TYPES[message.codec]
-        return carried.to_ros(ros_type, message.codec, Encoded(bytes(message.data)))
+        return carried.to_ros_body(ros_type, message.codec, Encoded(bytes(message.data)))
     definition = definition_of(bare_type(ros_type_of(message.msg_type)))
     if definition is not None and definition.name not in {JSON_TYPE, MSGPACK_TYPE}:
         return definition.encode(_with_ros1_times(message.payload))
     text = bytes(message.data) if message.codec == "json" else codec_for("json").encode(message.payload).data
-    return carried.to_ros(_STRING, "json", Encoded(bytes(text)))
+    return carried.to_ros_body(_STRING_TYPE, "json", Encoded(bytes(text)))
 
 
 def _image_bytes(message: Message, ros_type: str) -> bytes:
     """Return an image in ROS serialization; the header has the time of publication."""
     encoded = Encoded(message.data, dict(message.extension) or parse_header(message.data).extension)
     layout = image_codec.raw_layout((encoded.extension or {}).get("encoding"))
-    if ros_type == _COMPRESSED_IMAGE and layout is not None:
+    if ros_type == _COMPRESSED_IMAGE_TYPE and layout is not None:
         encoded = image_codec.encode(message.payload)
-    elif ros_type == _RAW_IMAGE and layout is None:
+    elif ros_type == _RAW_IMAGE_TYPE and layout is None:
         encoded = image_codec.raw_image(message.payload)
-    body = carried.to_ros(ros_type, "image", encoded)
+    body = carried.to_ros_body(ros_type, "image", encoded)
     stamp_ns = message.stamp_ns
     if stamp_ns is None or not 0 <= stamp_ns < 2**32 * _NS_PER_S:
         return body
@@ -189,7 +189,7 @@ def from_ros(msg: object, ros_type: str, msg_type: str) -> object:
             raise _field_error("data", text, _("a text"))
         return text
     if codec == "bytes":
-        return _bytes(_as_map(msg, ros_type).get("data", ""), "data")
+        return _to_bytes(_as_map(msg, ros_type).get("data", ""), "data")
     if codec == "image":
         return _image(_as_map(msg, ros_type), bare_type(ros_type))
     return _as_map(msg, ros_type) if "/" in codec else msg
@@ -205,7 +205,7 @@ def _as_map(msg: object, ros_type: str) -> Mapping[str, object]:
     return msg
 
 
-def _bytes(value: object, field: str) -> bytes:
+def _to_bytes(value: object, field: str) -> bytes:
     """Convert base64 text, or a list of numbers from 0 to 255, to bytes."""
     if isinstance(value, str):
         try:
@@ -221,11 +221,13 @@ def _bytes(value: object, field: str) -> bytes:
 
 
 def _image(fields: Mapping[str, object], ros_type: str) -> object:
-    data = _bytes(fields.get("data", ""), "data")
-    if ros_type != _RAW_IMAGE:
+    data = _to_bytes(fields.get("data", ""), "data")
+    if ros_type != _RAW_IMAGE_TYPE:
         return data  # the codec reads whether it is a JPEG or a PNG
-    definition = definition_of(_RAW_IMAGE)
-    unpack = carried.unpacker_for("image", _RAW_IMAGE, full_text(_RAW_IMAGE) or "").unpack
+    definition = definition_of(_RAW_IMAGE_TYPE)
+    unpack = carried.unpacker_for(
+        "image", _RAW_IMAGE_TYPE, full_definition_text(_RAW_IMAGE_TYPE) or ""
+    ).unpack
     try:
         known = (
             {each.name: fields[each.name] for each in definition.fields if each.name in fields}

@@ -19,7 +19,7 @@ from nep.programs.web.messages.operations import OperationError
 _MAX_WIDTH = 4_096
 
 
-def text_as_png(text: bytes) -> str:
+def encode_png(text: bytes) -> str:
     """Encode text in the pixels of a PNG file and return the file in base64.
 
     The text is padded with newlines. Raises `NepError` if the image codec is not installed.
@@ -35,7 +35,7 @@ def text_as_png(text: bytes) -> str:
     return base64.b64encode(png.data).decode()
 
 
-def text_in_png(data: str) -> bytes:
+def decode_png(data: str) -> bytes:
     """Decode the text in the pixels of a PNG file.
 
     Raises `OperationError` for invalid data. Large files are rejected before decoding.

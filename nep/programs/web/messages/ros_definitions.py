@@ -87,11 +87,11 @@ def bare_type(ros_type: str) -> str:
 @cache
 def definition_of(ros_type: str) -> Definition | None:
     """Return the definition of a type including all nested types, or None if the type is unknown."""
-    text = full_text(ros_type)
+    text = full_definition_text(ros_type)
     return None if text is None else parse(ros_type, text)
 
 
-def full_text(ros_type: str) -> str | None:
+def full_definition_text(ros_type: str) -> str | None:
     """Return a definition in the format of `gendeps --cat`, or None if the type is unknown."""
     if ros_type not in _DEFINITION_TEXTS:
         return None

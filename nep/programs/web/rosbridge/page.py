@@ -12,13 +12,13 @@ from nep.i18n import _
 from nep.nodes.loop_wait import yield_to_loop
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
-from nep.programs.web.access import AuthCheck
+from nep.programs.web.access import AuthVerifier
 from nep.programs.web.connection import PageConnection
 from nep.programs.web.context import PageContext, PageTopic, WebCounts
 from nep.programs.web.limits import AUTH_TIMEOUT_S, MAX_NESTED_OPERATIONS
 from nep.programs.web.messages import operations as op
 from nep.programs.web.messages.fragments import FragmentBuffer
-from nep.programs.web.messages.png import text_in_png
+from nep.programs.web.messages.png import decode_png
 from nep.programs.web.outgoing import Frame, publish_frames
 from nep.programs.web.rosbridge.page_services import PageServices
 from nep.programs.web.rosbridge.page_topics import PageTopics
@@ -79,7 +79,7 @@ class Page(PageConnection):
             op.ServiceResponse: self._services.respond,
             op.SetLevel: self._set_level,
             op.PageStatus: self._log_status,
-            op.Auth: _ignore,
+            op.Auth: _ignore_auth,
         }
 
     # ---- the connection
@@ -104,7 +104,7 @@ class Page(PageConnection):
             self._services.cancel()
             await self._close_node()
 
-    async def _frames_of(self, queued: QueuedMessage) -> list[Frame]:
+    async def _encode_frames(self, queued: QueuedMessage) -> list[Frame]:
         topic = queued.feed.topic
         try:
             return publish_frames(topic, queued.message, queued.feed.form)
@@ -155,7 +155,7 @@ class Page(PageConnection):
             whole = self._fragments.add(part)
             if whole is None:
                 return None
-            text = text_in_png(whole) if isinstance(part, op.Png) else whole.encode("utf-8", "replace")
+            text = decode_png(whole) if isinstance(part, op.Png) else whole.encode("utf-8", "replace")
             return op.parse(text)
         except op.OperationError as error:
             error.id = part.id if error.id is None else error.id
@@ -178,7 +178,7 @@ class Page(PageConnection):
         self._context.send_status(shown.level, str(shown), shown.id)
 
 
-async def authenticate(connection: ServerConnection, check: AuthCheck) -> bool:
+async def authenticate(connection: ServerConnection, check: AuthVerifier) -> bool:
     """Return True if the client's first message is a valid ``auth`` operation.
 
     Returns False if the message does not arrive within the time limit.
@@ -190,5 +190,5 @@ async def authenticate(connection: ServerConnection, check: AuthCheck) -> bool:
         return False
 
 
-def _ignore(_operation: op.Auth) -> None:
+def _ignore_auth(_operation: op.Auth) -> None:
     """Ignore credentials on a connection that does not require them."""

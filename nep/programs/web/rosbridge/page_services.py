@@ -26,7 +26,7 @@ from nep.programs.web.outgoing import EncodingOptions, operation_frames
 from nep.programs.web.rosbridge.rosapi import RosApi, is_rosapi
 from nep.text import bounded_str, quotable
 
-Respond = Callable[[CallService, object, bool], None]
+RespondCallback = Callable[[CallService, object, bool], None]
 """Function that sends the result of a call to the page: (operation, values or reason, success).
 
 Raises `NepError` if the result can't be encoded.
@@ -40,7 +40,7 @@ class ServiceFailedError(NepError):
 class PageServices:
     """Services that one page calls and serves. Methods raise `NepError` for invalid requests."""
 
-    def __init__(self, context: PageContext, respond: Respond | None = None) -> None:
+    def __init__(self, context: PageContext, respond: RespondCallback | None = None) -> None:
         """Initialize the services.
 
         Args:
@@ -81,7 +81,7 @@ class PageServices:
 
     async def _call_service(self, operation: CallService) -> object:
         if is_rosapi(operation.service):
-            api = RosApi(self._context.node, self._context.motion_refusal)
+            api = RosApi(self._context.node, self._context.motion_denial_reason)
             return await self._context.run_in_thread(api.reply, operation.service, operation.args)
         client = self._clients.pop(operation.service, None)
         if client is None:

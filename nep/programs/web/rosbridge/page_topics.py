@@ -28,9 +28,9 @@ from nep.programs.web.send_queue import Feed, SendQueue
 from nep.text import quotable
 
 _GRAPH_TIMEOUT_S = 2.0
-_SETTLE_S = 0.5
+_DESCRIPTIONS_TIMEOUT_S = 0.5
 """Maximum time in seconds that opening a publisher waits for the descriptions of robots."""
-_RAW_IMAGE = "sensor_msgs/Image"
+_RAW_IMAGE_TYPE = "sensor_msgs/Image"
 _NS_PER_S = 1_000_000_000
 
 
@@ -101,7 +101,7 @@ class PageTopics:
         if not is_compatible(operation.ros_type, known):
             raise _type_conflict(operation.topic, operation.ros_type, known, operation.id)
         msg_type = known or nep_type_of(operation.ros_type)
-        self._context.guard.wait_for_descriptions(_SETTLE_S)
+        self._context.guard.wait_for_descriptions(_DESCRIPTIONS_TIMEOUT_S)
         self._check_motion(operation.topic, msg_type, operation.id)
         return self._context.node.new_pub(operation.topic, msg_type, latched=operation.is_latched)
 
@@ -115,9 +115,9 @@ class PageTopics:
         return "" if members <= {own.id} else known.msg_type
 
     def _check_motion(self, topic: str, msg_type: str, id_: OperationId) -> None:
-        refusal = self._context.motion_refusal(topic, msg_type)
+        refusal = self._context.motion_denial_reason(topic, msg_type)
         if refusal:
-            self._context.counts.motions_refused += 1
+            self._context.counts.motions_rejected += 1
             raise OperationError(refusal, id_)
 
     async def publish(self, operation: Publish) -> None:
@@ -167,7 +167,7 @@ class PageTopics:
 
     async def subscribe(self, operation: Subscribe) -> None:
         """Start sending the messages of a topic to the page."""
-        as_pixels = bare_type(operation.ros_type) == _RAW_IMAGE
+        as_pixels = bare_type(operation.ros_type) == _RAW_IMAGE_TYPE
         known = self._subscriptions.get(operation.topic)
         if known is None:
             await self._open_subscription(operation, as_pixels=as_pixels)

@@ -16,7 +16,12 @@ from nep.i18n import _
 from nep.nodes.node import Node
 from nep.patterns.parameters.owned import parameters_topic
 from nep.programs.web.messages.payloads import ros_type_of
-from nep.programs.web.messages.ros_definitions import JSON_TYPE, bare_type, full_text, type_definitions
+from nep.programs.web.messages.ros_definitions import (
+    JSON_TYPE,
+    bare_type,
+    full_definition_text,
+    type_definitions,
+)
 from nep.protocol.graph_view import GraphView, NodeInfo
 from nep.text import bounded_str, quotable
 
@@ -108,7 +113,9 @@ class RosApi:
 
     def topics_and_raw_types(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return all topics with their types and the definitions of the types."""
-        texts = [full_text(each) or full_text(JSON_TYPE) for each in self._types.values()]
+        texts = [
+            full_definition_text(each) or full_definition_text(JSON_TYPE) for each in self._types.values()
+        ]
         return {**self.topics(args), "typedefs_full_text": texts}
 
     def publishers(self, args: Mapping[str, object]) -> Mapping[str, object]:
@@ -224,7 +231,7 @@ class RosApi:
         """Return the value of a parameter as JSON text, or the default given in the request."""
         default = args.get("default")
         try:
-            node, name = _parameter(args)
+            node, name = _parse_parameter_name(args)
             with self._node.parameters_of(node, _PARAMETER_TIMEOUT_S) as remote:
                 return {"value": orjson.dumps(remote.get(name)).decode()}
         except NepError:
@@ -242,7 +249,7 @@ class RosApi:
 
     def set_param(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Set a parameter. For the node of a robot, the page needs permission to move the robot."""
-        node, name = _parameter(args)
+        node, name = _parse_parameter_name(args)
         try:
             value = orjson.loads(_text(args, "value"))
         except orjson.JSONDecodeError:
@@ -280,7 +287,7 @@ def _text(args: Mapping[str, object], name: str) -> str:
     return value
 
 
-def _parameter(args: Mapping[str, object]) -> tuple[str, str]:
+def _parse_parameter_name(args: Mapping[str, object]) -> tuple[str, str]:
     given = _text(args, "name")
     node, colon, name = given.rpartition(":")
     if not colon or not node:

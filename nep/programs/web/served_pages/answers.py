@@ -20,11 +20,11 @@ from typing import NamedTuple
 
 from nep.errors import NepError
 from nep.i18n import _, language
-from nep.programs.web.access import Access, checked_origin, query_of
+from nep.programs.web.access import Access, checked_origin, path_with_token
 
 _METHODS = frozenset({"GET", "HEAD"})
 _PLACEHOLDER = re.compile(r"\{\{(\w+)\}\}")
-_INLINE = re.compile(r"<(script|style)>(.*?)</\1>", re.DOTALL)
+_INLINE_ELEMENT = re.compile(r"<(script|style)>(.*?)</\1>", re.DOTALL)
 _HTML_TYPE = "text/html; charset=utf-8"
 _TEXT_TYPE = "text/plain; charset=utf-8"
 _HEADERS = {
@@ -68,7 +68,7 @@ class PageResponse(NamedTuple):
     status: HTTPStatus
     headers: Mapping[str, str]
     body: bytes
-    is_token_refused: bool = False
+    is_token_rejected: bool = False
 
 
 def respond(request: PageRequest, access: Access) -> PageResponse:
@@ -92,13 +92,13 @@ def respond(request: PageRequest, access: Access) -> PageResponse:
     if access.token and not access.check_token(request.path, request.authorization):
         return _page_response(
             HTTPStatus.UNAUTHORIZED,
-            _fill_template("refused.html", _refused_page_texts()),
+            _fill_template("refused.html", _rejected_page_texts()),
             "default-src 'none'; img-src data:",
-        )._replace(is_token_refused=True)
+        )._replace(is_token_rejected=True)
     host = origin.partition("://")[2]
     url = f"{'wss' if origin.startswith('https') else 'ws'}://{host}"
     if path == "/starter.html":
-        page = starter_page(url + query_of(access.token))
+        page = starter_page(url + path_with_token(access.token))
         return _page_response(HTTPStatus.OK, page, f"default-src 'none'; connect-src {url}")
     policy = f"default-src 'none'; img-src data:; connect-src 'self' {url}"
     return _page_response(HTTPStatus.OK, _fill_template("test.html", _test_page_texts()), policy)
@@ -122,7 +122,7 @@ def _origin(request: PageRequest, access: Access) -> str | None:
             origin = checked_origin(f"{scheme}://{request.hosts[0]}")
         except NepError:
             return None
-        if not access.origin_refusal(origin, request.own_origin):
+        if not access.origin_rejection_reason(origin, request.own_origin):
             return origin
     return None
 
@@ -139,7 +139,7 @@ def _text_response(
 
 def _page_response(status: HTTPStatus, text: str, policy: str) -> PageResponse:
     hashes: dict[str, str] = {}
-    for element, content in _INLINE.findall(text):
+    for element, content in _INLINE_ELEMENT.findall(text):
         digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
         hashes[element] = hashes.get(element, "") + f" 'sha256-{digest}'"
     inline = "".join(f"; {element}-src{each}" for element, each in hashes.items())
@@ -176,7 +176,7 @@ def _script_json(value: object) -> str:
 # ---- words
 
 
-def _refused_page_texts() -> dict[str, str]:
+def _rejected_page_texts() -> dict[str, str]:
     return {
         "language": language(),
         "title": _("Token required"),

@@ -86,7 +86,7 @@ class SimulatedLab:
         link = self.studio.session.fleet.link(name)
         assert link is not None
         assert link.is_connected
-        assert not link.virtual
+        assert not link.is_virtual
         return link
 
     def stop(self) -> None:

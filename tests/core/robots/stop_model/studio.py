@@ -188,7 +188,7 @@ class SimulatedStudio:
     def run(self, robots: Sequence[str]) -> None:
         wanted = _Driving(self.session.documents.current)
         object.__setattr__(wanted, "robots", tuple(robots))
-        self.session.runs._request(wanted)
+        self.session.runs._request_run(wanted)
         self.allow()
 
     def send_from_shelf(self, name: str) -> None:

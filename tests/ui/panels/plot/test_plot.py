@@ -17,8 +17,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.network.mailbox import Batch
 from app.ui.panels.plot import PANEL
-from app.ui.panels.plot.export import CSV, PNG, SVG
-from app.ui.panels.plot.look import DASHES, CurveLook
+from app.ui.panels.plot.export import CSV_KIND, PNG_KIND, SVG_KIND
+from app.ui.panels.plot.look import DASH_PATTERNS, CurveLook
 from app.ui.panels.plot.panel import IDLE_STATS_UPDATE_TICKS, PlotPanel
 from app.ui.panels.plot.shown_curve import MINUS, value_text
 from app.ui.panels.plot.time_view import TimeView
@@ -170,7 +170,7 @@ def test_curves_differ_in_more_than_their_colour(panel) -> None:
     assert len({(each.colour, each.pattern) for each in looks}) == 8
     assert len({each.pattern for each in looks[:4]}) == 4
     pens = [CurveLook(0, pattern).pen(panel.theme) for pattern in range(4)]
-    assert [bool(pen.dashPattern()) for pen in pens] == [bool(dash) for dash in DASHES]
+    assert [bool(pen.dashPattern()) for pen in pens] == [bool(dash) for dash in DASH_PATTERNS]
 
 
 def test_nonexistent_field_suggests_a_similar_field(panel) -> None:
@@ -334,7 +334,7 @@ def test_cursors_a_and_b_are_moved_by_mouse_and_keys(panel) -> None:
     look(panel)
     assert set(panel.canvas.cursors) == {"A", "B"}
     x = panel.canvas.x_of(panel.canvas.cursors["A"])
-    flag = panel.canvas._flag(x).center()
+    flag = panel.canvas._flag_rect(x).center()
     drag(panel.canvas.viewport(), flag, flag - QPointF(40, 0))
     assert panel.canvas.x_of(panel.canvas.cursors["A"]) == pytest.approx(x - 40, abs=1)
     panel._set_cursor("A", 10.0)
@@ -593,17 +593,17 @@ def test_data_images_and_svg_are_exported(qtbot, panel, window, tmp_path: Path) 
     send(panel, "/odom", sine(0, 100))
     panel._curves_changed()
     look(panel)
-    panel.exporter.write(tmp_path / "a.csv", CSV)
+    panel.exporter.write(tmp_path / "a.csv", CSV_KIND)
     qtbot.waitUntil(lambda: panel.refresh() or "Exported a.csv" in window.toasts)
     rows = list(csv.reader((tmp_path / "a.csv").read_text().splitlines()))
     assert rows[0] == ["stamp_ns", "time_utc", "/odom.speed", "/odom.mode"]
     assert len(rows) == 1 + 1201, "what is shown"
-    panel.exporter.write(tmp_path / "a.png", PNG)
+    panel.exporter.write(tmp_path / "a.png", PNG_KIND)
     image = QImage(str(tmp_path / "a.png"))
     assert image.width() == 2 * panel.drawings.width()
     row = image.height() // 3
     assert any(_near(image.pixel(x, row), panel.theme.series(0).rgb()) for x in range(image.width()))
-    panel.exporter.write(tmp_path / "a.svg", SVG)
+    panel.exporter.write(tmp_path / "a.svg", SVG_KIND)
     assert (tmp_path / "a.svg").read_text().count("<path") + (tmp_path / "a.svg").read_text().count(
         "<poly"
     ) > 3
@@ -614,7 +614,7 @@ def test_export_that_cannot_be_written_is_reported(qtbot, panel, window, tmp_pat
     show(panel, "/odom.speed")
     look(panel)
     (tmp_path / "file").write_text("x")
-    for kind in (CSV, PNG):
+    for kind in (CSV_KIND, PNG_KIND):
         panel.exporter.write(tmp_path / "file" / f"a{kind.suffix}", kind)
         qtbot.waitUntil(
             lambda: panel.refresh() or any("can't write" in each.lower() for each in window.toasts)

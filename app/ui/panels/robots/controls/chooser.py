@@ -36,11 +36,11 @@ def control_for(
         pictures: Source of images for image parameters.
     """
     if parameter.choices or options:
-        return _choice(theme, parameter, options)
+        return _choice_control(theme, parameter, options)
     if parameter.kind in NUMBER_KINDS:
         return number_control(theme, parameter)
     if parameter.kind == "boolean":
-        return _switch(theme, parameter)
+        return _switch_control(theme, parameter)
     if parameter.kind == "colour":
         return colour_control(theme, parameter)
     if parameter.kind == "image":
@@ -48,7 +48,7 @@ def control_for(
     return text_control(theme, parameter)
 
 
-def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Control:
+def _choice_control(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Control:
     pairs = [(str(choice.value), choice.title) for choice in parameter.choices] or [(o, o) for o in options]
     values: dict[str, object] = {str(choice.value): choice.value for choice in parameter.choices}
     made: Control
@@ -85,7 +85,7 @@ def _value_for_key(values: dict[str, object], key: str) -> object:
     return values.get(key, key) if key else None
 
 
-def _switch(theme: Theme, parameter: Parameter) -> Control:
+def _switch_control(theme: Theme, parameter: Parameter) -> Control:
     switch = Switch(theme, yes_no_text(parameter.default is True), parameter.default is True)
     switch.setAccessibleName(parameter.title)
     switch.toggled.connect(lambda on: switch.setText(yes_no_text(on)))

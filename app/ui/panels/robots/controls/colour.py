@@ -18,7 +18,7 @@ from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _, lazy
 
-_HEX = re.compile(r"#?([0-9a-fA-F]{6})")
+_HEX_PATTERN = re.compile(r"#?([0-9a-fA-F]{6})")
 # Colours of robots' LEDs, therefore not theme tokens.
 LAMP_COLOURS: tuple[tuple[str, str], ...] = (
     ("#ffffff", lazy("white")),
@@ -30,7 +30,7 @@ LAMP_COLOURS: tuple[tuple[str, str], ...] = (
 )
 SWATCH_SIZE = 32
 STRIP_SIZE = QSize(168, 34)
-HUES = 360
+HUE_COUNT = 360
 HUE_STEP, LIGHT_STEP = 5, 0.05
 MAX_LIGHTNESS, MIN_LIGHTNESS = 0.95, 0.15
 
@@ -161,7 +161,7 @@ class HueStrip(QWidget):
         if by is None:
             super().keyPressEvent(event)
         else:
-            self._change_colour(self._hue + by[0] / HUES, self._light + by[1])
+            self._change_colour(self._hue + by[0] / HUE_COUNT, self._light + by[1])
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -246,7 +246,7 @@ class ColourChoice(QWidget):
 
     def set_value(self, value: object) -> None:
         """Show a colour without emitting `changed`; invalid values are ignored."""
-        if isinstance(value, str) and _HEX.fullmatch(value):
+        if isinstance(value, str) and _HEX_PATTERN.fullmatch(value):
             self.swatches.set_value(value)
             self._show_value()
 
@@ -272,7 +272,7 @@ class ColourChoice(QWidget):
         self.changed.emit()
 
     def _hex_edited(self, *, final: bool) -> None:
-        found = _HEX.fullmatch(self.field.text().strip())
+        found = _HEX_PATTERN.fullmatch(self.field.text().strip())
         if found is not None:
             self.swatches.set_value(f"#{found[1].lower()}")
             self.strip.show_colour(QColor(self.swatches.value))

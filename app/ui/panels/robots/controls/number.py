@@ -14,10 +14,10 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import NumberEdit, SliderWithUnit, label
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.slider import decimals_of
-from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.keyboard import has_no_modifiers
 from nep.i18n import number as number_text
 
-COARSE_SPAN = 20
+MIN_COARSE_SPAN = 20
 VERTICAL_KEYWORDS = ("pitch", "tilt", "down", "up", "nod")
 PAGE_STEPS = 10
 
@@ -26,21 +26,21 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
     """Create the input control for a number, integer or angle."""
     low, high = parameter.minimum, parameter.maximum
     if low is None or high is None or high <= low:
-        return _open_number(theme, parameter)
+        return _open_number_control(theme, parameter)
     slider = SliderWithUnit(
         theme,
         low,
         high,
         step=step_of(parameter),
-        value=_number(parameter.default),
-        default=_number(parameter.default),
+        value=_float_or_none(parameter.default),
+        default=_float_or_none(parameter.default),
         unit=parameter.unit or "",
         name=parameter.title,
     )
-    dial = _dial(theme, parameter, slider) if parameter.kind == "angle" else None
+    dial = _make_dial(theme, parameter, slider) if parameter.kind == "angle" else None
 
     def show(given: object) -> None:
-        number = _number(given)
+        number = _float_or_none(given)
         if number is not None and low <= number <= high:
             slider.set_value(number)
             if dial is not None:
@@ -51,8 +51,8 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
         connect(slider.field.textEdited, tell)
 
     return Control(
-        slider if dial is None else _dial_row(dial, slider, parameter.title),
-        lambda: _value_of(slider, parameter),
+        slider if dial is None else _make_dial_row(dial, slider, parameter.title),
+        lambda: _slider_value(slider, parameter),
         show,
         changed,
         finished=lambda tell: connect(slider.field.editingFinished, tell),
@@ -60,12 +60,12 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
     )
 
 
-def _value_of(slider: SliderWithUnit, parameter: Parameter) -> object:
+def _slider_value(slider: SliderWithUnit, parameter: Parameter) -> object:
     # Returns the typed text if it differs from the slider's value, even if it is invalid.
     whole = parameter.kind == "integer"
     typed = slider.field.text()
     if typed != slider.field.format_number(slider.value):
-        return typed_value(typed, whole=whole)
+        return parse_typed(typed, whole=whole)
     return round(slider.value) if whole else float(slider.value)
 
 
@@ -74,12 +74,12 @@ def step_of(parameter: Parameter) -> float:
     if parameter.step is not None and parameter.step > 0:
         return parameter.step
     span = (parameter.maximum or 0.0) - (parameter.minimum or 0.0)
-    if parameter.kind == "integer" or span > COARSE_SPAN or span <= 0:
+    if parameter.kind == "integer" or span > MIN_COARSE_SPAN or span <= 0:
         return 1.0
     return 0.01 if span <= 2 else 0.1
 
 
-def typed_value(typed: str, *, whole: bool) -> object:
+def parse_typed(typed: str, *, whole: bool) -> object:
     """Parse a typed number.
 
     Args:
@@ -98,7 +98,7 @@ def typed_value(typed: str, *, whole: bool) -> object:
     return int(number) if whole and number.is_integer() else number
 
 
-def _dial(theme: Theme, parameter: Parameter, slider: SliderWithUnit) -> AngleDial:
+def _make_dial(theme: Theme, parameter: Parameter, slider: SliderWithUnit) -> AngleDial:
     words = f"{parameter.name} {parameter.title}".casefold().split()
     dial = AngleDial(
         theme,
@@ -106,21 +106,21 @@ def _dial(theme: Theme, parameter: Parameter, slider: SliderWithUnit) -> AngleDi
         parameter.maximum or 0.0,
         step=step_of(parameter),
         value=slider.value,
-        default=_number(parameter.default),
+        default=_float_or_none(parameter.default),
         name=parameter.title,
         upright=any(word in words for word in VERTICAL_KEYWORDS),
     )
 
-    def from_dial(value: float) -> None:
+    def on_dial_changed(value: float) -> None:
         slider.set_value(value)
         slider.changed.emit(value)
 
-    dial.changed.connect(from_dial)
+    dial.changed.connect(on_dial_changed)
     slider.changed.connect(dial.set_value)
     return dial
 
 
-def _dial_row(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidget:
+def _make_dial_row(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidget:
     row = QWidget()
     row.setAccessibleName(name)
     inner = Flow(row)
@@ -129,7 +129,7 @@ def _dial_row(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidget:
     return row
 
 
-class OpenNumber(NumberEdit):
+class OpenNumberEdit(NumberEdit):
     """Number field for a parameter without a range; it may be empty.
 
     Arrow keys change the number by one step, Page Up and Page Down by ten steps.
@@ -150,8 +150,8 @@ class OpenNumber(NumberEdit):
             Qt.Key.Key_PageUp: PAGE_STEPS,
             Qt.Key.Key_PageDown: -PAGE_STEPS,
         }.get(Qt.Key(event.key()))
-        now = typed_value(self.text() or "0", whole=False)
-        if steps is None or not is_plain(event) or not isinstance(now, (int, float)):
+        now = parse_typed(self.text() or "0", whole=False)
+        if steps is None or not has_no_modifiers(event) or not isinstance(now, (int, float)):
             super().keyPressEvent(event)
             return
         low, high = self._parameter.minimum, self._parameter.maximum
@@ -160,15 +160,15 @@ class OpenNumber(NumberEdit):
         self.show_number(min(wanted, high) if high is not None else wanted)
         self.textEdited.emit(self.text())
 
-    def _read(self) -> None:
+    def _parse_text(self) -> None:
         if self.text().strip():
-            super()._read()
+            super()._parse_text()
         else:
             self._set_problem("")
 
 
-def _open_number(theme: Theme, parameter: Parameter) -> Control:
-    field = OpenNumber(theme, parameter)
+def _open_number_control(theme: Theme, parameter: Parameter) -> Control:
+    field = OpenNumberEdit(theme, parameter)
     field.setMinimumWidth(VALUE_WIDTH)
     field.setMaximumWidth(2 * VALUE_WIDTH)
     wrong = label("", "small", role="error", wrap=True)
@@ -184,7 +184,7 @@ def _open_number(theme: Theme, parameter: Parameter) -> Control:
     inner.addWidget(wrong)
 
     def show(given: object) -> None:
-        number = _number(given)
+        number = _float_or_none(given)
         if number is None:
             field.setText("" if given is None else f"{given}")
         else:
@@ -193,7 +193,7 @@ def _open_number(theme: Theme, parameter: Parameter) -> Control:
     show(parameter.default)
     return Control(
         column,
-        lambda: typed_value(field.text(), whole=parameter.kind == "integer"),
+        lambda: parse_typed(field.text(), whole=parameter.kind == "integer"),
         show,
         lambda tell: connect(field.textChanged, tell),
         finished=lambda tell: connect(field.editingFinished, tell),
@@ -201,6 +201,6 @@ def _open_number(theme: Theme, parameter: Parameter) -> Control:
     )
 
 
-def _number(value: object) -> float | None:
+def _float_or_none(value: object) -> float | None:
     good = isinstance(value, (int, float)) and not isinstance(value, bool)
     return float(value) if good else None  # type: ignore[arg-type]

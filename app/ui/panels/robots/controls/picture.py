@@ -17,7 +17,7 @@ from shiboken6 import isValid
 
 from app.robots.description.description import Parameter
 from app.ui.panels.robots.controls.base import Control, connect, line_field
-from app.ui.panels.robots.controls.picture_file import encode_image, image_of, read_picture
+from app.ui.panels.robots.controls.picture_file import decode_image, encode_image, read_picture
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from app.core.messages.image_streams import ImageStream
 
 POLL_MS = 200
-THUMBNAIL = QSize(72, 54)
+THUMBNAIL_SIZE = QSize(72, 54)
 
 
 class ImageSource(Protocol):
@@ -40,7 +40,7 @@ class ImageSource(Protocol):
     def topics(self) -> Sequence[str]:
         """Return the names of available image topics."""
 
-    def stream(self, topic: str) -> ImageStream:
+    def open_stream(self, topic: str) -> ImageStream:
         """Subscribe to the images of a topic; the caller closes the stream."""
 
     def prompt_file(self, folder: str, take: Callable[[Path], None]) -> None:
@@ -59,7 +59,7 @@ class EmptyImageSource:
         """Return an empty sequence."""
         return ()
 
-    def stream(self, topic: str) -> ImageStream:
+    def open_stream(self, topic: str) -> ImageStream:
         """Raise `KeyError`, because there are no topics."""
         raise KeyError(topic)
 
@@ -88,7 +88,7 @@ class Thumbnail(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        return THUMBNAIL
+        return THUMBNAIL_SIZE
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
@@ -165,7 +165,7 @@ class PictureChoice(QWidget):
         """Return the encoded image or the typed address; None if there is neither."""
         if self._stream is not None:
             self._poll_stream()
-            if self._stream.is_awaiting_picture:
+            if self._stream.is_awaiting_image:
                 return None  # the last image may have been received before the stream was suspended
         if self._image is not None:
             return encode_image(self._image, bare=self._parameter.is_bare_base64)
@@ -245,7 +245,7 @@ class PictureChoice(QWidget):
         """Show the images of a topic. The action receives the image that is the newest when it starts."""
         self.close_stream()
         self._clear_image()
-        self._stream = self._pictures.stream(topic)
+        self._stream = self._pictures.open_stream(topic)
         self.field.setText(_("newest image of {topic}").format(topic=topic))
         self._timer.start()
         self.changed.emit()
@@ -255,7 +255,7 @@ class PictureChoice(QWidget):
         if stream is None:
             return
         picture = stream.picture
-        if picture is not None and picture is not self._seen and not stream.is_awaiting_picture:
+        if picture is not None and picture is not self._seen and not stream.is_awaiting_image:
             self._seen = picture
             data = picture.bgra.data
             rows, columns = picture.bgra.shape[:2]
@@ -286,7 +286,7 @@ class PictureChoice(QWidget):
 def _image_from_url(address: str) -> QImage | None:
     # Decodes an image from a ``data:`` URL.
     try:
-        return image_of(base64.b64decode(address.partition(",")[2]))
+        return decode_image(base64.b64decode(address.partition(",")[2]))
     except (ValueError, DecodeError):
         return None
 

@@ -41,12 +41,12 @@ def read_picture(path: Path) -> tuple[QImage | None, str]:
         said = _("“{file}” is too large. Choose a file smaller than {size} MB.")
         return None, said.format(file=path.name, size=MAX_FILE_BYTES // 1_000_000)
     try:
-        return image_of(data), ""
+        return decode_image(data), ""
     except DecodeError as error:
         return None, _("“{file}” can't be used: {reason}.").format(file=path.name, reason=error.reason)
 
 
-def image_of(data: bytes) -> QImage:
+def decode_image(data: bytes) -> QImage:
     """Decode an image, limited in size, and apply its EXIF orientation.
 
     Raises:

@@ -8,10 +8,10 @@ from app.robots.description.description import Parameter
 from app.robots.description.inputs import format_for_editing, parse_value
 from app.ui.panels.robots.controls.base import Control, connect, line_field
 from app.ui.theme.theme import Theme
-from app.ui.widgets.inputs.fields import LongText
+from app.ui.widgets.inputs.fields import LongTextField
 from nep.i18n import _
 
-MULTILINE_LENGTH = 200
+MIN_MULTILINE_LENGTH = 200
 """Maximum length of a parameter from which its field has several lines."""
 
 
@@ -21,9 +21,9 @@ def text_control(theme: Theme, parameter: Parameter) -> Control:
     The items of a list are separated by commas. Objects, and lists of lists or objects, are typed as JSON.
     """
     if parameter.kind in ("list", "object"):
-        return _list(theme, parameter)
-    if (parameter.max_length or 0) >= MULTILINE_LENGTH or parameter.widget == "multiline":
-        return _long(theme, parameter)
+        return _list_control(theme, parameter)
+    if (parameter.max_length or 0) >= MIN_MULTILINE_LENGTH or parameter.widget == "multiline":
+        return _multiline_control(theme, parameter)
     field = line_field(theme, parameter)
     made = Control(
         field,
@@ -36,8 +36,8 @@ def text_control(theme: Theme, parameter: Parameter) -> Control:
     return made
 
 
-def _long(theme: Theme, parameter: Parameter) -> Control:
-    field = LongText(theme, parameter.title)
+def _multiline_control(theme: Theme, parameter: Parameter) -> Control:
+    field = LongTextField(theme, parameter.title)
     made = Control(
         field,
         lambda: _text_or_none(parameter, field.text()),
@@ -49,7 +49,7 @@ def _long(theme: Theme, parameter: Parameter) -> Control:
     return made
 
 
-def _list(theme: Theme, parameter: Parameter) -> Control:
+def _list_control(theme: Theme, parameter: Parameter) -> Control:
     field = line_field(theme, parameter)
     field.setPlaceholderText(_placeholder(parameter))
 

@@ -86,8 +86,8 @@ class AddressChoice(QWidget):
 class AccessForm(QWidget):
     """First part of the form. Signals request changes of the settings; `show_state` shows the result."""
 
-    copy_address = Signal()
-    copy_token = Signal()
+    copy_address_requested = Signal()
+    copy_token_requested = Signal()
     new_token_requested = Signal()
 
     def __init__(self, theme: Theme, web: WebPages) -> None:
@@ -104,8 +104,8 @@ class AccessForm(QWidget):
         self.qr = QrCode(theme)
         self.qr_words = label("", "small", role="textSecondary", wrap=True)
         self.qr_words.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-        self.address.copy_requested.connect(self.copy_address)
-        self.token.copy_requested.connect(self.copy_token)
+        self.address.copy_requested.connect(self.copy_address_requested)
+        self.token.copy_requested.connect(self.copy_token_requested)
         self.new_token.clicked.connect(self.new_token_requested)
         self.reveal.toggled.connect(self._show_token)
         self._lay_out()
@@ -141,10 +141,10 @@ class AccessForm(QWidget):
         code.addWidget(self.qr_words)
         code.addStretch(1)
         grid.addLayout(code, 0, 2, 4, 1)
-        self._theme.changed.connect(self._measure)
-        self._measure()
+        self._theme.changed.connect(self._update_widths)
+        self._update_widths()
 
-    def _measure(self) -> None:
+    def _update_widths(self) -> None:
         self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDTH)))
         self.qr_words.setFixedWidth(round(self._theme.scaled(SIDE)))
 
@@ -162,7 +162,7 @@ class AccessForm(QWidget):
         if self.open_to.value != web.host:
             self.open_to.set_value(web.host)
         self._show_reach(is_foxglove=is_foxglove)
-        self._show_code(is_foxglove=is_foxglove)
+        self._show_qr_code(is_foxglove=is_foxglove)
 
     def _show_token(self) -> None:
         token = self._web.token
@@ -188,7 +188,7 @@ class AccessForm(QWidget):
             else _("Works with roslib, roslibpy and your own pages.")
         )
 
-    def _show_code(self, *, is_foxglove: bool) -> None:
+    def _show_qr_code(self, *, is_foxglove: bool) -> None:
         web = self._web
         if is_foxglove:
             self.qr.show_message(

@@ -11,7 +11,7 @@ from app.ui.widgets.cards import AlertBox
 from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _, lazy, ngettext
 
-_BUTTONS = {
+_BUTTON_LABELS = {
     "allow origin": lazy("Allow"),
     "choose robots": lazy("Choose robots"),
     "let in": lazy("Unblock"),
@@ -57,7 +57,7 @@ class NoticeStrip(AlertBox):
             self.set_status(notice.status)
             self.words.setText(notice.message)
             self.setAccessibleName(notice.message)
-            word = _BUTTONS.get(notice.next_step, "")
+            word = _BUTTON_LABELS.get(notice.next_step, "")
             self.button.set_label(_(word) if word else "")
             paint.show_when(self.button, bool(word))
         more = ngettext("and {count} more", "and {count} more", others).format(count=others) if others else ""

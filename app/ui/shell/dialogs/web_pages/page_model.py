@@ -32,14 +32,14 @@ class PageRow:
         topics: Topics of the page, in the order of the child rows.
     """
 
-    listed: ListedPage
+    listed_page: ListedPage
     topics: list[PageTopic] = field(default_factory=list)
     number: int = 0
 
     @property
     def id(self) -> int:
         """Id of the page."""
-        return self.listed.page.id
+        return self.listed_page.page.id
 
 
 class PageTreeModel(QAbstractItemModel):
@@ -79,9 +79,9 @@ class PageTreeModel(QAbstractItemModel):
         if row is None:
             return None
         if role == Qt.ItemDataRole.DisplayRole:
-            return page_name(row.listed.page) if topic is None else topic.topic
+            return page_name(row.listed_page.page) if topic is None else topic.topic
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            return page_description(row.listed) if topic is None else topic_description(topic)
+            return page_description(row.listed_page) if topic is None else topic_description(topic)
         return None
 
     def headerData(
@@ -117,8 +117,8 @@ class PageTreeModel(QAbstractItemModel):
         new = [each for each in listed if each.page.id not in self._by_id]
         for each in listed:
             row = self._by_id.get(each.page.id)
-            if row is not None and row.listed != each:
-                row.listed = each
+            if row is not None and row.listed_page != each:
+                row.listed_page = each
                 self._emit_changed(self.createIndex(row.number, 0, 0), self.createIndex(row.number, 0, 0))
                 self._show_topics(row, each.page.topics)
         if new:

@@ -50,7 +50,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.menus import Menu
-from app.ui.widgets.table.cells import head_font
+from app.ui.widgets.table.cells import header_font
 from nep.i18n import _
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ PAGE_ROW_HEIGHT, TOPIC_ROW_HEIGHT = 28, 23
 _EDGE, _PADDING, _ICON, _GAP = 8, 6, 15, 6
 PageColumn = Literal["rate", "bandwidth", "dropped", "disconnect"]
 _WIDTHS: dict[PageColumn, int] = {"rate": 66, "bandwidth": 88, "dropped": 78, "disconnect": 34}
-_GONE_ROLE = "textDisabled"
+_DISCONNECTED_ROLE = "textDisabled"
 
 
 class _PageHeader(QHeaderView):
@@ -77,7 +77,7 @@ class _PageHeader(QHeaderView):
         return QSize(super().sizeHint().width(), round(self._theme.scaled(TOPIC_ROW_HEIGHT)) + 2)
 
     def paintSection(self, painter: QPainter, rect: QRect, _section: int) -> None:
-        theme, font = self._theme, head_font(self._theme)
+        theme, font = self._theme, header_font(self._theme)
         ink = theme.colour("textTertiary")
         painter.save()
         painter.fillRect(rect, theme.colour("raised"))
@@ -85,8 +85,8 @@ class _PageHeader(QHeaderView):
         painter.drawLine(rect.bottomLeft(), rect.bottomRight())
         box = QRectF(rect)
         for column, title in column_titles().items():
-            paint.text_line(painter, self._tree.cell(column, box), title, font, ink, paint.RIGHT)
-        box.setRight(self._tree.cell("rate", box).left())
+            paint.text_line(painter, self._tree.cell_rect(column, box), title, font, ink, paint.RIGHT)
+        box.setRight(self._tree.cell_rect("rate", box).left())
         paint.text_line(painter, box.adjusted(_EDGE, 0, 0, 0), _("Page and topics"), font, ink)
         painter.restore()
 
@@ -96,7 +96,7 @@ def column_titles() -> dict[PageColumn, str]:
     return {"rate": _("Rate /s"), "bandwidth": _("Bandwidth"), "dropped": _("Dropped")}
 
 
-class _RowHeights(QStyledItemDelegate):
+class _RowHeightDelegate(QStyledItemDelegate):
     def __init__(self, theme: Theme, parent: QWidget) -> None:
         super().__init__(parent)
         self.measure(theme)
@@ -117,7 +117,7 @@ class PageTree(QTreeView):
     """
 
     disconnect_requested = Signal(int)
-    copied = Signal(str)
+    copy_requested = Signal(str)
 
     def __init__(self, theme: Theme, model: PageTreeModel) -> None:
         super().__init__()
@@ -127,7 +127,7 @@ class PageTree(QTreeView):
         self._hovered = QPersistentModelIndex()
         self._over_button = False
         self.setModel(model)
-        self._heights = _RowHeights(theme, self)
+        self._heights = _RowHeightDelegate(theme, self)
         self.setItemDelegate(self._heights)
         self.setHeader(_PageHeader(theme, self))
         self.setAccessibleName(_("Connected pages"))
@@ -149,7 +149,7 @@ class PageTree(QTreeView):
     def current_page(self) -> ListedPage | None:
         """Return the page of the current row, which can be one of its topics; None if no row is current."""
         row = self._pages.page_row(self.currentIndex())
-        return None if row is None else row.listed
+        return None if row is None else row.listed_page
 
     def disconnect_current(self) -> None:
         """Emit `disconnect_requested` for the current page if it is connected."""
@@ -161,9 +161,9 @@ class PageTree(QTreeView):
         """Emit `copied` with the name of the current topic or the origin of the current page."""
         topic, listed = self._pages.topic(self.currentIndex()), self.current_page()
         if topic is not None:
-            self.copied.emit(topic.topic)
+            self.copy_requested.emit(topic.topic)
         elif listed is not None:
-            self.copied.emit(listed.page.origin or listed.page.address)
+            self.copy_requested.emit(listed.page.origin or listed.page.address)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         self._keyboard = True
@@ -241,8 +241,8 @@ class PageTree(QTreeView):
     def _is_on_button(self, at: QPoint) -> bool:
         index = self.indexAt(at)
         row = self._pages.page_row(index)
-        is_page = row is not None and self._pages.topic(index) is None and row.listed.gone_s is None
-        return is_page and at.x() >= self.cell("disconnect", QRectF()).left() - _PADDING
+        is_page = row is not None and self._pages.topic(index) is None and row.listed_page.gone_s is None
+        return is_page and at.x() >= self.cell_rect("disconnect", QRectF()).left() - _PADDING
 
     def _hover(self, at: QPoint) -> None:
         index, over = QPersistentModelIndex(self.indexAt(at)), self._is_on_button(at)
@@ -266,7 +266,7 @@ class PageTree(QTreeView):
         menu.popup(self.viewport().mapToGlobal(at))
 
     def _measure(self) -> None:
-        titles, font = column_titles(), head_font(self.theme)
+        titles, font = column_titles(), header_font(self.theme)
         for column, wide in _WIDTHS.items():
             words = paint.width_of(font, titles.get(column, "")) + 2 * _PADDING + 1
             self._widths[column] = max(round(self.theme.scaled(wide)), round(words))
@@ -292,9 +292,11 @@ class PageTree(QTreeView):
         if topic is None:
             if row.number:
                 paint.hairline(painter, rect, Qt.Edge.TopEdge, theme.colour("border"))
-            self._paint_page(painter, rect, row.listed, index)
+            self._paint_page(painter, rect, row.listed_page, index)
         else:
-            self._paint_topic(painter, rect, row.topics[index.row()], is_gone=row.listed.gone_s is not None)
+            self._paint_topic(
+                painter, rect, row.topics[index.row()], is_gone=row.listed_page.gone_s is not None
+            )
         if chosen and self._keyboard and self.hasFocus():
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setPen(QPen(theme.colour("focus"), 2))
@@ -302,13 +304,13 @@ class PageTree(QTreeView):
             painter.drawRoundedRect(rect.adjusted(1, 1, -1, -1), 4, 4)
         painter.restore()
 
-    def _icon(self, painter: QPainter, left: float, rect: QRectF, name: str, role: str) -> float:
+    def _paint_icon(self, painter: QPainter, left: float, rect: QRectF, name: str, role: str) -> float:
         side = self.theme.scaled(_ICON)
         square = QRectF(left, rect.center().y() - side / 2, side, side)
         paint_icon(painter, square, name, self.theme.colour(role))
         return left + side + _GAP
 
-    def cell(self, column: PageColumn, rect: QRectF) -> QRectF:
+    def cell_rect(self, column: PageColumn, rect: QRectF) -> QRectF:
         """Return the rectangle of a column within the rectangle of a row."""
         right = float(self.viewport().width())
         for name in reversed(_WIDTHS):
@@ -330,24 +332,24 @@ class PageTree(QTreeView):
         left = float(_EDGE)
         if self._pages.rowCount(index):
             chevron = "chevron-down" if self.isExpanded(index) else "chevron-right"
-            self._icon(painter, left, rect, chevron, "textSecondary")
+            self._paint_icon(painter, left, rect, chevron, "textSecondary")
         left += theme.scaled(_ICON) + _GAP
-        left = self._icon(
-            painter, left, rect, page_icon(listed.page), _GONE_ROLE if is_gone else "textSecondary"
+        left = self._paint_icon(
+            painter, left, rect, page_icon(listed.page), _DISCONNECTED_ROLE if is_gone else "textSecondary"
         )
         small = self._font("small")
         since = since_text(listed)
-        button = self.cell("disconnect", rect)
+        button = self.cell_rect("disconnect", rect)
         end = button.left() - _PADDING
         room = QRectF(end - paint.width_of(small, since) - 2, rect.top(), 0, rect.height())
         room.setRight(end)
         paint.text_line(painter, room, since, small, theme.colour("textSecondary"), paint.RIGHT)
         name, font = page_name(listed.page), self._font("body", bold=True, struck=is_gone)
         words = QRectF(left, rect.top(), max(20.0, room.left() - left - _GAP), rect.height())
-        paint.text_line(painter, words, name, font, theme.colour(_GONE_ROLE if is_gone else "text"))
+        paint.text_line(painter, words, name, font, theme.colour(_DISCONNECTED_ROLE if is_gone else "text"))
         words.setLeft(words.left() + paint.width_of(font, name) + 8)
         if words.width() > theme.scaled(40):
-            role = _GONE_ROLE if is_gone else "textSecondary"
+            role = _DISCONNECTED_ROLE if is_gone else "textSecondary"
             paint.text_line(
                 painter, words, location_text(listed.page), self._font("body"), theme.colour(role)
             )
@@ -363,23 +365,23 @@ class PageTree(QTreeView):
 
     def _paint_topic(self, painter: QPainter, rect: QRectF, topic: PageTopic, *, is_gone: bool) -> None:
         theme = self.theme
-        role = _GONE_ROLE if is_gone else "text"
+        role = _DISCONNECTED_ROLE if is_gone else "text"
         left = _EDGE + 2 * (theme.scaled(_ICON) + _GAP)
         icon = "arrow-up-from-line" if topic.is_published else "arrow-down-to-line"
-        left = self._icon(painter, left, rect, icon, _GONE_ROLE if is_gone else "textSecondary")
+        left = self._paint_icon(painter, left, rect, icon, _DISCONNECTED_ROLE if is_gone else "textSecondary")
         body, small = self._font("body"), self._font("small")
         verbs = max(paint.width_of(body, each) for each in (_("reads"), _("publishes")))
-        quiet = theme.colour(_GONE_ROLE if is_gone else "textSecondary")
+        quiet = theme.colour(_DISCONNECTED_ROLE if is_gone else "textSecondary")
         paint.text_line(
             painter, QRectF(left, rect.top(), verbs + 2, rect.height()), direction_text(topic), body, quiet
         )
         left += verbs + 10
         limit = limit_text(topic)
         wide = paint.width_of(small, limit) + 2 if limit else 0.0
-        end = self.cell("rate", rect).left() - 2 * _PADDING
+        end = self.cell_rect("rate", rect).left() - 2 * _PADDING
         paint.text_line(
             painter, QRectF(end - wide, rect.top(), wide, rect.height()), limit, small,
-            theme.colour(_GONE_ROLE if is_gone else "textTertiary"), paint.RIGHT,
+            theme.colour(_DISCONNECTED_ROLE if is_gone else "textTertiary"), paint.RIGHT,
         )  # fmt: skip
         name = QRectF(left, rect.top(), max(20.0, end - wide - left - _GAP), rect.height())
         paint.text_line(painter, name, topic.topic, self._font("code", struck=is_gone), theme.colour(role))
@@ -390,8 +392,10 @@ class PageTree(QTreeView):
             "bandwidth": bandwidth_text(topic.bytes_per_s),
         }
         for column, text in figures.items():
-            paint.text_line(painter, self.cell(column, rect), text, body, theme.colour(role), paint.RIGHT)
-        self._paint_dropped(painter, self.cell("dropped", rect), topic, body)
+            paint.text_line(
+                painter, self.cell_rect(column, rect), text, body, theme.colour(role), paint.RIGHT
+            )
+        self._paint_dropped(painter, self.cell_rect("dropped", rect), topic, body)
 
     def _paint_dropped(self, painter: QPainter, cell: QRectF, topic: PageTopic, font: QFont) -> None:
         theme, words = self.theme, dropped_text(topic)

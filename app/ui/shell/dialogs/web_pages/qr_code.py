@@ -25,7 +25,7 @@ QUIET_ZONE = 4
 _PADDING = 12
 
 
-def modules_of(text: str) -> tuple[bytes, ...]:
+def encode_modules(text: str) -> tuple[bytes, ...]:
     """Encode a text as a QR code and return the rows of its modules.
 
     Each byte is a module, 1 for dark and 0 for light. The quiet zone isn't included.
@@ -59,7 +59,7 @@ class QrCode(QWidget):
         if text == self._text:
             return
         try:
-            modules = modules_of(text)
+            modules = encode_modules(text)
         except ImportError:
             self.show_message(_("Install segno to show the QR code: pip install segno"))
             return

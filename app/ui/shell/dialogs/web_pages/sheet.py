@@ -39,7 +39,7 @@ from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.keyboard import tab_stops_of
 from nep.i18n import _, ngettext
 
-WIDE = 640
+WIDTH = 640
 REFRESH_MS = 300
 _SIDE, _TABLE_SIDE, _SCROLL_BAR, _EDGE, _BELOW_BARS = 19, 12, 10, 6, 46
 _MIN_TABLE_HEIGHT = 120
@@ -70,9 +70,9 @@ class WebPagesSheet(Overlay):
         self._tab_order: list[QWidget] = []
         self.access = AccessForm(theme, web)
         self.permissions = PermissionForm(theme, web, robots)
-        self._make_head()
+        self._make_header()
         self._make_table()
-        self._make_foot()
+        self._make_footer()
         self._lay_out()
         self._connect()
         self._timer = QTimer(self)
@@ -80,7 +80,7 @@ class WebPagesSheet(Overlay):
         self._timer.timeout.connect(self.refresh)
         self.closed.connect(self._timer.stop)
 
-    def _make_head(self) -> None:
+    def _make_header(self) -> None:
         theme = self.theme
         self.count = Chip(theme)
         options = [("rosbridge", "rosbridge", None), ("foxglove", "Foxglove", None)]
@@ -100,7 +100,7 @@ class WebPagesSheet(Overlay):
         self.empty.setMinimumHeight(_MIN_TABLE_HEIGHT // 2)
         self.notice = NoticeStrip(self.theme)
 
-    def _make_foot(self) -> None:
+    def _make_footer(self) -> None:
         theme = self.theme
         self.command = ElidedLabel("code", "text", least=round(theme.scaled(90)))
         self.command.mode = Qt.TextElideMode.ElideRight
@@ -131,13 +131,13 @@ class WebPagesSheet(Overlay):
         whole = QVBoxLayout(self)
         whole.setContentsMargins(1, 10, 1, 8)
         whole.setSpacing(8)
-        whole.addLayout(self._head_row())
+        whole.addLayout(self._header_row())
         whole.addWidget(self._area, 1)
         whole.addLayout(notice)
         whole.addWidget(Separator(self.theme))
-        whole.addLayout(self._foot_row())
+        whole.addLayout(self._footer_row())
 
-    def _head_row(self) -> QHBoxLayout:
+    def _header_row(self) -> QHBoxLayout:
         title = QWidget()
         row = Flow(title, gap=10)
         row.addWidget(RoleIcon(self.theme, "globe", side=20))
@@ -177,7 +177,7 @@ class WebPagesSheet(Overlay):
         self.empty.setContentsMargins(_SIDE - _TABLE_SIDE, 4, 0, 0)
         return part
 
-    def _foot_row(self) -> Flow:
+    def _footer_row(self) -> Flow:
         foot = Flow(gap=8)
         foot.setContentsMargins(_SIDE, 0, _SIDE - 7, 0)
         foot.addWidget(label(_("In a terminal:"), "small", role="textSecondary"))
@@ -191,17 +191,17 @@ class WebPagesSheet(Overlay):
         access, table = self.access, self.table
         self.tabs.changed.connect(lambda _tab: self.refresh())
         self.switch.clicked.connect(
-            lambda on: self._apply(partial(self._web.set_protocol_enabled, self._tab, on=on))
+            lambda on: self._apply(partial(self._web.set_protocol_enabled, self._selected_protocol, on=on))
         )
         self.other_port.clicked.connect(lambda: self._apply(self._web.use_free_port))
-        access.copy_address.connect(self._copy_address)
-        access.copy_token.connect(lambda: self._copy(self._web.token, _("Copied the token")))
+        access.copy_address_requested.connect(self._copy_address)
+        access.copy_token_requested.connect(lambda: self._copy(self._web.token, _("Copied the token")))
         access.new_token_requested.connect(self._replace_token)
         access.open_to.selected.connect(lambda host: self._apply(partial(self._web.listen_on, host)))
         self.permissions.robots.changed.connect(self.refresh)
-        self.permissions.origins.settled.connect(self.refresh)
+        self.permissions.origins.editing_finished.connect(self.refresh)
         table.disconnect_requested.connect(self._disconnect)
-        table.copied.connect(lambda text: self._copy(text, _("Copied {text}").format(text=text)))
+        table.copy_requested.connect(lambda text: self._copy(text, _("Copied {text}").format(text=text)))
         self.notice.fix_requested.connect(self._fix_notice)
         self.notice.dismissed.connect(self._dismiss)
         self.copy_command.clicked.connect(
@@ -215,7 +215,7 @@ class WebPagesSheet(Overlay):
 
     def preferred_size(self, room: QSize) -> QSize:
         least = self._inside.minimumSizeHint().width() + _SCROLL_BAR
-        return QSize(min(room.width(), max(round(self.theme.scaled(WIDE)), least)), room.height())
+        return QSize(min(room.width(), max(round(self.theme.scaled(WIDTH)), least)), room.height())
 
     def _geometry_at(self, top: int) -> QRect:
         window = self.covered_window()
@@ -238,7 +238,7 @@ class WebPagesSheet(Overlay):
     def open(self) -> None:
         """Open the sheet and update it until it is closed."""
         self.access.open_to.set_addresses(self._web.addresses(), self._web.host)
-        if self._tab not in self._web.protocols and self._web.protocols:
+        if self._selected_protocol not in self._web.protocols and self._web.protocols:
             self.tabs.set_value(next(iter(self._web.protocols)))
         self.refresh()
         self._timer.start()
@@ -246,12 +246,12 @@ class WebPagesSheet(Overlay):
         self._scrim.hide()
 
     @property
-    def _tab(self) -> WebProtocol:
+    def _selected_protocol(self) -> WebProtocol:
         return "foxglove" if self.tabs.value == "foxglove" else "rosbridge"
 
     def refresh(self) -> None:
         """Update the sheet to the state of the server and the connected pages."""
-        web, is_foxglove = self._web, self._tab == "foxglove"
+        web, is_foxglove = self._web, self._selected_protocol == "foxglove"
         web.refresh()
         self._show_switch()
         self.access.show_state(is_foxglove=is_foxglove)
@@ -261,16 +261,16 @@ class WebPagesSheet(Overlay):
         self.command.setText(terminal_command(web))
         self.copy_page.set_label(_("Copy the link") if is_foxglove else _("Copy a starter page"))
         paint.show_when(self.test_page, not is_foxglove)
-        self._order_tabs()
+        self._set_tab_order()
         self.test_page.setEnabled(web.state == "on")
 
     def _show_switch(self) -> None:
-        web, is_foxglove = self._web, self._tab == "foxglove"
+        web, is_foxglove = self._web, self._selected_protocol == "foxglove"
         words = _("Let Foxglove and Lichtblick connect") if is_foxglove else _("Let web pages connect")
         if words != self.switch.text():
             self.switch.set_text(words)
             self.switch.updateGeometry()
-        self.switch.setChecked(self._tab in web.protocols)
+        self.switch.setChecked(self._selected_protocol in web.protocols)
         for protocol in ("rosbridge", "foxglove"):
             self.tabs.set_dot(protocol, protocol in web.protocols and web.state == "on")
         quiet = "" if is_foxglove else _("Always off when Studio starts")
@@ -286,7 +286,7 @@ class WebPagesSheet(Overlay):
 
     def _show_pages(self) -> None:
         web = self._web
-        listed, count = web.listed, len(web.connected)
+        listed, count = web.listed_pages, len(web.connected)
         self.model.show_pages([sorted_topics(each) for each in listed])
         words = ngettext("{count} connected", "{count} connected", count).format(count=group_digits(count))
         self.count.set(words if count else "", "ok")
@@ -306,7 +306,7 @@ class WebPagesSheet(Overlay):
             words = _("Let web pages connect to see them here.")
         self.empty.setText(words)
 
-    def _order_tabs(self) -> None:
+    def _set_tab_order(self) -> None:
         # Sets the tab order to the reading order; Qt would append widgets that are created later.
         access, origins = self.access, self.permissions.origins
         parts = (
@@ -332,7 +332,7 @@ class WebPagesSheet(Overlay):
         self._copy(self._web.url, _("Copied the address"))
 
     def _copy_page(self) -> None:
-        if self._tab == "foxglove":
+        if self._selected_protocol == "foxglove":
             self._copy(self._web.full_url, _("Copied the link"))
         else:
             words = _("Copied a starter page. Paste it into a file such as page.html.")
@@ -340,7 +340,7 @@ class WebPagesSheet(Overlay):
 
     def _replace_token(self) -> None:
         web, before = self._web, self._web.token
-        count = web.new_token()
+        count = web.generate_token()
         self.refresh()
         words = ngettext(
             "New token. {count} page was disconnected.", "New token. {count} pages were disconnected.", count

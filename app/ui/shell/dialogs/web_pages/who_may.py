@@ -20,14 +20,14 @@ from nep.errors import NepError
 from nep.i18n import _, format_list
 
 _FIELD_HEIGHT = 31
-EXAMPLE = "http://192.168.1.20:8080"
+EXAMPLE_ORIGIN = "http://192.168.1.20:8080"
 
 
 class OriginField(TokenField):
     """Token field for allowed origins. Invalid text stays in the field and is shown as an error."""
 
     def __init__(self, theme: Theme, web: WebPages) -> None:
-        super().__init__(theme, _("Origins"), EXAMPLE, _("Add an origin"))
+        super().__init__(theme, _("Origins"), EXAMPLE_ORIGIN, _("Add an origin"))
         self._web = web
         self.is_wrong = False
 
@@ -42,7 +42,7 @@ class OriginField(TokenField):
         self._arrange()
 
     def _on_edited(self, text: str) -> None:
-        self._show_invalid(wrong=False)
+        self._set_invalid(wrong=False)
         if text.strip() and text[-1] in " ,":
             self._end_typing()
         self.changed.emit()
@@ -56,19 +56,19 @@ class OriginField(TokenField):
                 wrong.append(word)
         self.edit.setText(" ".join(wrong))
         self.show_origins(self._web.origins)
-        self._show_invalid(wrong=bool(wrong))
-        self.settled.emit()
+        self._set_invalid(wrong=bool(wrong))
+        self.editing_finished.emit()
 
     def _remove(self, token: Token) -> None:
         self._web.set_origins([each.entry for each in self.tokens if each is not token])
         super()._remove(token)
 
-    def _show_invalid(self, *, wrong: bool) -> None:
+    def _set_invalid(self, *, wrong: bool) -> None:
         self.is_wrong = wrong
         self.set_invalid(wrong)
 
 
-class _Box(QWidget):
+class _ReadOnlyRow(QWidget):
     """Framed row with read-only contents."""
 
     def __init__(self, theme: Theme) -> None:
@@ -101,7 +101,7 @@ class RobotChoice(QWidget):
         self._flow = Flow(self.list, gap=16, row_gap=2)
         self._flow.setContentsMargins(2, 4, 2, 0)
         self._flow.addWidget(self.none)
-        line = _Box(theme)
+        line = _ReadOnlyRow(theme)
         row = QHBoxLayout(line)
         row.setContentsMargins(10, 2, 3, 2)
         row.setSpacing(8)
@@ -186,7 +186,7 @@ class PermissionForm(QWidget):
         grid.setRowMinimumHeight(2, 3)
         self._add_row(3, label(_("Robots"), "body", role="textSecondary"), self.robots, self.robots_state)
         self.origins.changed.connect(self.show_state)
-        self.origins.settled.connect(self.show_state)
+        self.origins.editing_finished.connect(self.show_state)
         theme.changed.connect(self._measure)
         self._measure()
 
@@ -206,7 +206,7 @@ class PermissionForm(QWidget):
         self.origins.show_origins(self._web.origins)
         set_role(self.origins_state, "error" if self.origins.is_wrong else "textTertiary")
         self.origins_state.setText(
-            _("Enter an origin such as {example}.").format(example=EXAMPLE)
+            _("Enter an origin such as {example}.").format(example=EXAMPLE_ORIGIN)
             if self.origins.is_wrong
             else _("Pages from other origins are blocked. Programs need only the token.")
         )
