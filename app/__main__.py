@@ -2,7 +2,7 @@
 
 ``python -m app [FILE ...]`` opens the window; ``python -m app run FILE`` runs a behaviour without it. A
 frozen build also starts its child processes from the same executable: ``--child`` runs a program, ``--module
-NAME`` runs one of `PROCESSES`.
+NAME`` runs one of `CHILD_MODULES`.
 """
 
 from __future__ import annotations
@@ -243,7 +243,7 @@ def run_child_module(module: str, arguments: Sequence[str]) -> int:
     """Run a module as ``__main__`` in this process and return the exit code.
 
     Args:
-        module: One of `PROCESSES`; for any other module, the exit code is 2.
+        module: One of `CHILD_MODULES`; for any other module, the exit code is 2.
         arguments: Command-line arguments of the module.
     """
     if module not in CHILD_MODULES:

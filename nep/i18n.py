@@ -166,7 +166,7 @@ def install(wanted: str, folder: Path = LOCALE_FOLDER) -> _Catalogue:
 def set_initial_language(chosen: str = "") -> None:
     """Set the language at program start: NEP_LANG, else `chosen`, else the system's language.
 
-    The system's language is used only if enough of it is translated (`MIN_SHARE`). Child processes
+    The system's language is used only if enough of it is translated (`MIN_TRANSLATED_SHARE`). Child processes
     inherit the language through the environment, and argparse's own messages use it, too.
     """
     install(os.environ.get(LANG_VARIABLE) or chosen or _supported_system_language())

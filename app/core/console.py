@@ -66,7 +66,7 @@ class Console:
         return self._lines  # type: ignore[return-value]  # all entries are decoded
 
     def add(self, level: str, origin: str, text: str) -> None:
-        """Append a record. Text longer than `TEXT_LIMIT` is shortened."""
+        """Append a record. Text longer than `MAX_TEXT_LENGTH` is shortened."""
         self._append([ConsoleRecord(self._clock(), level, origin, _truncate(text))])
 
     def add_messages(self, messages: Sequence[Message], dropped: int = 0) -> None:

@@ -201,7 +201,7 @@ class _Fault:
 
     Attributes:
         message: Error message for the user.
-        last_s: Time of the last failure.
+        last_failure_s: Time of the last failure.
         has_recovered: True if the step has succeeded since the last failure.
     """
 

@@ -325,7 +325,7 @@ def run(options: Options) -> int:
 
     Returns:
         The exit code: 0 on success, 1 if an unattended run failed, 2 if no window can be opened, or
-        `RESTART`.
+        `RESTART_EXIT_CODE`.
     """
     move_old_versions()
     meeting_place = single_instance.socket_name(home())

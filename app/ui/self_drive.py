@@ -31,7 +31,7 @@ class Step:
         expected: Description of the expected result.
         action: Performs the action.
         is_visible: Returns True once the result is visible.
-        within_s: Time limit in s.
+        timeout_s: Time limit in s.
         picture: File name of the screenshot without extension, or "" for none.
         settle_s: Pause in s between the result and the screenshot.
         failure_reason: Returns the reason if the result can't occur any more, which fails the step, or

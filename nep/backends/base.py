@@ -105,7 +105,7 @@ class Wakeable(Protocol):
 
 
 class PublishHooks(NamedTuple):
-    """Arguments of `SupportsQuickPublish.quick_publish`.
+    """Arguments of `SupportsFastPublish.fast_publish_function`.
 
     Attributes:
         owner: Publisher that is checked for closing; after it is closed, calls go to `fallback`.
@@ -315,7 +315,7 @@ class Backend:
         master: Converts a node's `master` argument (None for the default) to `Hybrid.master`. Raises
             `NepError` for an invalid address.
         codec_for: Returns the codec for a publisher's message type.
-        codec_of_calls: Returns the codec for a client's calls. Only for back ends with typed services.
+        call_codec_for: Returns the codec for a client's calls. Only for back ends with typed services.
         qos: Names of the QoS profiles.
         has_history: True if publishers can store more than the newest message for late subscribers.
         has_patterns: True if subscribers accept topics with wildcards.

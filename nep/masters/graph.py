@@ -151,7 +151,7 @@ class Graph:
     def apply(
         self, request: Request, call: int, now: float, sender: str, *, is_foreign: bool = False
     ) -> tuple[OutgoingMessage, ...]:
-        """Execute a request and return the messages to send. Errors become a `Refused` reply.
+        """Execute a request and return the messages to send. Errors become a `RejectedReply` reply.
 
         Args:
             request: The request.

@@ -120,7 +120,7 @@ class RawRenewal(NamedTuple):
 
 
 def is_renewal(body: bytes) -> bool:
-    """Return True if a body begins like a renewal of nep, so that `read_renewal` can probably parse it."""
+    """Return True if a body begins like a renewal of nep, so that `parse_renewal` can probably parse it."""
     return body.startswith(_RENEWAL_PREFIX)
 
 
@@ -174,7 +174,7 @@ def encode_renewed(
     times: tuple[int, ...] = (),
     clocks: Mapping[str, tuple[int, int]] | None = None,
 ) -> bytes:
-    """Encode a `Renewed` reply without changed topics.
+    """Encode a `RenewedReply` reply without changed topics.
 
     Args:
         call: Number of the request.

@@ -141,7 +141,7 @@ class Master:
         return True
 
     def submit(self, request: Request, timeout_s: float = 2.0) -> Reply:
-        """Execute a request of this process and return the reply, which may be `Refused`.
+        """Execute a request of this process and return the reply, which may be `RejectedReply`.
 
         Callable from any thread except the master's.
 

@@ -47,7 +47,7 @@ _ENDPOINT_PATTERN = re.compile(
 _NANOMSG_ENDPOINT_PATTERN = re.compile(r"nanomsg://[A-Za-z0-9._-]{1,253}:(\d{1,5})/(\d{1,5})", re.ASCII)
 
 _MAX_UNCONNECTED_NODES = 100
-"""Maximum number of ids in `RegisteredNode.hung_for`."""
+"""Maximum number of ids in `RegisteredNode.unconnected_node_ids`."""
 _MAX_CORES = 100_000.0
 _MAX_PROBLEM_LENGTH = 500
 """Maximum length in characters of a problem that a node reports."""
@@ -104,12 +104,12 @@ class RegisteredNode:
     Attributes:
         node: Record of the node.
         renewed_at: Time of the last renewal.
-        renew_s: Requested interval in seconds between the last and the next renewal.
+        renew_interval_s: Requested interval in seconds between the last and the next renewal.
         is_managed: True for a node without a lease, whose end an attachment reports.
         route: Connection over which the node sends requests; "" for nodes of attachments.
         publishers: Publishers by id.
         subscribers: Subscribers by id.
-        hung_for: Ids of nodes to whose publishers this node's subscribers did not connect.
+        unconnected_node_ids: Ids of nodes to whose publishers this node's subscribers did not connect.
         cpu_ratio: CPU usage of the node's process (1.0 is one core), or None if unknown.
         sources: Publishers that the node's subscribers receive, cached by `Registry.sources_of`.
         sources_version: Version of `sources` and `remote_nodes`.

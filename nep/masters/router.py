@@ -128,7 +128,7 @@ class MasterRouter:
     def send(self, to: bytes, body: bytes) -> bool:
         """Send a body; return False if the receiver has no connection.
 
-        A large body is dropped while the receiver has more than `UNREAD_MAX_BYTES` of unread large
+        A large body is dropped while the receiver has more than `MAX_UNREAD_BYTES` of unread large
         bodies.
         """
         try:

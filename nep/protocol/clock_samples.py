@@ -13,7 +13,7 @@ _MAX_SAMPLES = 8
 """Maximum number of stored samples; the sample with the shortest round trip determines the offset."""
 _MIN_STEP_NS = 50_000
 _SLEW_DIVISOR = 2_000
-"""Reciprocal of the fastest clock slew. A larger change (plus `_STEP_NS`) is treated as a step."""
+"""Reciprocal of the fastest clock slew. A larger change (plus `_MIN_STEP_NS`) is treated as a step."""
 
 
 class Moment(NamedTuple):
@@ -22,7 +22,7 @@ class Moment(NamedTuple):
     Attributes:
         wall_ns: Clock of message time stamps, in nanoseconds since 1970.
         steady_ns: Monotonic clock in nanoseconds: the middle of two readings.
-        slack_ns: Uncertainty (±) of `steady_ns`.
+        uncertainty_ns: Uncertainty (±) of `steady_ns`.
     """
 
     wall_ns: int

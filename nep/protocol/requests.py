@@ -25,7 +25,7 @@ RENEW_INTERVAL_S = 1.0
 
 
 def clamp_count(value: int) -> int:
-    """Clamp a received counter to 0 … `COUNT_MAX`."""
+    """Clamp a received counter to 0 … `MAX_COUNT`."""
     return value if 0 <= value <= MAX_COUNT else 0 if value < 0 else MAX_COUNT
 
 
@@ -223,7 +223,7 @@ class Join:
 
 @dataclass(frozen=True)
 class AddPublisher:
-    """Request to register a publisher, and its node if unknown. Reply: `Added`."""
+    """Request to register a publisher, and its node if unknown. Reply: `AddedReply`."""
 
     node: NodeRecord
     publisher: PublisherRecord
@@ -231,7 +231,7 @@ class AddPublisher:
 
 @dataclass(frozen=True)
 class AddSubscriber:
-    """Request to register a subscriber, and its node if unknown. Reply: `Found`."""
+    """Request to register a subscriber, and its node if unknown. Reply: `FoundReply`."""
 
     node: NodeRecord
     subscriber: SubscriberRecord
@@ -269,7 +269,7 @@ class Leave:
 
 @dataclass(frozen=True)
 class Renew:
-    """Request to renew a lease, with statistics. Reply: `Renewed`.
+    """Request to renew a lease, with statistics. Reply: `RenewedReply`.
 
     Attributes:
         node_id: Id of the node.
@@ -324,7 +324,7 @@ class ReportAlerts:
 
 @dataclass(frozen=True)
 class Listen:
-    """Request to serve other computers. Reply: `Done`. Rejected if sent from another computer.
+    """Request to serve other computers. Reply: `DoneReply`. Rejected if sent from another computer.
 
     Attributes:
         hosts: Addresses of the master's computer; empty to serve only this computer.
@@ -340,7 +340,7 @@ class QueryGraph:
 
 @dataclass(frozen=True)
 class Ping:
-    """Request to check that a master is running. Reply: `Done`."""
+    """Request to check that a master is running. Reply: `DoneReply`."""
 
 
 Request = (

@@ -45,7 +45,7 @@ _ERROR_PREFIX = b'{"nep_error":'
 
 
 class CallKind(IntEnum):
-    """Kind of a service frame. `REFUSED` is the reply to a call that the server did not execute."""
+    """Kind of a service frame. `REJECTED` is the reply to a call that the server did not execute."""
 
     CALL = 1
     REPLY = 2

@@ -106,7 +106,7 @@ def encode_form(codec: int, flags: int) -> int:
 
 
 pack_header: Callable[[int, int, int, int, int], bytes] = _FAST_HEADER.pack
-"""Fast encoder for a header: (form, size, seq, stamp_ns, publisher). Sizes above `SIZE_MAX` are sent as 0."""
+"""Fast encoder for a header: (form, size, seq, stamp_ns, publisher). Sizes above `MAX_SIZE` are sent as 0."""
 unpack_header: Callable[[bytes], tuple[int, int, int, int, int]] = _FAST_HEADER.unpack
 """Fast decoder for a header, without validation: (form, size, seq, stamp_ns, publisher).
 
@@ -173,9 +173,9 @@ class Hello(NamedTuple):
     Attributes:
         subscriber: Id of the subscriber.
         topic: Name of the topic.
-        one_part: True if the subscriber reads messages of one part.
+        reads_one_part: True if the subscriber reads messages of one part.
         acknowledges: True if the subscriber acknowledges echoes.
-        batches: True if the subscriber reads batches.
+        reads_batches: True if the subscriber reads batches.
     """
 
     subscriber: int

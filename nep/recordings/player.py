@@ -48,7 +48,7 @@ SPEED_MIN, SPEED_MAX = 0.1, 10.0
 _MAX_LAG_S = 0.25
 """Maximum delay in seconds that a slow sink may cause.
 
-When it is exceeded, playback slows down (see `PlayerStatus.true_speed`) instead of catching up with a
+When it is exceeded, playback slows down (see `PlayerStatus.measured_speed`) instead of catching up with a
 burst.
 """
 _MAX_BATCH = 2_000
@@ -69,7 +69,7 @@ class PlayerStatus:
         is_playing: True while playing.
         is_at_end: True if the position is at the end of the selected part or of the recording.
         speed: Requested speed factor.
-        true_speed: Measured speed factor over the last second; None while paused or unknown.
+        measured_speed: Measured speed factor over the last second; None while paused or unknown.
         loop: Start and end of the selected part in ns since 1970; None for the whole recording.
         is_looping: True if the part is repeated.
     """

@@ -66,7 +66,7 @@ class RepairReport:
         lost_s: Time in seconds between the last recovered message and the end of the recording, as far as
             known.
         duration_s: Duration of the new file in seconds.
-        damaged_range_count: Number of damaged places in the old file.
+        corrupt_range_count: Number of damaged places in the old file.
     """
 
     path: Path

@@ -94,7 +94,7 @@ def test_blocks_dragged_with_the_mouse_run_on_the_robot(studio: Studio, address:
         until(lambda: (pose.listen()[1] or {}).get("theta", 0) != 0, "the robot turns")
         studio.click("Stop", kind="StopButton")
         studio.says("Pepper stopped (")
-        proof = studio.find(kind="StopResult")
+        proof = studio.find(kind="StopResultLabel")
         until(lambda: green(studio.picture(proof)), "the result of the stop stands on green")
         answered = until(lambda: _stops(answers), "the robot answers the stop")
         assert {answer["state"] for answer in answered} <= {"accepted", "succeeded"}

@@ -71,7 +71,7 @@ def test_f5_and_the_run_button_restart_the_program(turning: Studio) -> None:
 
 def test_edit_during_a_run_shows_when_it_applies(turning: Studio) -> None:
     (first,) = programs(turning)
-    assert not turning.all(kind="StateText", name=LATER)
+    assert not turning.all(kind="RunStateLabel", name=LATER)
     turning.point("[data-id='text Round and round'] .blocklyInputField", dx=10, dy=10)
     turning.screen.type("Hello")
     turning.screen.key("Return")

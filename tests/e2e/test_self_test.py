@@ -21,7 +21,7 @@ NO_ROBOT = """
 import sys
 from app.core.robots import launcher
 from app.__main__ import main
-launcher.VIRTUAL_ROBOTS["pepper"] = "app.robots.nobody"
+launcher.VIRTUAL_ROBOT_MODULES["pepper"] = "app.robots.nobody"
 sys.exit(main(sys.argv[1:]))
 """
 NO_WEB = """

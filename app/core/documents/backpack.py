@@ -60,7 +60,7 @@ class _Content(NamedTuple):
 
     Attributes:
         items: Stacks that this version can read.
-        unknown: Entries that this version can't read; written back unchanged.
+        unknown_entries: Entries that this version can't read; written back unchanged.
     """
 
     items: tuple[BackpackStack, ...] = ()

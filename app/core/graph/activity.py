@@ -48,7 +48,7 @@ class QuietNodes:
                 self._counted[entry] = total, now if moved or had is None else had[1]
 
     def quiet_keys(self, now: float) -> frozenset[str]:
-        """Return the keys of the nodes without a message or call in the last `QUIET_S` seconds."""
+        """Return the keys of the nodes without a message or call in the last `QUIET_TIMEOUT_S` seconds."""
         return frozenset(
             entry for entry, (_total, since) in self._counted.items() if now - since >= QUIET_TIMEOUT_S
         )

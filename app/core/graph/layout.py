@@ -52,7 +52,7 @@ class LayoutSizes:
         header: Height of a group's header.
         side_margin: Margin between a group's border and its nodes.
         footer: Height of the text about hidden quiet nodes at the bottom of a group.
-        letter_width: Average width of a character.
+        char_width: Average width of a character.
     """
 
     node: Position = (152.0, 48.0)
@@ -83,7 +83,7 @@ class GraphLayout:
         routes: Points of each route, from the edge of the source box to the edge of the target box.
         saved_positions: Last positions of nodes that left, by key, oldest first.
         omitted_routes: Number of omitted routes.
-        is_plain: True if graphlay failed and the boxes are arranged in rows.
+        is_fallback: True if graphlay failed and the boxes are arranged in rows.
     """
 
     positions: Mapping[str, Position] = field(default_factory=dict)

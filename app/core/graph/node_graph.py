@@ -64,8 +64,9 @@ class GraphOptions:
     """Options of the drawing.
 
     Attributes:
-        quiet: Keys of the nodes without traffic.
-        hides_quiet: True if quiet nodes are hidden, except in the groups of `quiet_visible_groups`.
+        quiet_nodes: Keys of the nodes without traffic.
+        hides_quiet: True if quiet nodes are hidden, except in the groups of
+            `groups_with_visible_quiet_nodes`.
         starts_collapsed: True if all groups are collapsed except the groups in `toggled`; False if only
             the groups in `toggled` are collapsed.
     """

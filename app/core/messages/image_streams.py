@@ -55,7 +55,7 @@ class ImageStream:
         picture: Newest decoded image; None before the first image.
         error: Reason why the newest message can't be decoded, or None.
         is_frozen: True if the image is frozen; arriving images are counted but not decoded.
-        is_awaiting_picture: True from opening or `suspend` until the next image arrives.
+        is_awaiting_image: True from opening or `suspend` until the next image arrives.
     """
 
     topic: str

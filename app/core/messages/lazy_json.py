@@ -83,7 +83,7 @@ class JsonIndex:
     def value(self, start: int, end: int, level: int) -> object:
         """Return the value between two positions of the text.
 
-        Objects and arrays are returned as `LazyObject` and `LazyList`, invalid JSON as `Unreadable`.
+        Objects and arrays are returned as `LazyObject` and `LazyList`, invalid JSON as `UnreadableValue`.
 
         Args:
             start: Position of the first character.

@@ -53,7 +53,7 @@ class QueryResult:
     """Result of a query.
 
     Attributes:
-        found: Found values, by path.
+        values: Found values, by path.
         cut: Reason why the result is incomplete, or "".
     """
 

@@ -31,14 +31,14 @@ SOME, SOME_BYTES = 256, 64_000
 
 @dataclass(slots=True)
 class CheckResult:
-    """Result of the checks of one topic since the last call of `Checks.pop_results`.
+    """Result of the checks of one topic since the last call of `DecodeChecker.pop_results`.
 
     Attributes:
         checked: Number of checked messages.
-        bad: Number of checked messages that can't be decoded.
-        unchecked: Number of messages that were not checked for lack of time.
+        bad_count: Number of checked messages that can't be decoded.
+        unchecked_count: Number of messages that were not checked for lack of time.
         error: Description of the newest error, or "".
-        is_last_good: True if the newest message can be decoded.
+        is_newest_readable: True if the newest message can be decoded.
     """
 
     checked: int = 0

@@ -43,7 +43,7 @@ class DrainResult:
     Attributes:
         batches: New messages by topic.
         events: New events, oldest first.
-        lost_events: Number of events that were lost because the queue was full.
+        lost_event_count: Number of events that were lost because the queue was full.
     """
 
     batches: dict[str, Batch]

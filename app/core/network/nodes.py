@@ -19,8 +19,8 @@ class NodeEntry:
     """One node of a network. Unknown values are None or empty.
 
     Attributes:
-        publishes: Names of published topics, sorted and unique.
-        subscribes: Names of subscribed topics and patterns, sorted and unique.
+        published_topics: Names of published topics, sorted and unique.
+        subscribed_topics: Names of subscribed topics and patterns, sorted and unique.
         cpu_ratio: CPU time of the process as a share of one core.
         gone_s: Seconds since the node left; None while the node is registered. Its topics are still
             listed.

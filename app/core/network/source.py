@@ -47,7 +47,7 @@ class GraphReceived:
 
     Attributes:
         view: New graph.
-        query_s: Duration of the query in seconds.
+        query_duration_s: Duration of the query in seconds.
     """
 
     view: GraphView
@@ -87,7 +87,7 @@ class JobFailed:
     """Event: a job on the network failed.
 
     Attributes:
-        what: Sentence for the report, see `Source.submit`.
+        message_template: Sentence for the report, see `Source.submit`.
         message: Reason for the failure.
     """
 

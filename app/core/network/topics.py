@@ -172,7 +172,7 @@ class Topics:
         """Apply a new graph at ``now`` (monotonic seconds).
 
         If no node or topic has changed, only the statistics are updated. The statistics of more than
-        `BATCH_SIZE` topics are updated in parts, by `update_ages`.
+        `MAX_TOPICS_PER_UPDATE` topics are updated in parts, by `update_ages`.
         """
         seen = (view.epoch, view.revision)
         self._clocks = self._clock_offsets(view)
@@ -261,7 +261,7 @@ class Topics:
     def update_ages(self, now: float, now_ns: int) -> None:
         """Update the ages of topics, and remove topics that vanished more than `GONE_DISPLAY_S` seconds ago.
 
-        Each call processes at most `BATCH_SIZE` topics and updates their statistics.
+        Each call processes at most `MAX_TOPICS_PER_UPDATE` topics and updates their statistics.
 
         Args:
             now: Monotonic seconds.

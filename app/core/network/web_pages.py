@@ -349,7 +349,7 @@ class WebPages:
             self._apply_settings()  # apply changes made during the start
 
     def refresh(self) -> None:
-        """Update `connected` and `listed` from the running server."""
+        """Update `connected` and `listed_pages` from the running server."""
         self._list.update(self.pages, self._clock())
 
     def check(self) -> None:

@@ -21,10 +21,10 @@ class NetworkKind:
         name: Name of nep's back end.
         product_name: Product name.
         address_label: Label of the address field (a `lazy` text).
-        example: Default address.
+        default_address: Default address.
         hint: Advice for the user (a `lazy` text).
         reports_stats: True if the nodes report rates, losses and CPU use.
-        codec: Returns the codec of a topic, if the codec in the graph is too general.
+        codec_of: Returns the codec of a topic, if the codec in the graph is too general.
         readable_type_of: Returns the message type for a subscription.
         qos: Quality of service that is compatible with most publishers.
     """

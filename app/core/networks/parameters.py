@@ -47,7 +47,7 @@ class ReportedParameter:
         minimum: Lower limit of a number, or None.
         maximum: Upper limit of a number, or None.
         choices: Allowed values; empty if any value is allowed.
-        read_only: True if only the node itself can set the parameter.
+        is_read_only: True if only the node itself can set the parameter.
         text: Value as editable text.
     """
 
@@ -292,7 +292,7 @@ def parse_value(text: str, kind: str) -> object:
 
     Args:
         text: Text that the user entered.
-        kind: Kind of the parameter, see `ShownParameter`.
+        kind: Kind of the parameter, see `ReportedParameter`.
     """
     if kind == "str":
         return text

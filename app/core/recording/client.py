@@ -80,14 +80,14 @@ class RecorderState:
     Attributes:
         phase: "" (idle), "starting", "recording" or "ending".
         lost: Number of lost messages, determined from sequence numbers.
-        unwritten: Number of messages that could not be written.
+        unwritten_count: Number of messages that could not be written.
         free_bytes: Free space on the disk; None while unknown.
         ring_s: Duration of the flight recorder's content in seconds; None while the flight recorder is
             off.
         ring_bytes: Size of the flight recorder's content.
-        saving: Files that are being saved from the flight recorder.
+        pending_saves: Files that are being saved from the flight recorder.
         last: Last finished file.
-        limit: Limit that ended this file: "time", "size", or "" if it was stopped.
+        reached_limit: Limit that ended this file: "time", "size", or "" if it was stopped.
     """
 
     phase: str = ""

@@ -35,7 +35,7 @@ class SendEvent(Protocol):
 class RecordedEvents:
     """Publisher of run and alarm events for the recorder. Not thread-safe; use it from the main thread.
 
-    Active runs and alarms are sent again by `repeat`: once to a recording that starts later, and every
+    Active runs and alarms are sent again by `resend`: once to a recording that starts later, and every
     second to the flight recorder, so that each saved part contains them. Otherwise only changes are
     sent.
     """

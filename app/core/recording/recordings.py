@@ -263,7 +263,7 @@ class SessionRecordings:
         """Restart a recorder process that ended unexpectedly, and repeat active events.
 
         Called once a second. Active runs and alarms are sent to the flight recorder again, see
-        `RecordedEvents.repeat`.
+        `RecordedEvents.resend`.
         """
         self.client.check()
         self.events.resend("ring")

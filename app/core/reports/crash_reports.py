@@ -53,7 +53,7 @@ class CrashReport:
     Attributes:
         path: File of the report.
         part: Part of Studio that crashed.
-        noticed_s: Time when the crash was detected, in seconds since 1970.
+        detected_s: Time when the crash was detected, in seconds since 1970.
         is_new: True until the report has been offered to the user.
     """
 

@@ -74,7 +74,7 @@ class ReportParts:
     """Sources of a report.
 
     Attributes:
-        facts: Information that only the window has, such as the version of Qt and the screen.
+        info: Information that only the window has, such as the version of Qt and the screen.
         settings: Current settings.
         doctor: Returns the findings of the connection doctor; may take some seconds.
         log: Folder of the log files.

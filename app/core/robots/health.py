@@ -36,8 +36,8 @@ class _BadTopic:
 
     Attributes:
         count: Number of undecodable messages.
-        unchecked: Number of messages that were not checked.
-        since: Time of the last error (monotonic seconds).
+        unchecked_count: Number of messages that were not checked.
+        last_error_s: Time of the last error (monotonic seconds).
         has_recovered: True if all messages received since the last error can be decoded.
     """
 

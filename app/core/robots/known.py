@@ -22,7 +22,7 @@ class KnownRobot:
     """Real robot that is or was connected.
 
     Attributes:
-        seen_s: Time of the last connection in seconds since 1970.
+        last_connected_s: Time of the last connection in seconds since 1970.
     """
 
     name: str

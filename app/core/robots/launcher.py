@@ -180,7 +180,7 @@ class Launcher:
         """Request the start of a virtual robot, unless a robot with this name is listed.
 
         Robots started by other Studios count as well. The request is valid for some seconds;
-        `start_requested`
+        `start_requested_robots`
         starts the robot as soon as the graph shows that no such robot is listed, or immediately if this
         Studio started the master.
         """
@@ -331,7 +331,7 @@ class VirtualProcesses:
 
         This applies to Studio's own process, to its child processes (or a child of one, as in a frozen
         build), and to processes of the same user on this computer that run a module of
-        `VIRTUAL_ROBOTS`.
+        `VIRTUAL_ROBOT_MODULES`.
         """
         if identity.pid is None or identity.host != platform.node():
             return False

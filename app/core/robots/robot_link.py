@@ -43,8 +43,8 @@ class Invocation:
 
     Attributes:
         state: State in the robot's last reply; "sent" before the first reply.
-        waits_for: Actions that must end before this one starts, while the state is "accepted".
-        replaces: Actions that were cancelled by this one.
+        awaited_actions: Actions that must end before this one starts, while the state is "accepted".
+        replaced_actions: Actions that were cancelled by this one.
         timeout_s: Time limit in seconds, measured from the start of execution; None for no limit.
         sent_at_s: Time of sending in seconds since 1970.
     """
@@ -92,18 +92,18 @@ class RobotLink:
         past_invocations: Last manual invocations, newest last.
         is_unresponsive: True if the robot did not reply to a command.
         last_contact_s: Time of the last reply of the robot or of the last command to it, whichever is later.
-        replied_s: Time of the last reply; None before the first reply.
+        last_reply_s: Time of the last reply; None before the first reply.
         gone_s: Time of the disconnection; None while connected.
         stop_problem: Reason why the last Stop is not confirmed, such as "Arm may still move: the brake
             does not answer"; "" if it is confirmed.
         unended_actions: Message of the robot about actions that it could not end, or "".
         motion_warning: Reason why the robot may be moving although it doesn't reply (`MovedRobots`), or "".
-        has_proven_stop: True if the robot's program has ever confirmed a Stop.
-        stop_began_s: Time of a Stop that the robot has not replied to, or None.
+        has_confirmed_stop: True if the robot's program has ever confirmed a Stop.
+        pending_stop_start_s: Time of a Stop that the robot has not replied to, or None.
         is_stopping: True if such a Stop takes long enough to be shown.
         is_reachable: True if a Stop sent now would reach the robot.
         identity: Program of the robot.
-        topics_before: Topics of the robot's earlier descriptions.
+        earlier_topics: Topics of the robot's earlier descriptions.
         rejected: Number of messages that the robot's driver rejected.
         errors: Number of exceptions that the robot's driver caught.
         was_real: True if the robot was not virtual at any time.

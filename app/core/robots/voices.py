@@ -91,7 +91,7 @@ class RobotSound:
     Attributes:
         speech: Text that the robot is speaking, or "".
         spoken_fraction: Progress of the speech, 0 to 1.
-        sound: Serial number of the sound.
+        sound_number: Serial number of the sound.
         played_fraction: Progress of the sound, 0 to 1.
         notes: Tones of the sound.
     """

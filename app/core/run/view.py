@@ -32,7 +32,7 @@ class RunState:
         is_started: True if the scripts run and receive events; the process starts some tenths of a second
             earlier.
         paused_s: Total duration of all pauses.
-        pause_began_s: Start of the current pause, or None.
+        pause_start_s: Start of the current pause, or None.
         is_stop_repeated: True if the previous Stop is not proven.
         is_restarting: True if a program will start once this Stop is proven.
         is_edited: True if the behaviour differs from the running program.

@@ -32,7 +32,7 @@ class RequestedRun:
 
     Attributes:
         document: Behaviour to run.
-        paused: True to pause before the first block.
+        starts_paused: True to pause before the first block.
         stack: Stack to run; None for the whole behaviour.
     """
 

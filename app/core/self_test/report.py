@@ -31,9 +31,9 @@ class StepReport:
     Attributes:
         description: Expectation.
         timeout_s: Time limit in seconds.
-        began_ms: Start of the step.
-        ended_ms: Duration; None while the step is in progress.
-        ok: True if the step succeeded.
+        start_ms: Start of the step.
+        duration_ms: Duration; None while the step is in progress.
+        is_ok: True if the step succeeded.
         details: Details of the result.
     """
 

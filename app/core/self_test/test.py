@@ -164,7 +164,7 @@ def command(process: psutil.Process) -> list[str]:
     """Return the command line of a process; empty if the process has exited."""
     try:
         return process.cmdline()
-    except (psutil.Error, OSError):  # see `is_web`
+    except (psutil.Error, OSError):  # see `is_web_process`
         return []
 
 
@@ -193,7 +193,7 @@ def is_windows_program(process: psutil.Process, root: str = os.environ.get("SYST
     """
     try:
         program = process.exe()
-    except (psutil.Error, OSError):  # not available on every Windows for every process; see `is_web`
+    except (psutil.Error, OSError):  # not available on every Windows for every process; see `is_web_process`
         program = next(iter(command(process)), "")
     return bool(root) and PureWindowsPath(program).is_relative_to(PureWindowsPath(root))
 

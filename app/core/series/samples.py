@@ -97,7 +97,7 @@ class _Pixels:
 
     Attributes:
         keys: Indices of the columns that contain samples.
-        broken: True for each column that follows a gap.
+        gaps: True for each column that follows a gap.
     """
 
     first: float = 0.0

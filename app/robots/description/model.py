@@ -170,8 +170,8 @@ class Robot:
 
     Attributes:
         source: Original document.
-        beat_s: Interval in seconds at which the robot sends heartbeats on its reply topic during actions;
-            None if it sends none.
+        heartbeat_interval_s: Interval in seconds at which the robot sends heartbeats on its reply topic
+            during actions; None if it sends none.
     """
 
     name: str

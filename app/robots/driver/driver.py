@@ -225,7 +225,7 @@ class Driver:
         )
 
     def publish_value(self, leaf: str, value: object) -> None:
-        """Publish a value on a topic that is not in the description; see `Link.tell`."""
+        """Publish a value on a topic that is not in the description; see `Link.publish_value`."""
         topic = topic_of(self.name, leaf)
         if topic not in self._publishers:
             self._open_publisher(topic)

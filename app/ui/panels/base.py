@@ -59,7 +59,7 @@ class PanelContext:
         session: Session that the window shows.
         theme: Theme of the window.
         open_topic: Shows a topic in the panel that fits its message type.
-        toast: Shows a short message that disappears after some seconds.
+        show_toast: Shows a short message that disappears after some seconds.
         run: Runs a command of the window by its id (`app.ui.shell.commands.table`).
         files: Dialogs for opening and saving files.
         focus_question: Gives the keyboard focus to the question of a running behaviour, if there is one.
@@ -143,7 +143,7 @@ class Panel:
         name: Id in saved layouts.
         title: Title, wrapped in `lazy`.
         icon: Name of a Lucide icon.
-        accepts: Codecs of the topics that the panel can show, such as "image", or `ANY_TYPE`.
+        accepted_types: Codecs of the topics that the panel can show, such as "image", or `ANY_TYPE`.
         make: Creates the widget of the panel.
         allows_multiple: True if several panels of this kind can be open, each with its own topic.
     """

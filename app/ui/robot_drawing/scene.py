@@ -34,7 +34,7 @@ class Marks:
     Attributes:
         hovered: Part under the mouse, or None.
         selected: Part selected by keyboard, or None.
-        ink: Colour of the outline.
+        colour: Colour of the outline.
     """
 
     hovered: str | None = None

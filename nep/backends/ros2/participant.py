@@ -73,7 +73,7 @@ class DdsEndpoint:
         type: Name of the DDS type.
         is_latched: True if its durability is not VOLATILE.
         is_reliable: True if its reliability is RELIABLE.
-        announced: Entries of its USER_DATA.
+        user_data: Entries of its USER_DATA.
     """
 
     gid: bytes

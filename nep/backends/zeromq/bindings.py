@@ -119,7 +119,7 @@ class Bindings:
     Args:
         socket: Socket to bind.
         may_be_local: True to bind Unix sockets as well.
-        is_watched: True if the owner itself closes connections that don't respond; see `keep_alive`.
+        is_watched: True if the owner itself closes connections that don't respond; see `enable_keep_alive`.
     """
 
     def __init__(self, socket: Socket, *, may_be_local: bool, is_watched: bool = False) -> None:

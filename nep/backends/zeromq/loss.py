@@ -159,7 +159,7 @@ class PublisherTracker:
     def count_message(self, publisher: int, seq: int, *, is_alone: bool) -> bool:
         """Count a message; return False if it is a duplicate.
 
-        If the gap before a message exceeds `GAP_MAX` and the publisher continues from there, counting
+        If the gap before a message exceeds `MAX_GAP` and the publisher continues from there, counting
         restarts with an unknown number of losses.
 
         Args:
@@ -169,7 +169,7 @@ class PublisherTracker:
                 such messages can be duplicates.
 
         Raises:
-            WireError: The gap before the message exceeds `GAP_MAX`.
+            WireError: The gap before the message exceeds `MAX_GAP`.
         """
         source = self.get(publisher)
         source.has_responded = source.is_connected = True
@@ -198,7 +198,7 @@ class PublisherTracker:
 
         A publisher with a history may process this subscriber's topic filter before its hello. Messages
         sent in between are sent again as part of the history, which precedes the echo. If a publisher sends
-        no echo, its messages are accepted after `EARLY_MESSAGES_S`.
+        no echo, its messages are accepted after `EARLY_MESSAGE_WINDOW_S`.
         """
         source = self.by_id.get(publisher)
         if source is None or source.has_echoed or source.has_responded or source.remote is None:
@@ -214,7 +214,7 @@ class PublisherTracker:
         """Handle an echo or bye, before which all messages up to `seq` were sent on the same connection.
 
         Messages up to `seq` that have not been received are counted as lost. Returns False, and counts
-        nothing, if the gap exceeds `GAP_MAX`.
+        nothing, if the gap exceeds `MAX_GAP`.
         """
         source = self.get(publisher)
         source.has_responded = source.is_connected = True
@@ -283,7 +283,7 @@ class PublisherTracker:
         """Return the ids of publishers to remove.
 
         These are unregistered publishers whose bye is overdue at `now`, and the oldest silent publishers
-        beyond `UNLISTED_MAX`.
+        beyond `MAX_UNLISTED_PUBLISHERS`.
         """
         all_ = self.by_id.items()
         silent = [each for each, source in all_ if source.is_silent and source.bye_deadline is None]

@@ -349,7 +349,7 @@ class MasterSession:
             self._left_at = time.monotonic()
 
     def leave(self, timeout_s: float) -> None:
-        """Wait for the reply to the request of `begin_leave`, until `timeout_s` seconds after it was sent."""
+        """Wait for the reply to the request of `start_leave`, until `timeout_s` seconds after it was sent."""
         if self._leaving is None:
             return
         left = timeout_s + self._left_at - time.monotonic()

@@ -1,7 +1,7 @@
 """Messages published in quick succession, which are sent in one part. Performs no I/O.
 
 A message is sent immediately unless the previous one was published less than `BATCH_WINDOW_NS` ago.
-Otherwise it waits for others until there are `MAX_PENDING`, or until `MAX_DELAY_NS` have passed. See
+Otherwise it waits for others until there are `MAX_PENDING_MESSAGES`, or until `MAX_DELAY_NS` have passed. See
 docs/adr/0009-one-part.md.
 """
 
@@ -147,7 +147,7 @@ class PendingBatch:
         return publish
 
     def pop_batch(self) -> list[tuple[bytes, int]]:
-        """Remove and return up to `BATCH_MAX` pending messages, oldest first.
+        """Remove and return up to `MAX_BATCH_MESSAGES` pending messages, oldest first.
 
         At least one message must be pending.
         """

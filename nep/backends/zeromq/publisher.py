@@ -259,7 +259,7 @@ class NativePublisher(HandshakePublisher):
             self._send_now(data, extension_fields)
 
     def fast_publish_function(self, asked: PublishHooks) -> Callable[..., None]:
-        """Return the fast publish function. See `nep.backends.base.SupportsQuickPublish`."""
+        """Return the fast publish function. See `nep.backends.base.SupportsFastPublish`."""
         return self._batch.publish_function(asked, self, self._lock)
 
     def send_now(self, data: bytes) -> None:

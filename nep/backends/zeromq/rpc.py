@@ -179,7 +179,7 @@ class RpcClient:
         self._send(request, is_waited=False, then=then)
 
     def read(self) -> list[ReceivedMessage]:
-        """Return up to `_READ_MAX` received messages and send pending requests.
+        """Return up to `_MAX_MESSAGES_PER_READ` received messages and send pending requests.
 
         Call only in the I/O thread.
         """

@@ -1,7 +1,7 @@
 """SUB socket and its publishers, which parses messages and notices, and counts losses.
 
 Guarded by its subscriber's lock. Nearly every message directly follows the previous message of its
-publisher and takes a fast path; `CarefulParser` handles all others.
+publisher and takes a fast path; `MessageParser` handles all others.
 """
 
 from __future__ import annotations

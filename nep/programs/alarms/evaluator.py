@@ -67,7 +67,7 @@ class AlarmState:
         phase: "off" (disabled), "faulty" (invalid rule), "waits" (the topic or node was never seen), "well"
             (condition false), "pending" (condition true, but not yet long enough) or "on".
         value: Newest value.
-        on_for_s: Time in seconds since the alarm turned on; 0 if it is off.
+        on_duration_s: Time in seconds since the alarm turned on; 0 if it is off.
         count: Number of times the condition became true since the alarm turned on.
         problem: "missing" if the newest message lacks the field, "no_number" if the field isn't a number,
             "unreadable" if the message can't be decoded, else "".

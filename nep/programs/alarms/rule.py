@@ -92,7 +92,7 @@ class AlarmAction:
         name: Behaviour to run, service to call, or topic to publish on; "" for other kinds.
         payload: Request of the call, or payload of the message.
         msg_type: Message type of the topic.
-        seconds: Length of the saved recording in seconds, for the kind "keep".
+        recording_s: Length of the saved recording in seconds, for the kind "keep".
     """
 
     kind: str

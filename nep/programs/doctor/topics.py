@@ -152,7 +152,7 @@ def _unreachable_finding(each: PublisherFact) -> Finding:
 def _silence_findings(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
     quiet_s = facts.now_s - each.last_message_s if each.last_message_s is not None else None
     if quiet_s is not None and quiet_s < max(MIN_SILENCE_S, facts.listen_duration_s):
-        return  # it sends; `_arrival` reports missing messages
+        return  # it sends; `_arrival_findings` reports missing messages
     if quiet_s is None and each.sent:
         return
     if quiet_s is None or each.last_message_s is None:

@@ -198,8 +198,8 @@ class ProxyPair:
     def forward(self, frame: bytes, data: bytes) -> None:
         """Send a frame that was received on this line to the subscribers of the same line.
 
-        The frame is sent unchanged, unless a subscriber's language requires escaping (`shield_javascript`,
-        `shield_csharp`).
+        The frame is sent unchanged, unless a subscriber's language requires escaping
+        (`escape_for_javascript`, `escape_for_csharp`).
 
         Args:
             frame: Received frame.

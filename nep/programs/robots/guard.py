@@ -42,8 +42,8 @@ _GRAPH_TIMEOUT_S = 0.5
 class MotionGuard:
     """Guard that decides on which topics a program may publish. Thread-safe.
 
-    Call `update_graph` with each new graph. `refusal` is a dictionary look-up unless something has changed.
-    Before the first graph no robots are known, and only the message type and RIZE's topic decide.
+    Call `update_graph` with each new graph. `denial_reason` is a dictionary look-up unless something has
+    changed. Before the first graph no robots are known, and only the message type and RIZE's topic decide.
 
     Args:
         node: Node that subscribes to the robots' descriptions.

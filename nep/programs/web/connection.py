@@ -40,7 +40,7 @@ _ids = itertools.count(1)
 class PageConnection:
     """Base class for the WebSocket connection of a page. Runs in the server's event loop.
 
-    Subclasses implement a protocol: `_frames_of`, `_warn`, `_reject` and `_topic_list`.
+    Subclasses implement a protocol: `_encode_frames`, `_warn`, `_reject` and `_topic_list`.
 
     Args:
         connection: WebSocket connection.

@@ -1,4 +1,4 @@
-"""`OneFile`: destination of a recording in a single file, with checks of the file and its disk."""
+"""`SingleFile`: destination of a recording in a single file, with checks of the file and its disk."""
 
 from __future__ import annotations
 

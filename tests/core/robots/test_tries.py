@@ -105,7 +105,7 @@ def test_trial_fails_two_seconds_after_robot_falls_silent(bench) -> None:
 
 
 def test_trial_on_robot_without_heartbeat_waits_until_the_time_limit(bench) -> None:
-    bench.link.robot = replace(bench.link.robot, beat_s=None)
+    bench.link.robot = replace(bench.link.robot, heartbeat_interval_s=None)
     made = bench.begin()
     bench.answer(made, "running")
     bench.pass_time(59.0)

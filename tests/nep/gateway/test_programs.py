@@ -23,7 +23,7 @@ class FakeProcesses:
     def language(self, pid):
         return "python"
 
-    def is_joined(self, pid, port, *, binds):
+    def is_connected(self, pid, port, *, binds):
         return None if self.is_secret else (pid, port) in self.joined
 
 

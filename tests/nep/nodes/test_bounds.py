@@ -219,7 +219,7 @@ def test_alerts_about_original_nodes_are_escaped_and_bounded() -> None:
 def test_registration_without_connection_is_evicted_first() -> None:
     known = PortMap(None)
     line = TopicLine("t", "bare", "json", "many2many")
-    processes = SimpleNamespace(started=lambda _pid: None, is_joined=lambda *_a, **_k: None)
+    processes = SimpleNamespace(started=lambda _pid: None, is_connected=lambda *_a, **_k: None)
     registry = ProgramTable(known, processes, lambda _line: None)  # type: ignore[arg-type]
     for n in range(3):
         known.add(Registration(line, f"n{n}", "publisher", "json", "A", None, None, None))

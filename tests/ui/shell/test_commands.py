@@ -30,7 +30,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 IDS = {command.id for command in COMMANDS}
 ABOUT = {command.id for command in ARGUMENT_COMMANDS}
-CALLS = {"run": 0, "_run": 0, "bind": 1, "name_command": 1, "Fix": 1, "_raise_alert": 1}
+CALLS = {"run": 0, "_run": 0, "bind": 1, "assign_command": 1, "Fix": 1, "_raise_alert": 1}
 """Calls that are given a command, and the place of it; `setProperty` is one with "command" before it."""
 KEYWORDS = {"action", "fix_action"}
 

@@ -185,7 +185,7 @@ def test_reopening_the_column_menu_of_a_table_leaks_no_objects(window: MainWindo
     window.show()
     dock = opened(window, "topics")
     table = dock.panel.table  # type: ignore[attr-defined]
-    leaves_nothing(window, lambda: table._show_columns(QPoint(5, 5)))
+    leaves_nothing(window, lambda: table._show_column_menu(QPoint(5, 5)))
 
 
 def test_reopening_the_menus_and_submenus_of_the_menu_bar_leaks_no_objects(window: MainWindow) -> None:

@@ -70,7 +70,7 @@ from PySide6.QtWebEngineWidgets import QWebEngineView
 
 application.sendEvent(application, QFileOpenEvent("/a/Early.nepb"))
 taken = []
-application.open_files_with(taken.extend)
+application.set_file_opener(taken.extend)
 application.sendEvent(application, QFileOpenEvent("/a/Late.nepb"))
 try:
     application.installEventFilter(QObject(application))

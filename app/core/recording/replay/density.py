@@ -21,7 +21,7 @@ class Density:
     """Message counts in equal intervals of the range [``start_ns``, ``end_ns``).
 
     Attributes:
-        buckets: Number of intervals.
+        bucket_count: Number of intervals.
         counts: Number of messages in each interval, by topic.
     """
 

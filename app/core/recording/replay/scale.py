@@ -21,7 +21,7 @@ class TimeScale:
     Attributes:
         first_ns: Start of the recording.
         last_ns: End of the recording.
-        begin_ns: Start of the visible range.
+        start_ns: Start of the visible range.
         end_ns: End of the visible range.
     """
 

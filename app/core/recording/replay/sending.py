@@ -60,7 +60,7 @@ class SentTopic:
         publishers: Open publishers, by message type.
         is_ready: True if messages can be sent.
         count: Number of sent messages.
-        skipped: Number of dropped messages.
+        dropped_count: Number of dropped messages.
         problem: Reason why the topic can't be published, or "".
     """
 

@@ -24,7 +24,7 @@ class RecordedSpan:
 
     Attributes:
         name: Name of the behaviour, or the sentence of the alarm.
-        is_over: True if the run or alarm ended within the recording.
+        has_ended: True if the run or alarm ended within the recording.
         result: Result of a run, one of `RESULTS`; "" while unknown.
         details: Details of the result.
         topic: Topic of the alarm, or "".

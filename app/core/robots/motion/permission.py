@@ -40,9 +40,9 @@ class PermissionQuestion:
     """Question to the user about the motion of robots.
 
     Attributes:
-        moves: Titles of the actions that move a robot, by robot.
+        moving_actions: Titles of the actions that move a robot, by robot.
         on_allow: Called if the user allows the motion.
-        strangers: Robots without a readable description, or topics of unknown robots, that would move
+        unknown_robots: Robots without a readable description, or topics of unknown robots, that would move
             too.
         reason: Sentence about the origin of the command, or "" for a command of the user.
     """
@@ -200,7 +200,7 @@ def _unknown_robot_label(name: str) -> str:
 def risky_actions(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
     """Return the quoted titles of the actions that move the robot, without duplicates.
 
-    At most `MAX_NAMED` titles are returned, followed by “more” if there are others.
+    At most `MAX_NAMED_ACTIONS` titles are returned, followed by “more” if there are others.
     """
     found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
     titles = [f"“{title}”" for title in dict.fromkeys(found)]

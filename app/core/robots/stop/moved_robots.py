@@ -20,7 +20,7 @@ from nep.i18n import _, lazy
 OnMoved: TypeAlias = Callable[[Sequence[str], str], object]
 """Callback before a message is sent, with the names of the robots that it moves and the kind of sender."""
 UNKNOWN_SENDERS: tuple[str, str] = ("action", "stop")
-"""Values of `UnprovenMotion.sender` for an action that didn't end and for an unproven Stop."""
+"""Values of `UnconfirmedMotion.sender` for an action that didn't end and for an unproven Stop."""
 MAX_MOTIONS = 64
 """Maximum number of motions of one robot that are tracked by id. Further motions end only with a Stop."""
 

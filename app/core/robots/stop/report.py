@@ -22,9 +22,9 @@ class RobotStop:
         elapsed_ms: Time until the reply; None without a reply.
         can_confirm: False for robots that never reply to a Stop (RIZE), and for programs that only
             subscribe to a robot's commands.
-        error: Reason why the robot has not stopped (if `is_refused`) or why the Stop could not be sent, or
+        error: Reason why the robot has not stopped (if `has_failed`) or why the Stop could not be sent, or
             "".
-        is_refused: True if the program reported that the robot has not stopped.
+        has_failed: True if the program reported that the robot has not stopped.
         program: Name of the program if it is not the robot's own, else "".
         is_waiting: True if replies of other programs of the robot are pending.
         node: Id of the node that replied.
@@ -88,7 +88,7 @@ class StopReport:
 
     Attributes:
         elapsed_ms: Time from the call to the last reply.
-        strangers: Programs that replied in the name of a robot without serving it, as (robot, program).
+        impostors: Programs that replied in the name of a robot without serving it, as (robot, program).
     """
 
     robots: tuple[RobotStop, ...]

@@ -23,7 +23,7 @@ class StopRequest:
     """State of the Stop of one robot.
 
     Attributes:
-        serving: Reply of each program that serves the robot, by node; None while pending. Empty until
+        replies: Reply of each program that serves the robot, by node; None while pending. Empty until
             the programs are known.
         unknown_replies: Undecoded replies of publishers that the graph does not list yet.
         foreign_replies: Undecoded replies of programs that do not serve the robot.

@@ -160,7 +160,7 @@ class RobotStopper:
     def deliver(self) -> None:
         """Send pending Stops to robots that have been connected since. Called at each tick.
 
-        A Stop is pending for at most `LATE_REPLY_S` seconds.
+        A Stop is pending for at most `LATE_REPLY_TIMEOUT_S` seconds.
         """
         with self._changed:
             now = self._clock()

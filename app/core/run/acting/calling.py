@@ -36,7 +36,7 @@ class CallRecord:
     """One call of a service.
 
     Attributes:
-        at_s: Time of the start in seconds since 1970.
+        started_s: Time of the start in seconds since 1970.
         duration_s: Duration in seconds.
         error: Reason for a failure, or "".
         reply: Value of the reply.

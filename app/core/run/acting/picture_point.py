@@ -48,7 +48,7 @@ class PicturePoint:
 
         Args:
             pictures: Topic of the images.
-            msg_type: One of `TYPES`.
+            msg_type: One of `MESSAGE_TYPES`.
         """
         stamp = Time.from_ns(self.stamp_ns) if self.stamp_ns is not None else None
         place = asdict(Point(float(self.x), float(self.y), 0.0))

@@ -37,7 +37,7 @@ class SendOrder:
     """Order to send a message, once or repeatedly.
 
     Attributes:
-        make_payload: Returns a new payload for each message, or raises `NepError`.
+        create_payload: Returns a new payload for each message, or raises `NepError`.
         source: Text that the user wrote.
         origin: Origin of the order.
         on_result: Callback for the result, or None.
@@ -67,7 +67,7 @@ class SendResult:
         message: Reason for a failure, or "".
         subscriber_count: Number of subscribers.
         count: Number of repeated messages that were sent.
-        skipped: Number of repeated messages that were dropped because they were late.
+        dropped_count: Number of repeated messages that were dropped because they were late.
         text: Message that was sent once; "" if it is too large to be stored.
     """
 
@@ -171,7 +171,7 @@ class Outbox:
         self._submit("", self._guarded_job(order, asked_s, send_job))
 
     def start(self, order: SendOrder, rate_hz: float) -> bool:
-        """Start sending a message repeatedly; return False if the limit `MAX_CONCURRENT` is reached.
+        """Start sending a message repeatedly; return False if the limit `MAX_REPEATED_MESSAGES` is reached.
 
         Args:
             order: Message to send.

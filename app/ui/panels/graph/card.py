@@ -67,7 +67,7 @@ class CardStat:
         value: Formatted number.
         note: Text below the number, or "".
         curve: Recent values to draw as a curve; empty for no curve.
-        is_bad: True for a number that indicates a problem.
+        is_problem: True for a number that indicates a problem.
     """
 
     title: str
@@ -85,9 +85,9 @@ class CardContent:
         title: Name of the topic, service or node.
         kind: Short description below the title, such as the message type.
         stats: Numbers in large type.
-        facts: Lines of text below the numbers.
+        lines: Lines of text below the numbers.
         tables: Tables below the lines of text.
-        foot: Text at the bottom of the card, or "".
+        footer: Text at the bottom of the card, or "".
     """
 
     title: str

@@ -60,7 +60,7 @@ ACTION_SPECS: tuple[ImageActionSpec, ...] = (
 
 
 class PictureActions(QObject):
-    """QActions defined in `ROWS`, for one image view.
+    """QActions defined in `ACTION_SPECS`, for one image view.
 
     Args:
         view: Image view that the actions change.

@@ -98,7 +98,7 @@ class FindBar(QWidget):
         source: Returns the value to search, and the index of a large message or None.
 
     Signals:
-        found: Path of the selected match.
+        match_selected: Path of the selected match.
     """
 
     match_selected = Signal(object)

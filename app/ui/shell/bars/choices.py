@@ -54,7 +54,7 @@ class ChoiceButton(PaintedButton):
         return QSize(wide, self.height_for(wide))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Handle Enter and Space, and pass all other keys on to `Choices`.
+        """Handle Enter and Space, and pass all other keys on to `ChoiceGrid`.
 
         Qt's buttons would handle the arrow keys themselves.
         """

@@ -12,7 +12,7 @@ from app.ui.widgets.letters import strip_mnemonic
 
 
 class _AltKeyFilter(QObject):
-    """Event filter that emits `held` when Alt is pressed or released.
+    """Event filter that emits `held_changed` when Alt is pressed or released.
 
     This is an object separate from the menu bar, because Qt installs a menu bar as an event filter of
     the whole application while Alt is held, and events of the web view's internal objects must not

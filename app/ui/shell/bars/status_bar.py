@@ -35,7 +35,7 @@ def _worst_status(found: Iterable[str]) -> tuple[str, str]:
 class StatusFormatter:
     """Formatter of the session's state for the status bar.
 
-    Each method returns a `Fact` (icon, text, status), which is empty if there is nothing to show.
+    Each method returns a `StatusEntry` (icon, text, status), which is empty if there is nothing to show.
 
     Attributes:
         window_ms: Duration in ms of the last refresh of the window.
@@ -48,7 +48,7 @@ class StatusFormatter:
         self._web_host = self._web_network = ""
 
     def alerts(self, *, for_developers: bool = False) -> StatusEntry:
-        """Return a `Fact` with the number of alerts.
+        """Return a `StatusEntry` with the number of alerts.
 
         Args:
             for_developers: True to count alerts that are meant for developers too.
@@ -61,7 +61,7 @@ class StatusFormatter:
         return icon, words.format(count=len(alerts)), status
 
     def health(self) -> StatusEntry:
-        """Return a `Fact` with the number of alerts, else with the health of the robots.
+        """Return a `StatusEntry` with the number of alerts, else with the health of the robots.
 
         A robot that hasn't reported its state yet is only described as "connected".
         """
@@ -98,7 +98,7 @@ class StatusFormatter:
         return "circle-dashed", words.format(robot=name, count=count), "off"
 
     def save_state(self) -> StatusEntry:
-        """Return a `Fact` with the time of the last save or, for unsaved changes, the state of the backup."""
+        """Return the time of the last save or, for unsaved changes, the state of the backup."""
         document = self._session.document
         if document.dirty and document.journal_error is not None:
             return "circle-x", _("Not saved · no backup"), "error"
@@ -111,12 +111,12 @@ class StatusFormatter:
         return "save", _("Saved {clock}").format(clock=f"{then.tm_hour}:{then.tm_min:02d}"), None
 
     def topics(self) -> StatusEntry:
-        """Return a `Fact` with the number of active topics."""
+        """Return a `StatusEntry` with the number of active topics."""
         live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         return "", ngettext("{count} active topic", "{count} active topics", live).format(count=live), None
 
     def remote_access(self) -> StatusEntry:
-        """Return a `Fact` about the computers that can connect to this master."""
+        """Return a `StatusEntry` about the computers that can connect to this master."""
         return access_status(self._session.remote_access)
 
     def remote_access_plain(self) -> StatusEntry:
@@ -125,7 +125,7 @@ class StatusFormatter:
         return ("" if status is None else icon), words, status
 
     def web_pages(self) -> StatusEntry:
-        """Return a `Fact` with the network of the web server and the number of connected pages.
+        """Return a `StatusEntry` with the network of the web server and the number of connected pages.
 
         The fact is empty while the server is off.
         """
@@ -135,7 +135,7 @@ class StatusFormatter:
         return web_status(web, self._web_network)
 
     def master(self) -> StatusEntry:
-        """Return a `Fact` with the state and the address of the master."""
+        """Return a `StatusEntry` with the state and the address of the master."""
         master = self._session.master
         if master.kind == "connected":
             return "circle-check", _("Master {address}").format(address=master.address), "ok"
@@ -145,7 +145,7 @@ class StatusFormatter:
         return "circle-dashed", _("No master"), "off"
 
     def traffic(self) -> StatusEntry:
-        """Return a `Fact` with the numbers of nodes and topics, and the message rate."""
+        """Return a `StatusEntry` with the numbers of nodes and topics, and the message rate."""
         graph = self._session.live.graph
         if graph is None:
             return EMPTY_ENTRY
@@ -160,7 +160,7 @@ class StatusFormatter:
         return "", ", ".join(facts), None
 
     def lost(self) -> StatusEntry:
-        """Return a `Fact` with the number of messages lost during the last 30 s; empty for 0."""
+        """Return a `StatusEntry` with the number of messages lost during the last 30 s; empty for 0."""
         lost = self._session.traffic.lost_30s
         if not lost:
             return EMPTY_ENTRY
@@ -168,7 +168,7 @@ class StatusFormatter:
         return "triangle-alert", words.format(count=group_digits(lost)), "warn"
 
     def recording(self) -> StatusEntry:
-        """Return a `Fact` with duration, size and losses of the current recording; empty if there is none."""
+        """Return duration, size and losses of the current recording; empty if there is none."""
         recordings = self._session.recordings
         state = recordings.client.state
         if not recordings.is_recording:
@@ -187,7 +187,7 @@ class StatusFormatter:
         )
 
     def arming(self) -> StatusEntry:
-        """Return a `Fact` with the remaining arming time and the topics being sent; empty while disarmed."""
+        """Return the remaining arming time and the topics being sent; empty while disarmed."""
         acting = self._session.acting
         if not acting.arming.is_on:
             return EMPTY_ENTRY
@@ -212,7 +212,7 @@ class StatusFormatter:
         return "triangle-alert", words, "warn"
 
     def flight_recorder(self) -> StatusEntry:
-        """Return a `Fact` with the duration stored in the flight recorder; empty while it is off."""
+        """Return a `StatusEntry` with the duration stored in the flight recorder; empty while it is off."""
         seconds = self._session.recordings.client.state.ring_s
         if seconds is None:
             return EMPTY_ENTRY
@@ -242,11 +242,11 @@ class StatusFormatter:
         )
 
     def live_network_note(self) -> StatusEntry:
-        """Return a `Fact` that the live network keeps running while a recording is shown."""
+        """Return a `StatusEntry` that the live network keeps running while a recording is shown."""
         return "radio-tower", _("The live network keeps running"), None
 
     def displayed_messages(self) -> StatusEntry:
-        """Return a `Fact` with the number of messages of watched topics that were displayed.
+        """Return a `StatusEntry` with the number of messages of watched topics that were displayed.
 
         The fact is empty if all messages were displayed.
         """
@@ -261,7 +261,7 @@ class StatusFormatter:
         )
 
     def window(self) -> StatusEntry:
-        """Return a `Fact` with the duration of the last refresh of the window."""
+        """Return a `StatusEntry` with the duration of the last refresh of the window."""
         spent = f"{round(self.window_ms):>2}".replace(" ", FIGURE_SPACE)  # equal width for 9 and 10
         return "", _("Refresh {spent} ms of {most} ms").format(spent=spent, most=TICK_MS), None
 

@@ -32,7 +32,7 @@ class LayoutFile:
         name: Name of the layout.
         base: Name of the built-in layout on which it is based.
         saved: Arrangement, as returned by `Workbench.save`, without unknown panels.
-        unknown: Names of panels in the file that aren't installed.
+        unknown_panels: Names of panels in the file that aren't installed.
     """
 
     name: str

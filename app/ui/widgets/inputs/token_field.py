@@ -113,7 +113,7 @@ class _TokenEdit(QLineEdit):
 class TokenField(QWidget):
     """Base class of token fields. Subclasses decide when typed text becomes a token.
 
-    `changed` is emitted when the tokens or the typed text change, and `settled` when the tokens have
+    `changed` is emitted when the tokens or the typed text change, and `editing_finished` when the tokens have
     changed and no text is being typed.
 
     Args:

@@ -45,7 +45,7 @@ class Cell:
         role: Colour role of text and icon.
         mono: True for a monospaced font.
         bold: True for a bold font.
-        struck: True for a strikethrough font.
+        is_struck_out: True for a strikethrough font.
         chip: Text of the chip after the text, such as a state, or None.
         elide_middle: True to elide a long text in its middle instead of its end.
         curve: Values of a sparkline, which replaces the text.
@@ -96,7 +96,7 @@ class Column(Generic[Row]):
         is_hidden_by_default: True to hide the column until the user shows it.
         label: Name for a column with an empty title, wrapped in `lazy`.
         is_available: Returns False to hide the column regardless of the user's choice.
-        verbatim: True if the title isn't translated.
+        is_verbatim: True if the title isn't translated.
     """
 
     name: str

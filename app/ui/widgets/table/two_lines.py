@@ -19,7 +19,7 @@ class TwoLines:
 
     Attributes:
         name: First line.
-        below: Second line, in a small font.
+        second_line: Second line, in a small font.
         mono: True if the name is monospaced, as for topics and services.
     """
 

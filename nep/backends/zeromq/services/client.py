@@ -76,7 +76,7 @@ class Connection(Protocol):
         """True if a reply is available that the file descriptor doesn't signal any more."""
 
     def update(self) -> None:
-        """Update `is_open` and `is_over`."""
+        """Update `is_open` and `has_ended`."""
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
         """Send a call."""

@@ -71,7 +71,7 @@ class ServerConnection:
         self._socket.connect(self.endpoint)
 
     def update(self) -> None:
-        """Update `is_open` and `is_over` from the monitor's events."""
+        """Update `is_open` and `has_ended` from the monitor's events."""
         while self._monitor is not None and _has_input(self._monitor):
             event, _value = _EVENT_HEADER.unpack(self._monitor.recv_multipart(zmq.DONTWAIT)[0])
             self.has_ended = self.has_ended or event == zmq.EVENT_DISCONNECTED

@@ -248,7 +248,7 @@ class TcpConnection:
 def enable_keep_alive(connected: socket.socket, address: str) -> None:
     """Set socket options that detect within a dozen seconds that the peer's computer has vanished.
 
-    See `nep.backends.zeromq.sockets.keep_alive`.
+    See `nep.backends.zeromq.sockets.enable_keep_alive`.
     """
     connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     if is_loopback(address):

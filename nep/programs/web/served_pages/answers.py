@@ -62,7 +62,7 @@ class PageResponse(NamedTuple):
         status: Status code.
         headers: Header fields.
         body: Content.
-        is_token_refused: True if the token was missing or wrong.
+        is_token_rejected: True if the token was missing or wrong.
     """
 
     status: HTTPStatus

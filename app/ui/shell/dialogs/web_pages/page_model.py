@@ -27,7 +27,7 @@ class PageRow:
     """Row of a page in the model.
 
     Attributes:
-        listed: Page.
+        listed_page: Page.
         number: Row number.
         topics: Topics of the page, in the order of the child rows.
     """

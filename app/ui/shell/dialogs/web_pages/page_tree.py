@@ -113,7 +113,7 @@ class _RowHeightDelegate(QStyledItemDelegate):
 class PageTree(QTreeView):
     """Tree view of connected pages and their topics.
 
-    `disconnect_requested` is emitted with the id of a page, and `copied` with the text to copy.
+    `disconnect_requested` is emitted with the id of a page, and `copy_requested` with the text to copy.
     """
 
     disconnect_requested = Signal(int)
@@ -158,7 +158,7 @@ class PageTree(QTreeView):
             self.disconnect_requested.emit(listed.page.id)
 
     def copy_current(self) -> None:
-        """Emit `copied` with the name of the current topic or the origin of the current page."""
+        """Emit `copy_requested` with the name of the current topic or the origin of the current page."""
         topic, listed = self._pages.topic(self.currentIndex()), self.current_page()
         if topic is not None:
             self.copy_requested.emit(topic.topic)
