@@ -48,7 +48,7 @@ class StatusFormatter:
         self._web_host = self._web_network = ""
 
     def alerts(self, *, for_developers: bool = False) -> StatusEntry:
-        """Return a `StatusEntry` with the number of alerts.
+        """Return the number of alerts.
 
         Args:
             for_developers: True to count alerts that are meant for developers too.
@@ -61,7 +61,7 @@ class StatusFormatter:
         return icon, words.format(count=len(alerts)), status
 
     def health(self) -> StatusEntry:
-        """Return a `StatusEntry` with the number of alerts, else with the health of the robots.
+        """Return the number of alerts, else with the health of the robots.
 
         A robot that hasn't reported its state yet is only described as "connected".
         """
@@ -111,7 +111,7 @@ class StatusFormatter:
         return "save", _("Saved {clock}").format(clock=f"{then.tm_hour}:{then.tm_min:02d}"), None
 
     def topics(self) -> StatusEntry:
-        """Return a `StatusEntry` with the number of active topics."""
+        """Return the number of active topics."""
         live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         return "", ngettext("{count} active topic", "{count} active topics", live).format(count=live), None
 
@@ -125,7 +125,7 @@ class StatusFormatter:
         return ("" if status is None else icon), words, status
 
     def web_pages(self) -> StatusEntry:
-        """Return a `StatusEntry` with the network of the web server and the number of connected pages.
+        """Return the network of the web server and the number of connected pages.
 
         The fact is empty while the server is off.
         """
@@ -135,7 +135,7 @@ class StatusFormatter:
         return web_status(web, self._web_network)
 
     def master(self) -> StatusEntry:
-        """Return a `StatusEntry` with the state and the address of the master."""
+        """Return the state and the address of the master."""
         master = self._session.master
         if master.kind == "connected":
             return "circle-check", _("Master {address}").format(address=master.address), "ok"
@@ -145,7 +145,7 @@ class StatusFormatter:
         return "circle-dashed", _("No master"), "off"
 
     def traffic(self) -> StatusEntry:
-        """Return a `StatusEntry` with the numbers of nodes and topics, and the message rate."""
+        """Return the numbers of nodes and topics, and the message rate."""
         graph = self._session.live.graph
         if graph is None:
             return EMPTY_ENTRY
@@ -160,7 +160,7 @@ class StatusFormatter:
         return "", ", ".join(facts), None
 
     def lost(self) -> StatusEntry:
-        """Return a `StatusEntry` with the number of messages lost during the last 30 s; empty for 0."""
+        """Return the number of messages lost during the last 30 s; empty for 0."""
         lost = self._session.traffic.lost_30s
         if not lost:
             return EMPTY_ENTRY
@@ -212,7 +212,7 @@ class StatusFormatter:
         return "triangle-alert", words, "warn"
 
     def flight_recorder(self) -> StatusEntry:
-        """Return a `StatusEntry` with the duration stored in the flight recorder; empty while it is off."""
+        """Return the duration stored in the flight recorder; empty while it is off."""
         seconds = self._session.recordings.client.state.ring_s
         if seconds is None:
             return EMPTY_ENTRY
@@ -246,7 +246,7 @@ class StatusFormatter:
         return "radio-tower", _("The live network keeps running"), None
 
     def displayed_messages(self) -> StatusEntry:
-        """Return a `StatusEntry` with the number of messages of watched topics that were displayed.
+        """Return the number of messages of watched topics that were displayed.
 
         The fact is empty if all messages were displayed.
         """
@@ -261,7 +261,7 @@ class StatusFormatter:
         )
 
     def window(self) -> StatusEntry:
-        """Return a `StatusEntry` with the duration of the last refresh of the window."""
+        """Return the duration of the last refresh of the window."""
         spent = f"{round(self.window_ms):>2}".replace(" ", FIGURE_SPACE)  # equal width for 9 and 10
         return "", _("Refresh {spent} ms of {most} ms").format(spent=spent, most=TICK_MS), None
 
