@@ -48,7 +48,7 @@ from nep.backends.zeromq.master_session import RenewalTimer
 from nep.protocol.encoding import decode_reply, encode_request
 from nep.protocol.requests import (NodeRecord, PublisherCount, PublisherRecord,
     SubscriberCount, SubscriberRecord)
-from nep.protocol.requests import Found, Join, Renew, Renewed
+from nep.protocol.requests import FoundReply, Join, Renew, RenewedReply
 count, topics = int(sys.argv[1]), int(sys.argv[2])
 each = topics // count
 context = zmq.Context()
@@ -72,9 +72,9 @@ def read(ms):
         while socket.getsockopt(zmq.EVENTS) & zmq.POLLIN:
             answer = decode_reply(socket.recv())[1]
             epoch = answer.epoch
-            if isinstance(answer, Found | Renewed):
+            if isinstance(answer, FoundReply | RenewedReply):
                 revisions[n] = answer.revision
-            if isinstance(answer, Renewed):
+            if isinstance(answer, RenewedReply):
                 paces[n].set_interval(answer.next_s, time.monotonic())
                 if answer.again:
                     join(n)

@@ -126,7 +126,7 @@ def thing_description(model: Mapping[str, object], name: str) -> dict[str, objec
         "securityDefinitions": {"nosec_sc": {"scheme": "nosec"}},
         "security": "nosec_sc",
         "rb:robot": {**kind, "title": text(kind.get("title")) or str(model["title"])},
-        "rb:topics": {leaf: topic for leaf, topic in vars(topics).items() if topic is not None},
+        "rb:topics": _topics_json(topics),
     }
     asked = _form(topics.command, "invokeaction", "cancelaction") | {"rb:answer": f"nep:{topics.reply}"}
     kept["properties"] = {
@@ -145,6 +145,17 @@ def thing_description(model: Mapping[str, object], name: str) -> dict[str, objec
         for leaf, event in object_member(described, "events").items()
     }
     return kept
+
+
+def _topics_json(topics: RobotTopics) -> dict[str, str]:
+    topic_by_key = {
+        "description": topics.description,
+        "command": topics.command,
+        "answer": topics.reply,
+        "state": topics.state,
+        "world": topics.world,
+    }
+    return {key: topic for key, topic in topic_by_key.items() if topic is not None}
 
 
 def _form(topic: str, *ops: str) -> dict[str, object]:

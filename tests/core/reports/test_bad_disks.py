@@ -11,7 +11,7 @@ import json, sys
 from pathlib import Path
 from app.core.reports.crash import Crash
 from app.core.reports.crash_reports import CrashReports
-from app.core.reports.problem_report import ReportParts, make_report, write_report
+from app.core.reports.problem_report import ReportParts, create_report, write_report
 from app.core.reports.studio_run import StudioRun
 from app.errors import AppError
 
@@ -19,7 +19,7 @@ disk = Path(sys.argv[1])
 reports = CrashReports(disk / "crashes")
 reports.add(Crash("robot", "before it was full"))
 parts = ReportParts((), {}, lambda: "", disk / "log", reports)
-data = make_report(parts, "x" * 10)
+data = create_report(parts, "x" * 10)
 old = disk / "report.zip"
 write_report(old, data)
 with (disk / "filler").open("wb", buffering=0) as file:

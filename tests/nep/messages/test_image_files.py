@@ -38,7 +38,7 @@ def test_decompression_bomb_is_rejected_before_decoding(name: str) -> None:
 CHILD = """
 import json, resource, sys, time
 import cv2, numpy
-from app.core.messages.picture import decode, png_of
+from app.core.messages.picture import decode, encode_png
 from nep.errors import NepError
 from nep.messages.message import Message
 from tests.nep.bad_pictures import BOMBS
@@ -49,7 +49,7 @@ said = {}
 for name, data in BOMBS.items():
     for told in ({}, {"encoding": "jpeg", "shape": [8, 8, 3]}, {"encoding": "png", "shape": [8, 8, 3]}):
         message = Message("/c", data, "image", "image", extension=told)
-        for read in (lambda: message.payload, lambda: png_of(message)):
+        for read in (lambda: message.payload, lambda: encode_png(message)):
             try:
                 read()
                 said[name] = "was read"

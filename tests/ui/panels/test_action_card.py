@@ -35,7 +35,7 @@ def card(qtbot) -> ActionCard:
 
 
 def tried(state: str = "running", **more: object) -> Invocation:
-    return Invocation("1", "go_far", state, given={"distance": 0.5}, **more)  # type: ignore[arg-type]
+    return Invocation("1", "go_far", state, input={"distance": 0.5}, **more)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -118,9 +118,9 @@ def show(card: ActionCard, tries: Sequence[Invocation]) -> list[str]:
 def test_last_tries_are_listed_with_buttons_that_restore_their_input_values(card) -> None:
     assert not card.past.isVisible()
     done = Invocation(
-        "1", "go_far", "succeeded", given={"distance": 0.25}, output={"moved": 0.25}, elapsed_s=1
+        "1", "go_far", "succeeded", input={"distance": 0.25}, output={"moved": 0.25}, elapsed_s=1
     )
-    late = Invocation("2", "go_far", "failed", error="go far took longer than 10 s", given={"distance": -0.5})
+    late = Invocation("2", "go_far", "failed", error="go far took longer than 10 s", input={"distance": -0.5})
     other = Invocation("3", "say", "succeeded")
     running = Invocation("4", "go_far", "running")
     assert show(card, [done, late, other, running]) == [
