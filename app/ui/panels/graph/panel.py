@@ -139,7 +139,7 @@ class GraphPanel(PanelWidget):
         tools.group.changed.connect(self._group_by)
         tools.quiet.clicked.connect(
             lambda: self._update_choices(
-                hides_quiet=tools.quiet.isChecked(), quiet_visible_groups=frozenset()
+                hides_quiet=tools.quiet.isChecked(), groups_with_visible_quiet_nodes=frozenset()
             )
         )
         tools.services.clicked.connect(
@@ -226,7 +226,7 @@ class GraphPanel(PanelWidget):
         self._quiet.update(facts, now)
         self._calls.update(facts, now)
         self._hertz = self._calls.rates_hz()
-        self._update_choices(quiet=self._quiet.quiet_keys(now))
+        self._update_choices(quiet_nodes=self._quiet.quiet_keys(now))
 
     def _rebuild(self) -> None:
         facts = self._graph_facts()
@@ -323,14 +323,18 @@ class GraphPanel(PanelWidget):
         for group_by in GROUPS:
             if group_by == name:
                 self._layout = None
-                self._update_choices(group_by=group_by, toggled=frozenset(), quiet_visible_groups=frozenset())
+                self._update_choices(
+                    group_by=group_by, toggled=frozenset(), groups_with_visible_quiet_nodes=frozenset()
+                )
 
     def _toggle_group(self, group: str) -> None:
         self._layout = None
         self._update_choices(toggled=self._choices.toggled ^ {group})
 
     def _show_quiet(self, group: str) -> None:
-        self._update_choices(quiet_visible_groups=self._choices.groups_with_visible_quiet_nodes | {group})
+        self._update_choices(
+            groups_with_visible_quiet_nodes=self._choices.groups_with_visible_quiet_nodes | {group}
+        )
 
     def _reset_layout(self) -> None:
         self._layout = self._asked = self._coming = None
@@ -349,7 +353,9 @@ class GraphPanel(PanelWidget):
             now = GROUPS.index(self._choices.group_by)
             self._group_by(GROUPS[(now + 1) % len(GROUPS)])
         elif letter == "h":
-            self._update_choices(hides_quiet=not self._choices.hides_quiet, quiet_visible_groups=frozenset())
+            self._update_choices(
+                hides_quiet=not self._choices.hides_quiet, groups_with_visible_quiet_nodes=frozenset()
+            )
         elif letter == "s":
             self._update_choices(shows_services=not self._choices.shows_services)
 
