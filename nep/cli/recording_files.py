@@ -35,7 +35,7 @@ FromOption = Annotated[
     str | None,
     typer.Option(
         "--from",
-        metavar=_("SECONDS|CLOCK"),
+        metavar=_("SECONDS|TIME"),
         help=_("Start this long after the beginning of the recording, or at this time: 15:04:05."),
         show_default=False,
     ),
@@ -44,7 +44,7 @@ ToOption = Annotated[
     str | None,
     typer.Option(
         "--to",
-        metavar=_("SECONDS|CLOCK"),
+        metavar=_("SECONDS|TIME"),
         help=_(
             "Stop this long after the beginning of the recording, or at this time: 15:04:05.5, "
             "2026-11-17T14:04:05Z."

@@ -150,7 +150,7 @@ def broken(change) -> tuple[str, ...]:
          "actions.turn.input uses $ref, which isn't supported; write the definition inline"),
         (lambda d: d.update({"rb:profile": 2}), "rb:profile must be 1"),
         (lambda d: d["events"].update(state={}),
-         ("'state' is reserved or used twice; each sensor and event needs a name of its own, "
+         ("'state' is reserved or used twice; each sensor and event needs a different name, "
           "because the name becomes a topic")),
     ],
 )  # fmt: skip

@@ -200,7 +200,7 @@ def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
         properties
     ) & _RESERVED_NAMES:
         yield _(
-            "'{name}' is reserved or used twice; each sensor and event needs a name of its own, "
+            "'{name}' is reserved or used twice; each sensor and event needs a different name, "
             "because the name becomes a topic"
         ).format(name=name)
     for name, action in actions.items():

@@ -59,8 +59,8 @@ BLOCK_KEYS = {
 MENU_KEY = QKeyCombination(Qt.KeyboardModifier.ShiftModifier, Qt.Key.Key_F10)
 DUPLICATE_KEY = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_D)
 BOOKMARK_KEY = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_B)
-LOADING_TEXTS = {"behaviour": lazy("Loading blocks.")}
-OTHER_LOADING_TEXT = lazy("Loading panels.")
+LOADING_TEXTS = {"behaviour": lazy("Loading blocks…")}
+OTHER_LOADING_TEXT = lazy("Loading panels…")
 
 
 @runtime_checkable

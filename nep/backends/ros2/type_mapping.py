@@ -190,8 +190,8 @@ def _encode_image(payload: object) -> Encoded:
 
 def _raw_image_reason() -> str:
     return _(
-        "a compressed ROS image is a JPEG or PNG; publish 'uint8' or 'uint16', or a map as "
-        "'sensor_msgs/msg/Image'"
+        "arrays of this type can't be compressed as JPEG or PNG; publish a 'uint8' or 'uint16' array, "
+        "or a 'sensor_msgs/msg/Image' as a map of its fields"
     )
 
 

@@ -20,7 +20,7 @@ def test_loading_message_appears_after_a_delay_and_disappears_when_the_page_is_l
     now[0] += 0.02
     wait.set_ready(ready=False)
     assert not wait.words.isHidden()
-    assert wait.words.text() == "Loading blocks."
+    assert wait.words.text() == "Loading blocks…"
     assert wait.words.geometry() == place.rect()
     wait.set_ready(ready=True)
     assert wait.words.isHidden()

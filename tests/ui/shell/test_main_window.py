@@ -728,7 +728,7 @@ def test_loading_layout_shows_its_bars_first_and_then_its_panels(
     assert window.ring.target is None, "no ring round a page that is only words"
     placeholder = window.findChild(Placeholder)
     assert window.pages.currentWidget() is placeholder
-    assert placeholder.accessibleName() == "Loading blocks."
+    assert placeholder.accessibleName() == "Loading blocks…"
     assert not window.run_bar.isHidden()
     assert window.start.isHidden()
     commands.run("layout.behaviour")
@@ -756,7 +756,7 @@ def test_startup_shows_the_last_open_layout(
     monkeypatch.setattr(window, "start_session", lambda: None)
     window.state.save_layout("developer")
     steps = show_first_page(window, Options())
-    assert window.findChild(Placeholder).accessibleName() == "Loading panels."
+    assert window.findChild(Placeholder).accessibleName() == "Loading panels…"
     for step in steps:
         step()
     assert window.current_layout == "developer"

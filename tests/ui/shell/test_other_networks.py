@@ -63,7 +63,7 @@ def test_network_switch_applies_immediately_and_shows_the_connection_state(
     ros = sheet.rows[0]
     ros.switch.click()
     assert (world.made[0].address, ros.address.text()) == ("127.0.0.1:11311", "127.0.0.1:11311")
-    assert states(sheet)[0] == "Searching."
+    assert states(sheet)[0] == "Searching…"
     world.tell(GraphReceived(graph("/a", "/b"), 0.0))
     assert states(sheet)[0] == "Connected: 2 topics, 1 node."
     world.tell(MasterLost("", LONG))

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 LIVE_UPDATE_TICKS = 6  # refreshes at 30 Hz: values on sensor blocks are updated five times a second
 PINNED_SETTING = "toolbox_pinned"
 ALARM_STATES = frozenset({NOT_STOPPED, STOPPING, "silent"})
-LOADING_TEXT = lazy("Loading blocks.")
+LOADING_TEXT = lazy("Loading blocks…")
 LOADING_TEXT_DELAY_S = 0.5
 START_COMMANDS = {"robot": "robots.virtual", "examples": "help.examples"}
 """Commands of the window that the buttons on an empty canvas run."""

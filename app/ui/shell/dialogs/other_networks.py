@@ -215,7 +215,7 @@ def state_text(network: OtherNetwork) -> str:
     if network.state == "lost":
         return f"{network.sentence[:1].upper()}{network.sentence[1:]}."
     if network.state == "looking":
-        return _("Searching.")
+        return _("Searching…")
     if network.state == "off":
         return _(network.kind.hint)
     topics, nodes = len(network.topics), len(network.nodes)

@@ -506,7 +506,7 @@ class RecordSheet(Overlay):
         self.keep.setEnabled(state.ring_s is not None)
         if state.ring_s is None:
             self.ring_bar.set_fraction(None)
-            self.ring_words.setText(_("Starting.") if wish.is_on else _("Off: nothing is saved."))
+            self.ring_words.setText(_("Starting…") if wish.is_on else _("Off: nothing is saved."))
             return
         self.ring_bar.set_fraction(state.ring_s / wish.seconds)
         words = _("{count} s buffered, {size} of {most}").format(

@@ -142,7 +142,7 @@ def _subscriber_record(bench: Bench) -> None:
 
 @rule(
     "request-form",
-    lazy("A request has one part: a map with 'do', 'call' and 'what'. Call numbers are unique."),
+    lazy("A request is a single-part message: a map with 'do', 'call' and 'what'. Call numbers are unique."),
     "the-master",
 )
 def _request_form(bench: Bench) -> None:
