@@ -38,8 +38,8 @@ def test_parallel_check_prints_its_output_only_on_failure(
         return (sys.executable, "-c", f"import sys; print('{words}'); sys.exit({code})")
 
     found = [
-        Check("well", says("quiet", 0), is_beside=True),
-        Check("not well", says("loud", 1), is_beside=True),
+        Check("well", says("quiet", 0), in_background=True),
+        Check("not well", says("loud", 1), in_background=True),
         Check("last", says("seen", 0)),
     ]
     assert [(each.name, each.passed) for each in run_all(found)] == [

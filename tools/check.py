@@ -32,13 +32,13 @@ class Check(NamedTuple):
     Attributes:
         name: Name in the output.
         command: Command and arguments.
-        is_beside: True to run the check in parallel with the others and show its output only if it
+        in_background: True to run the check in parallel with the others and show its output only if it
             fails.
     """
 
     name: str
     command: tuple[str, ...]
-    is_beside: bool = False
+    in_background: bool = False
 
 
 class Outcome(NamedTuple):
@@ -64,7 +64,7 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
         Check("ruff format", (python, "-m", "ruff", "format", "--check", ".")),
         Check("mypy", (python, "-m", "mypy")),
         Check("lint-imports", (lint_imports, "--no-logo", "--cache-dir", "build/import-linter")),
-        Check("tests read", (python, "-m", "pytest", "--collect-only", "-qq", "-n0"), is_beside=True),
+        Check("tests read", (python, "-m", "pytest", "--collect-only", "-qq", "-n0"), in_background=True),
         Check("pytest", (python, "-m", "pytest", *side_by_side(), *pytest_arguments)),
     )
     if fast:
@@ -85,12 +85,12 @@ def side_by_side() -> tuple[str, ...]:
 
 def run(check: Check) -> Outcome:
     """Run a check and return its result."""
-    if not check.is_beside:
+    if not check.in_background:
         print(f"\n=== {check.name}", flush=True)
     # Many containers set it; compiled files are ignored by git.
     environ = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     begin = time.monotonic()
-    out, errors = (subprocess.PIPE, subprocess.STDOUT) if check.is_beside else (None, None)
+    out, errors = (subprocess.PIPE, subprocess.STDOUT) if check.in_background else (None, None)
     done = subprocess.run(
         check.command,
         cwd=ROOT,
@@ -101,7 +101,7 @@ def run(check: Check) -> Outcome:
         text=True,
         errors="replace",
     )
-    if check.is_beside and done.returncode != 0:
+    if check.in_background and done.returncode != 0:
         print(f"\n=== {check.name}\n{done.stdout}", flush=True)
     return Outcome(check.name, done.returncode == 0, time.monotonic() - begin)
 
@@ -109,11 +109,11 @@ def run(check: Check) -> Outcome:
 def run_all(found: Sequence[Check]) -> list[Outcome]:
     """Run the checks in order and return their outcomes.
 
-    Checks with `is_beside` run in the background from the start; later checks wait for them.
+    Checks with `in_background` run in the background from the start; later checks wait for them.
     """
     with ThreadPoolExecutor() as pool:
-        beside = {check: pool.submit(run, check) for check in found if check.is_beside}
-        return [beside[check].result() if check.is_beside else run(check) for check in found]
+        background = {check: pool.submit(run, check) for check in found if check.in_background}
+        return [background[check].result() if check.in_background else run(check) for check in found]
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:

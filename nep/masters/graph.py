@@ -155,7 +155,7 @@ class Graph:
 
         Args:
             request: The request.
-            call: Number of the request.
+            call: Id of the request.
             now: Current time.
             sender: Connection of the request.
             is_foreign: True if another program sent the request; such a program may only change its own

@@ -177,7 +177,7 @@ def encode_renewed(
     """Encode a `RenewedReply` reply without changed topics.
 
     Args:
-        call: Number of the request.
+        call: Id of the request.
         epoch: Epoch of the master.
         revision: Revision of the graph.
         last_seqs: Newest sequence numbers by publisher id.

@@ -93,7 +93,7 @@ class ReceivedRequest(NamedTuple):
     """Result of decoding a request.
 
     Attributes:
-        call: Number of the request.
+        call: Id of the request.
         request: The request, or the error if it is malformed.
     """
 

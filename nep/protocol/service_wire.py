@@ -59,7 +59,7 @@ class Reply(NamedTuple):
     Attributes:
         kind: Kind of the frame.
         data: Encoded payload or error.
-        codec: Number of the codec.
+        codec: Code of the codec on the wire.
     """
 
     kind: CallKind
@@ -72,7 +72,7 @@ class CallHeader(NamedTuple):
 
     Attributes:
         number: Number of the call, which the reply repeats.
-        codec: Number of the codec.
+        codec: Code of the codec on the wire.
         timeout_s: Time limit of the client in seconds; None for no limit.
         data: Encoded request.
     """
@@ -109,7 +109,7 @@ class Framing(Protocol):
 
         Args:
             number: Number of the call, which the reply repeats.
-            codec: Number of the codec.
+            codec: Code of the codec on the wire.
             timeout_s: Time limit of the client in seconds; None for no limit.
             data: Encoded request.
         """

@@ -75,7 +75,7 @@ class Header(NamedTuple):
     """Message header, the second part of a message.
 
     Attributes:
-        codec: Number of the codec.
+        codec: Code of the codec on the wire.
         flags: Flags.
         seq: Sequence number, counted from 1.
         stamp_ns: Time of publication by the publisher's clock, in nanoseconds since 1970.

@@ -62,7 +62,7 @@ def test_repeated_fault_is_logged_at_increasing_intervals_with_its_count(
     ]
 
 
-def test_faults_are_distinguished_by_place_and_text() -> None:
+def test_repeated_fault_is_logged_once_until_it_is_evicted() -> None:
     once = RepeatFilter()
 
     def said(text: str) -> bool:

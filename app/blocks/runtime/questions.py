@@ -25,7 +25,7 @@ class ProgramQuestion:
     """Question to the user.
 
     Attributes:
-        id: Number of the question.
+        id: Id of the question.
         text: Text of the question.
         answer: Answer as text; None until the user has answered.
     """
@@ -101,7 +101,7 @@ class Questions:
         """Store the user's answer to a question; ignored if the question is no longer open.
 
         Args:
-            id: Number of the question.
+            id: Id of the question.
             words: Answer.
         """
         with self._lock:

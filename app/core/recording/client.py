@@ -41,7 +41,7 @@ class RecorderEvent:
     """Event sent by a recorder process.
 
     Attributes:
-        process: Number of the process.
+        process: Id of the process (PID).
         content: Content of the event, as described in `nep.recordings.child`.
     """
 
@@ -54,7 +54,7 @@ class RecorderExited:
     """Event: a recorder process has ended or could not be started.
 
     Attributes:
-        process: Number of the process.
+        process: Id of the process (PID).
         detail: Last output of the process, or the reason why it could not be started.
     """
 

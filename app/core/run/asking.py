@@ -12,7 +12,7 @@ class AskedQuestion:
     """Question of a program to the user.
 
     Attributes:
-        run: Number of the run.
+        run: Id of the run.
         number: Number of the question within the run.
         text: Text of the question.
         choices: Possible answers; empty if any answer is allowed.

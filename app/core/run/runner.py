@@ -60,7 +60,7 @@ class RunnerEvent:
 
     Attributes:
         kind: Kind of event.
-        run: Number of the run.
+        run: Id of the run.
         blocks: Ids of the running blocks (running), of the blocks before which the program is paused,
             the next one first (paused), or of the failed blocks (error).
         description: Description of the running block, or of the next block (paused).

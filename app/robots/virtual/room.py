@@ -113,7 +113,7 @@ class Marker:
     """ArUco card (dictionary 4x4, 50).
 
     Attributes:
-        id: Number of the marker.
+        id: Id of the marker.
         size: Side length of the printed square, without its white border.
         facing_deg: Direction of a card on a wall; None for a card that stands in the room and is visible from
             everywhere.

@@ -176,7 +176,7 @@ def marker(number: int) -> Texture:
     """Return the texture of an ArUco card: the printed square and a white border of one module.
 
     Args:
-        number: Number of the marker.
+        number: Id of the marker.
     """
     square = cv2.aruco.generateImageMarker(
         cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), number, 6 * 24

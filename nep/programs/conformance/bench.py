@@ -133,7 +133,7 @@ class Bench:
         """Wait for the reply to a request that `Adapter.send_request` sent, and return the reply.
 
         Args:
-            number: Number of the request.
+            number: Id of the request.
             do: Name of the request, for the error message.
 
         Raises:

@@ -39,7 +39,7 @@ def test_thumbnails_are_centred_in_equal_intervals(look):
     assert [each.name for each in look.topics] == ["/camera", "/odom"]
 
 
-def test_film_strip_without_images_has_counts_and_invalid_file_has_none(tmp_path):
+def test_film_strip_without_images_has_counts_and_unreadable_or_empty_file_has_no_film_strip(tmp_path):
     record(tmp_path / "a.mcap", [[json_message(1)]])
     look = film_strip(tmp_path / "a.mcap", 4, 3, (24, 16), LocalOpener())
     assert look is not None

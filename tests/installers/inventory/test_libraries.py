@@ -83,7 +83,7 @@ def test_libraries_are_identified_by_file_name_on_each_system(name: str, part: s
         "x.dll",
     ],
 )
-def test_other_file_names_match_no_library(name: str) -> None:
+def test_unknown_file_names_match_no_library(name: str) -> None:
     assert library_of(name) is None
 
 

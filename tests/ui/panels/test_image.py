@@ -477,7 +477,7 @@ def test_image_that_cannot_be_saved_raises_an_alert_with_the_reason(qtbot, qapp,
     (tmp_path / "file").write_text("in the way")
     panel.job = SnapshotJob(panel, lambda: tmp_path / "file")
     panel.job.failed.connect(panel._on_failed)
-    panel.save_picture()
+    panel.save_image()
     qtbot.waitUntil(lambda: window.session.alerts.has("snapshot"))
     assert window.toasts == []
 

@@ -342,7 +342,7 @@ class SessionActing:
         """Send the message or call of an entry of `sent` again, if its target is armed.
 
         Args:
-            number: Number of the entry.
+            number: Id of the entry.
 
         Returns:
             Reason why this isn't possible, or "".

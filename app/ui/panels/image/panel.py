@@ -94,8 +94,8 @@ class ImagePanel(PanelWidget):
     def _make_actions(self) -> None:
         own = {
             "freeze": self._toggle_freeze,
-            "save": self.save_picture,
-            "copy": self.copy_picture,
+            "save": self.save_image,
+            "copy": self.copy_image,
             "point": lambda: self._publish_points(on=not self.points.is_on),
         }
         self.actions_of = PictureActions(self.theme, self.view, own)
@@ -116,7 +116,7 @@ class ImagePanel(PanelWidget):
         self.keep = IconButton(self.theme, "download", _("Save as PNG"), "S", size=26)
         self.fit.clicked.connect(self.view.fit_to_view)
         self.freeze.toggled.connect(self._set_frozen)
-        self.keep.clicked.connect(self.save_picture)
+        self.keep.clicked.connect(self.save_image)
         tune = _("Brightness, contrast and colours")
         self.tune: IconButton = IconButton(self.theme, "sliders-horizontal", tune, checkable=True, size=26)
         self.layers = IconButton(self.theme, "layers", _("Annotations from messages"), size=26)
@@ -256,7 +256,7 @@ class ImagePanel(PanelWidget):
         if self._stream is not None:
             self._stream.set_frozen(held)
 
-    def save_picture(self) -> None:
+    def save_image(self) -> None:
         """Save the image as PNG at its original size."""
         message = self._message()
         if message is not None:
@@ -270,7 +270,7 @@ class ImagePanel(PanelWidget):
         else:
             self.context.run(f"recording.export:{replay.path}")
 
-    def copy_picture(self) -> None:
+    def copy_image(self) -> None:
         """Copy the image to the clipboard at its original size."""
         message = self._message()
         if message is not None:

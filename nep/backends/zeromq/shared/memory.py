@@ -395,7 +395,7 @@ class SharedReader:
         """Return a payload as a read-only buffer, or None if the payload was overwritten.
 
         Args:
-            number: Number of the payload.
+            number: Id of the payload.
             may_copy: True to copy small payloads, which frees their slots.
         """
         while True:
