@@ -152,8 +152,8 @@ def virtual_screen() -> Iterator[int]:
     server = subprocess.Popen(command, pass_fds=[writer], start_new_session=True, stderr=subprocess.DEVNULL)
     os.close(writer)
     try:
-        with os.fdopen(reader) as answer:
-            number = answer.readline().strip()
+        with os.fdopen(reader) as output:
+            number = output.readline().strip()
         if not number:
             raise Trouble(f"the virtual screen did not start; try '{program} :99' to see why")
         yield int(number)
@@ -173,8 +173,8 @@ def demo(computer: Computer, arguments: Sequence[str]) -> int:
     with screen(computer) as environ:
         code = computer.do(command, environ, None)
     if "--self-drive" in command:
-        made = sorted(pictures.glob("*.png"))
-        print(f"· {len(made)} pictures of the window are in {pictures}", flush=True)
+        images = sorted(pictures.glob("*.png"))
+        print(f"· {len(images)} pictures of the window are in {pictures}", flush=True)
     return code
 
 
@@ -202,11 +202,11 @@ def package(computer: Computer, arguments: Sequence[str]) -> int:
     """Build the packages in an environment with only their dependencies; return the exit code."""
     folder = ROOT / "build" / "package" / "env"
     python = environment(computer, sys.executable, folder, "package", is_for_oldest=True)
-    ours = [*pip(python), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
-    if computer.do(ours, computer.environ, None) != 0:
+    install_command = [*pip(python), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
+    if computer.do(install_command, computer.environ, None) != 0:
         raise Trouble("Studio couldn't be installed; pip's output is above")
-    given = [each for each in arguments if each != "--"]
-    return computer.do([str(python), "-m", "installers.package", *given], computer.environ, None)
+    forwarded = [each for each in arguments if each != "--"]
+    return computer.do([str(python), "-m", "installers.package", *forwarded], computer.environ, None)
 
 
 def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
@@ -243,18 +243,18 @@ def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
 
 def main(arguments: Sequence[str] | None = None, computer: Computer | None = None) -> int:
     """Run the command line; return 0, 1 on failure, 2 if something is missing, 130 after Ctrl+C."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
+    args = sys.argv[1:] if arguments is None else list(arguments)
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("command", choices=["demo", *SCRIPTS, "versions", "fuzz", "package", "setup"])
-    command: str = parser.parse_args(given[:1]).command
+    command: str = parser.parse_args(args[:1]).command
     # Remove the virtual screen also when the terminal closes or CI cancels the job.
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), lambda number, _frame: sys.exit(128 + number))
     try:
-        return run(computer or Computer(), command, given[1:])
+        return run(computer or Computer(), command, args[1:])
     except Trouble as trouble:
         print(f"dev.py: {trouble}", file=sys.stderr)
         return 2

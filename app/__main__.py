@@ -125,29 +125,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ImportError as error:
         from app.core.reports.not_installed import import_problem  # noqa: PLC0415  needed only here
 
-        why = import_problem(error)
-        if not why:
+        message = import_problem(error)
+        if not message:
             raise
-        print_error(f"nep-studio: {why}")
+        print_error(f"nep-studio: {message}")
         return 2
     finally:
         close_streams()
 
 
-def _main(given: Sequence[str]) -> int:
-    if given[:1] == ["--child"]:
-        return run_child_module("app.blocks.runtime.child", given[1:])
-    if given[:1] == ["--module"] and len(given) > 1:
-        return run_child_module(given[1], given[2:])
+def _main(arguments: Sequence[str]) -> int:
+    if arguments[:1] == ["--child"]:
+        return run_child_module("app.blocks.runtime.child", arguments[1:])
+    if arguments[:1] == ["--module"] and len(arguments) > 1:
+        return run_child_module(arguments[1], arguments[2:])
     from app.core.storage.settings import saved_language  # noqa: PLC0415  not needed by child processes of a frozen build
 
     # a self-test leaves the user's settings unchanged
-    tests_itself = any(word.startswith("--selft") for word in given)
+    tests_itself = any(argument.startswith("--selft") for argument in arguments)
     set_initial_language("" if tests_itself else saved_language())
-    if given[:1] == ["run"]:
-        return run_behaviour(given[1:])
+    if arguments[:1] == ["run"]:
+        return run_behaviour(arguments[1:])
     parser = window_parser()
-    options = parser.parse_intermixed_args(given)
+    options = parser.parse_intermixed_args(arguments)
     if options.master is not None:
         try:  # for the window and the processes that it starts
             os.environ[MASTER_VARIABLE] = master_address(options.master)
@@ -219,9 +219,9 @@ def self_test(folder: Path, *, web: bool) -> int:
 
     gc.disable()  # as at every start of the window
     code = test.run(show)
-    words = test.report.failure or _("the self-test passed")
+    outcome = test.report.failure or _("the self-test passed")
     with suppress(OSError, ValueError):  # the output stream may be closed; the report is the result
-        (sys.stderr if code else sys.stdout).write(f"{words}: {test.place.folder}\n")
+        (sys.stderr if code else sys.stdout).write(f"{outcome}: {test.place.folder}\n")
     return code
 
 
@@ -267,13 +267,15 @@ def join_threads(within_s: float) -> tuple[str, ...]:
     """
     until = time.monotonic() + within_s
     others = [
-        each
-        for each in threading.enumerate()
-        if not each.daemon and each is not threading.current_thread() and each is not threading.main_thread()
+        thread
+        for thread in threading.enumerate()
+        if not thread.daemon
+        and thread is not threading.current_thread()
+        and thread is not threading.main_thread()
     ]
-    for each in others:
-        each.join(max(0.0, until - time.monotonic()))
-    return tuple(each.name for each in others if each.is_alive())
+    for thread in others:
+        thread.join(max(0.0, until - time.monotonic()))
+    return tuple(thread.name for thread in others if thread.is_alive())
 
 
 def end_process(code: int, within_s: float = JOIN_TIMEOUT_S) -> int:
@@ -286,10 +288,10 @@ def end_process(code: int, within_s: float = JOIN_TIMEOUT_S) -> int:
         code: Exit code of the process.
         within_s: Maximum wait in seconds.
     """
-    left = join_threads(within_s)
-    if not left:
+    running = join_threads(within_s)
+    if not running:
         return code
-    _log.error("exiting while threads are still running: %s", ", ".join(f"'{name}'" for name in left))
+    _log.error("exiting while threads are still running: %s", ", ".join(f"'{name}'" for name in running))
     logging.shutdown()
     close_streams()
     os._exit(code)

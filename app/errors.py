@@ -132,14 +132,14 @@ class DescriptionError(AppError):
         # The description comes from another program, so its text is escaped and shortened.
         self.name = name
         self.problems = problems
-        shown = shortened(escaped(name), MAX_NAME_LENGTH)
+        display_name = shortened(escaped(name), MAX_NAME_LENGTH)
         first = shortened(escaped(problems[0]), MAX_PROBLEM_LENGTH) if problems else _("empty")
-        words = (
+        template = (
             _("the description of '{name}' can't be used: {problem} (and {count} more)")
             if len(problems) > 1
             else _("the description of '{name}' can't be used: {problem}")
         )
-        super().__init__(words.format(name=shown, problem=first, count=len(problems) - 1))
+        super().__init__(template.format(name=display_name, problem=first, count=len(problems) - 1))
 
 
 class DeclarationError(DescriptionError):
@@ -180,7 +180,7 @@ class RobotInputError(AppError):
 
     def __init__(self, sentences: tuple[str, ...], problems: tuple[InputProblem, ...] = ()) -> None:
         self.sentences = sentences
-        self.problems = problems or tuple(InputProblem("", sentence) for sentence in sentences)
+        self.problems = problems or tuple(InputProblem("", message) for message in sentences)
         super().__init__("; ".join(sentences))
 
 
@@ -191,11 +191,11 @@ class RobotValueError(AppError, ValueError):
         place: Name of the invalid part of the value; "" for the whole value.
     """
 
-    def __init__(self, words: str, place: str = "", **holes: object) -> None:
+    def __init__(self, template: str, place: str = "", **holes: object) -> None:
         # `words` is a `lazy` text; its placeholder `place` and the others are filled here.
         self.place = place
-        self._words, self._holes = words, holes
-        super().__init__(_(words).format(place=place or _("the value"), **holes))
+        self._words, self._holes = template, holes
+        super().__init__(_(template).format(place=place or _("the value"), **holes))
 
     def nested_in(self, outer: str) -> RobotValueError:
         """Return this error for an outer value.
@@ -203,8 +203,8 @@ class RobotValueError(AppError, ValueError):
         Args:
             outer: Name of the part of the outer value that contains the invalid value.
         """
-        place = _("{place} {inner}").format(place=outer, inner=self.place) if self.place else outer
-        return RobotValueError(self._words, place, **self._holes)
+        location = _("{place} {inner}").format(place=outer, inner=self.place) if self.place else outer
+        return RobotValueError(self._words, location, **self._holes)
 
 
 class UnknownRobotError(AppError):

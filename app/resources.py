@@ -21,9 +21,9 @@ def path(*parts: str) -> Path:
 
     Raises FileNotFoundError if there is no such resource.
     """
-    found = folder().joinpath(*parts)
-    if not found.exists():
+    resource = folder().joinpath(*parts)
+    if not resource.exists():
         raise FileNotFoundError(
             f"no resource '{'/'.join(parts)}' in '{folder()}'; is Studio installed completely?"
         )
-    return found
+    return resource

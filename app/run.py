@@ -74,58 +74,66 @@ def run_file(
             position.
     """
     ending = interrupted or threading.Event()
-    say = _LineWriter(out or sys.stdout, ending)
+    write_line = _LineWriter(out or sys.stdout, ending)
     try:
         name, workspace, descriptions = read(Path(path))
-        known = _parse_descriptions(descriptions)
-        wanted = used_robot_names(workspace)
+        known_robots = _parse_descriptions(descriptions)
+        robot_names = used_robot_names(workspace)
         with nep.node("behaviour runner", master=master) as node:
-            found = _with_trusted_virtual(_find_used_robots(workspace, node, robot_wait_s, known))
-            for claim in found.rejected_claims:
-                say(_("warning: {sentence}").format(sentence=claim))
-            program = compile_behaviour(workspace, found.robots, absent=known, name=name)
-            code = _rejection_exit_code(program, wanted, found.robots, say)
+            discovered = _with_trusted_virtual(_find_used_robots(workspace, node, robot_wait_s, known_robots))
+            for claim in discovered.rejected_claims:
+                write_line(_("warning: {sentence}").format(sentence=claim))
+            program = compile_behaviour(workspace, discovered.robots, absent=known_robots, name=name)
+            code = _rejection_exit_code(program, robot_names, discovered.robots, write_line)
             if code is not None:
                 return code
-            used = [robot for robot in found.robots if robot.name in program.robots]
-            if not allow_moving and _would_move(program, used, say):
+            used_robots = [robot for robot in discovered.robots if robot.name in program.robots]
+            if not allow_moving and _would_move(program, used_robots, write_line):
                 return MAY_NOT_MOVE
             if not keep_position:
-                _reset_positions(node, [robot for robot in used if robot.virtual])
+                _reset_positions(node, [robot for robot in used_robots if robot.virtual])
             with closing(RobotStopper(node)) as stopper:
-                stopper.set_robots(StopTarget(robot, found.owners.get(robot.name)) for robot in used)
-                return _run(program, found, _Connection(master, node, stopper), say, ending)
+                stopper.set_robots(
+                    StopTarget(robot, discovered.owners.get(robot.name)) for robot in used_robots
+                )
+                return _run(program, discovered, _Connection(master, node, stopper), write_line, ending)
     except KeyboardInterrupt:
         return INTERRUPTED
     except (AppError, NepError) as error:
-        say(f"{error}.")
+        write_line(f"{error}.")
         return UNUSABLE
     finally:
-        say.report_problem()
+        write_line.report_problem()
 
 
 def _find_used_robots(
-    workspace: Mapping[str, object], node: nep.Node, wait_s: float, known: Sequence[Robot]
+    workspace: Mapping[str, object], node: nep.Node, wait_s: float, known_robots: Sequence[Robot]
 ) -> FoundRobots:
-    wanted = used_robot_names(workspace)
-    found = find_robots(node, wait_s, wanted=wanted, known=known) if wanted else FoundRobots()
-    if compile_behaviour(workspace, found.robots, absent=known).publishes:
-        found = find_robots(
-            node, ALL_ROBOTS_WAIT_S, wanted=(), known=known
+    robot_names = used_robot_names(workspace)
+    discovered = (
+        find_robots(node, wait_s, expected=robot_names, previous=known_robots)
+        if robot_names
+        else FoundRobots()
+    )
+    if compile_behaviour(workspace, discovered.robots, absent=known_robots).publishes:
+        discovered = find_robots(
+            node, ALL_ROBOTS_WAIT_S, expected=(), previous=known_robots
         )  # publish blocks may move any of them
-    return found
+    return discovered
 
 
-def _with_trusted_virtual(found: FoundRobots) -> FoundRobots:
+def _with_trusted_virtual(discovered: FoundRobots) -> FoundRobots:
     # Only robots whose programs are known to be Studio's own count as virtual (docs/trust.md).
     processes = VirtualProcesses(VIRTUAL_ROBOT_MODULES.values())
     robots = (
-        replace(robot, virtual=robot.virtual and processes.is_started_by_studio(found.owners[robot.name]))
-        if robot.name in found.owners
+        replace(
+            robot, virtual=robot.virtual and processes.is_started_by_studio(discovered.owners[robot.name])
+        )
+        if robot.name in discovered.owners
         else robot
-        for robot in found.robots
+        for robot in discovered.robots
     )
-    return replace(found, robots=tuple(robots))
+    return replace(discovered, robots=tuple(robots))
 
 
 def used_robot_names(workspace: Mapping[str, object]) -> tuple[str, ...]:
@@ -183,42 +191,42 @@ class _LineWriter:
 
 
 def _parse_descriptions(descriptions: Mapping[str, Mapping[str, object]]) -> list[Robot]:
-    found = []
+    robots = []
     for description in descriptions.values():
         try:
-            found.append(parse(description))
+            robots.append(parse(description))
         except DescriptionError:
             continue
-    return found
+    return robots
 
 
 def _rejection_exit_code(
-    program: Program, wanted: Sequence[str], robots: Sequence[Robot], say: Callable[[str], None]
+    program: Program, robot_names: Sequence[str], robots: Sequence[Robot], write_line: Callable[[str], None]
 ) -> int | None:
     for problem in program.problems:
-        words = _("error: {sentence}") if problem.severity == "error" else _("warning: {sentence}")
-        say(words.format(sentence=problem.message))
-    missing = sorted(set(wanted) - {robot.name for robot in robots})
+        template = _("error: {sentence}") if problem.severity == "error" else _("warning: {sentence}")
+        write_line(template.format(sentence=problem.message))
+    missing = sorted(set(robot_names) - {robot.name for robot in robots})
     if missing:
-        say(
+        write_line(
             _("{robots} not found. Switch it on, or start the virtual robot.").format(
                 robots=format_list(missing)
             )
         )
         return ROBOT_MISSING
     if program.errors or not program.starts:
-        say(_("“{name}” can't run.").format(name=program.name))
+        write_line(_("“{name}” can't run.").format(name=program.name))
         return UNUSABLE
     return None
 
 
-def _would_move(program: Program, robots: Sequence[Robot], say: Callable[[str], None]) -> bool:
+def _would_move(program: Program, robots: Sequence[Robot], write_line: Callable[[str], None]) -> bool:
     real = [robot for robot in robots if not robot.virtual]
-    wanted = actions_by_robot(program, real)
-    moves = {robot.name: risky_actions(robot, asked) for robot, asked in wanted}
+    used_actions = actions_by_robot(program, real)
+    moves = {robot.name: risky_actions(robot, actions) for robot, actions in used_actions}
     for name, titles in moves.items():
         if titles:
-            say(
+            write_line(
                 _("{robot} would move ({actions}). Add --allow-moving if it may.").format(
                     robot=name, actions=", ".join(titles)
                 )
@@ -249,18 +257,22 @@ class _Connection:
 
 
 def _run(
-    program: Program, found: FoundRobots, reach: _Connection, say: _LineWriter, interrupted: threading.Event
+    program: Program,
+    discovered: FoundRobots,
+    connection: _Connection,
+    write_line: _LineWriter,
+    interrupted: threading.Event,
 ) -> int:
-    stopper = reach.stopper
-    events = _RunEvents(say)
+    stopper = connection.stopper
+    events = _RunEvents(write_line)
     runner = Runner(events)
-    say(_("Running “{name}”").format(name=program.name))
+    write_line(_("Running “{name}”").format(name=program.name))
     if interrupted.is_set():
-        return FAILED if say.has_failed else INTERRUPTED
-    owners = {name: owner.node_id for name, owner in found.owners.items()}
-    late = _LateRobotMonitor(reach.node, runner) if program.publishes else None
+        return FAILED if write_line.has_failed else INTERRUPTED
+    owners = {name: owner.node_id for name, owner in discovered.owners.items()}
+    late = _LateRobotMonitor(connection.node, runner) if program.publishes else None
     try:
-        runner.start(program, [robot.source for robot in found.robots], reach.master, owners=owners)
+        runner.start(program, [robot.source for robot in discovered.robots], connection.master, owners=owners)
         while not runner.wait(POLL_INTERVAL_S) and not interrupted.is_set():
             if late is not None:
                 late.poll()
@@ -271,12 +283,12 @@ def _run(
         # Immediately, and again when the program has ended and can't move the robots any more.
         stopper.send_stop(ends=runner.program_key)
         runner.close()
-        names = [*(robot.name for robot in found.robots if robot.name in program.robots), *events.silent]
+        names = [*(robot.name for robot in discovered.robots if robot.name in program.robots), *events.silent]
         report = stopper.stop_all(names, ends=runner.program_key)
         for line in stop_lines(report):
-            say(line)
+            write_line(line)
     if was_interrupted:
-        return INTERRUPTED if not report.unconfirmed_robots and not say.has_failed else FAILED
+        return INTERRUPTED if not report.unconfirmed_robots and not write_line.has_failed else FAILED
     return OK if events.ok and not report.unconfirmed_robots else FAILED
 
 
@@ -293,21 +305,21 @@ class _LateRobotMonitor:
             return
         with suppress(NepError):
             view = self._node.graph()
-            there = tuple(sorted(description_topics(view)))
-            if there != self._known:
-                found = find_robots(self._node, LATE_ROBOT_CHECK_INTERVAL_S)
-                unread = set(there) - {robot.topics.description for robot in found.robots}
-                moving = moving_topics(view, map(controls_of, found.robots), unread)
+            topics = tuple(sorted(description_topics(view)))
+            if topics != self._known:
+                discovered = find_robots(self._node, LATE_ROBOT_CHECK_INTERVAL_S)
+                unread = set(topics) - {robot.topics.description for robot in discovered.robots}
+                moving = moving_topics(view, map(controls_of, discovered.robots), unread)
                 self._runner.set_robots({}, moving.topics)
-                self._known = there if not unread else ()
+                self._known = topics if not unread else ()
         self._next_s = time.monotonic() + LATE_ROBOT_CHECK_INTERVAL_S
 
 
 class _RunEvents:
     """Handler of the runner's events: writes them as lines and stores the result of the run."""
 
-    def __init__(self, say: Callable[[str], None]) -> None:
-        self._say = say
+    def __init__(self, write_line: Callable[[str], None]) -> None:
+        self._say = write_line
         self._last = ""
         self.ok = True
         self.silent: tuple[str, ...] = ()

@@ -30,8 +30,8 @@ def this_system() -> str:
 
 
 def _machine() -> str:
-    found = platform.machine().lower()
-    return {"amd64": "x86_64", "aarch64": "arm64"}.get(found, found)
+    machine = platform.machine().lower()
+    return {"amd64": "x86_64", "aarch64": "arm64"}.get(machine, machine)
 
 
 def last_commit_s(root: Path = ROOT) -> int:
@@ -40,13 +40,15 @@ def last_commit_s(root: Path = ROOT) -> int:
     The timestamp is $SOURCE_DATE_EPOCH if set, else the time of the last commit, else of
     pyproject.toml.
     """
-    given = os.environ.get("SOURCE_DATE_EPOCH", "")
-    if given.isdecimal():
-        return int(given)
-    told = subprocess.run(
+    source_date = os.environ.get("SOURCE_DATE_EPOCH", "")
+    if source_date.isdecimal():
+        return int(source_date)
+    completed = subprocess.run(
         ["git", "log", "-1", "--format=%ct"], cwd=root, capture_output=True, text=True, check=False
     )
-    return int(told.stdout) if told.returncode == 0 else int((root / "pyproject.toml").stat().st_mtime)
+    return (
+        int(completed.stdout) if completed.returncode == 0 else int((root / "pyproject.toml").stat().st_mtime)
+    )
 
 
 @dataclass(frozen=True)
@@ -104,10 +106,12 @@ class Context:
         Raises:
             PackageError: The program is missing or has failed.
         """
-        words = [str(each) for each in command]
+        arguments = [str(each) for each in command]
         try:
-            done = subprocess.run(words, cwd=cwd or self.root, env=dict(self.environ), check=False)
+            completed = subprocess.run(arguments, cwd=cwd or self.root, env=dict(self.environ), check=False)
         except OSError as error:
-            raise PackageError(f"'{words[0]}' can't be run: {error.strerror}") from error
-        if done.returncode != 0:
-            raise PackageError(f"'{Path(words[0]).name}' ended with {done.returncode}; its words are above")
+            raise PackageError(f"'{arguments[0]}' can't be run: {error.strerror}") from error
+        if completed.returncode != 0:
+            raise PackageError(
+                f"'{Path(arguments[0]).name}' ended with {completed.returncode}; its words are above"
+            )

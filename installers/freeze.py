@@ -32,22 +32,29 @@ def freeze(context: Context) -> Path:
     return context.frozen
 
 
-def add_licences(context: Context, inside: Path, folder: Path) -> Path:
+def add_licences(context: Context, program_folder: Path, folder: Path) -> Path:
     """Write licence texts, notice and bill of materials of a frozen program; return the bill of materials.
 
     Args:
         context: Version and folders; the bill of materials is written to `dist`.
-        inside: Folder of the frozen program.
+        program_folder: Folder of the frozen program.
         folder: Folder for licence texts and notice.
 
     Raises:
         PackageError: A part has no known licence, or writing has failed.
     """
     # A release has one file per system, and two for macOS.
-    of = f"macos-{context.machine}" if context.system == "macos" else context.system
-    bill = context.dist / f"NEP-Studio-{context.version}-{of}.cdx.json"
+    platform_tag = f"macos-{context.machine}" if context.system == "macos" else context.system
+    bill = context.dist / f"NEP-Studio-{context.version}-{platform_tag}.cdx.json"
     inventory = context.root / "installers" / "inventory" / "__main__.py"
     context.run(
-        *context.python, inventory, context.system, str(context.epoch), inside, folder, bill, cwd=context.work
+        *context.python,
+        inventory,
+        context.system,
+        str(context.epoch),
+        program_folder,
+        folder,
+        bill,
+        cwd=context.work,
     )
     return bill

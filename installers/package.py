@@ -60,9 +60,9 @@ def write_sums(folder: Path) -> Path:
     return sums
 
 
-def told(made: Iterable[Path]) -> str:
+def told(paths: Iterable[Path]) -> str:
     """Return the names and sizes of files, one per line."""
-    return "\n".join(f"  {path.name}  {path.stat().st_size / 1e6:.1f} MB" for path in made)
+    return "\n".join(f"  {path.name}  {path.stat().st_size / 1e6:.1f} MB" for path in paths)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -78,17 +78,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ]
     dist = contexts[0].dist
     dist.mkdir(exist_ok=True)
-    begun = time.monotonic()
-    made: list[Path] = []
+    start_s = time.monotonic()
+    paths: list[Path] = []
     try:
         for context in contexts:
-            made += packer_for(context.system).build(context, keep_frozen=options.keep_frozen)
+            paths += packer_for(context.system).build(context, keep_frozen=options.keep_frozen)
     except PackageError as error:
         print(f"package: {error}", file=sys.stderr)
         return 2
     sums = write_sums(dist)
     print(
-        f"· in {dist.name}/, after {time.monotonic() - begun:.0f} s:\n{told([*made, sums])}",
+        f"· in {dist.name}/, after {time.monotonic() - start_s:.0f} s:\n{told([*paths, sums])}",
         flush=True,
     )
     return 0

@@ -43,11 +43,11 @@ def _load_attribute(name: str) -> object:
 
 def _is_submodule(name: str) -> bool:
     # `import nep` gives access to submodules such as `nep.errors`; importing them here keeps that.
-    whole = f"nep.{name}"
+    full_name = f"nep.{name}"
     try:
-        importlib.import_module(whole)
+        importlib.import_module(full_name)
     except ModuleNotFoundError as error:
-        if error.name != whole:
+        if error.name != full_name:
             raise
         return False
     return True

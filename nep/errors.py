@@ -44,7 +44,7 @@ _MAX_REASON_LENGTH = 500
 """Maximum length in characters of a reason received from another program."""
 
 
-def did_you_mean(word: str, known: Sequence[str]) -> str:
+def did_you_mean(word: str, known_names: Sequence[str]) -> str:
     """Return a hint for an unknown word, for use in an error message.
 
     The hint is "did you mean 'zeromq'?" if a known word is similar, else "known names: 'zeromq',
@@ -52,19 +52,19 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
 
     Args:
         word: The unknown word.
-        known: The known words.
+        known_names: The known words.
     """
-    near = nearest(word, known)
-    if near is not None:
-        return _("did you mean '{near}'?").format(near=near)
-    return _("known names: {names}").format(names=", ".join(f"'{name}'" for name in known))
+    nearest_name = nearest(word, known_names)
+    if nearest_name is not None:
+        return _("did you mean '{near}'?").format(near=nearest_name)
+    return _("known names: {names}").format(names=", ".join(f"'{name}'" for name in known_names))
 
 
-def nearest(word: str, known: Sequence[str]) -> str | None:
+def nearest(word: str, known_names: Sequence[str]) -> str | None:
     """Return the known word most similar to `word`, or None if none is similar."""
     if len(word) > _MAX_WORD_LENGTH:  # the cost of the comparison grows with the square of the length
         return None
-    return next(iter(get_close_matches(word, known, n=1)), None)
+    return next(iter(get_close_matches(word, known_names, n=1)), None)
 
 
 class NepError(Exception):
@@ -125,7 +125,7 @@ class NoServerError(WaitTimeoutError):
         self.address = address
         self.known = tuple(known)
         super().__init__(service, timeout_s)
-        near = nearest(service, self.known)
+        nearest_name = nearest(service, self.known)
         if address:
             step = _("start it, or check the address '{address}'").format(address=address)
         elif service in self.known:
@@ -133,8 +133,8 @@ class NoServerError(WaitTimeoutError):
                 "the server can't be reached; programs of the original NEP accept calls only from their "
                 "own computer"
             )
-        elif near is not None:
-            step = _("did you mean '{near}'?").format(near=near)
+        elif nearest_name is not None:
+            step = _("did you mean '{near}'?").format(near=nearest_name)
         else:
             step = _("'nep service list' shows all services")
         self.args = (
@@ -177,10 +177,10 @@ class NoValueError(NepError, KeyError):
     def __init__(self, key: str, known: Sequence[str] = ()) -> None:
         self.key = key
         self.known = tuple(known)
-        near = nearest(key, self.known)
+        nearest_name = nearest(key, self.known)
         step = (
-            _("did you mean '{near}'?").format(near=near)
-            if near is not None
+            _("did you mean '{near}'?").format(near=nearest_name)
+            if nearest_name is not None
             else _("'keys' lists the existing keys")
         )
         super().__init__(

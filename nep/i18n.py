@@ -73,10 +73,12 @@ class _ContextMessage(str):
 class _Catalogue:
     """Translations of one language, with a cache of checked translations."""
 
-    def __init__(self, language: str, found: GNUTranslations | None, facts: Mapping[str, object]) -> None:
+    def __init__(
+        self, language: str, translations: GNUTranslations | None, metadata: Mapping[str, object]
+    ) -> None:
         self.language = language
-        self._translations = found
-        self._metadata = facts
+        self._translations = translations
+        self._metadata = metadata
         self._checked: dict[tuple[str | None, str], str] = {}
         self._rejected: set[str] = set()
 
@@ -116,16 +118,16 @@ class _Catalogue:
         return False
 
     def metadata_text(self, name: str, default: str) -> str:
-        found = self._metadata.get(name)
-        return found if isinstance(found, str) else default
+        value = self._metadata.get(name)
+        return value if isinstance(value, str) else default
 
     def months(self) -> Sequence[str]:
-        found = self._metadata.get("months")
-        return found if isinstance(found, list) else _MONTHS
+        value = self._metadata.get("months")
+        return value if isinstance(value, list) else _MONTHS
 
     def list_pattern(self, kind: str) -> Mapping[str, str]:
-        found = self._metadata.get(kind)
-        return found if isinstance(found, dict) else _LIST_PATTERNS[kind]
+        value = self._metadata.get(kind)
+        return value if isinstance(value, dict) else _LIST_PATTERNS[kind]
 
 
 _current: _Catalogue | None = None
@@ -140,36 +142,36 @@ def _current_catalogue() -> _Catalogue:
     return _current if _current is not None else install(os.environ.get(LANG_VARIABLE, ENGLISH))
 
 
-def install(wanted: str, folder: Path = LOCALE_FOLDER) -> _Catalogue:
+def install(requested: str, folder: Path = LOCALE_FOLDER) -> _Catalogue:
     """Set the language of this process; English if the catalogue is missing or unreadable.
 
     Args:
-        wanted: Language code, such as "es" or "es_MX.UTF-8".
+        requested: Language code, such as "es" or "es_MX.UTF-8".
         folder: Folder of the catalogues.
     """
     global _current  # noqa: PLW0603 - one language per process
-    chosen = best_match(wanted, folder)
-    found = None
-    if chosen != ENGLISH:
-        file = folder / chosen / "LC_MESSAGES" / f"{DOMAIN}.mo"
+    code = best_match(requested, folder)
+    translations = None
+    if code != ENGLISH:
+        file = folder / code / "LC_MESSAGES" / f"{DOMAIN}.mo"
         try:
             with file.open("rb") as stream:
-                found = _gettext_module().GNUTranslations(stream)
+                translations = _gettext_module().GNUTranslations(stream)
         except Exception as error:  # noqa: BLE001 - a damaged catalogue may raise any exception
-            _log.warning("can't load the catalogue of '%s' from '%s': %s", chosen, file, error)
-            chosen = ENGLISH
-    facts = known_languages(folder).get(chosen, {}) if chosen != ENGLISH else {}
-    _current = _Catalogue(chosen, found, facts)
+            _log.warning("can't load the catalogue of '%s' from '%s': %s", code, file, error)
+            code = ENGLISH
+    metadata = known_languages(folder).get(code, {}) if code != ENGLISH else {}
+    _current = _Catalogue(code, translations, metadata)
     return _current
 
 
-def set_initial_language(chosen: str = "") -> None:
-    """Set the language at program start: NEP_LANG, else `chosen`, else the system's language.
+def set_initial_language(preferred: str = "") -> None:
+    """Set the language at program start: NEP_LANG, else `preferred`, else the system's language.
 
     The system's language is used only if enough of it is translated (`MIN_TRANSLATED_SHARE`). Child processes
     inherit the language through the environment, and argparse's own messages use it, too.
     """
-    install(os.environ.get(LANG_VARIABLE) or chosen or _supported_system_language())
+    install(os.environ.get(LANG_VARIABLE) or preferred or _supported_system_language())
     os.environ[LANG_VARIABLE] = language()
     if language() != ENGLISH:
         os.environ["LANGUAGE"] = language()
@@ -178,8 +180,8 @@ def set_initial_language(chosen: str = "") -> None:
 
 
 def _supported_system_language() -> str:
-    found = best_match(system_language())
-    return found if found in dict(selectable_languages()) else ENGLISH
+    code = best_match(system_language())
+    return code if code in dict(selectable_languages()) else ENGLISH
 
 
 def editor_translations(folder: Path = LOCALE_FOLDER) -> Mapping[str, str]:
@@ -195,12 +197,12 @@ def editor_translations(folder: Path = LOCALE_FOLDER) -> Mapping[str, str]:
 
 def selectable_languages(folder: Path = LOCALE_FOLDER) -> list[tuple[str, str]]:
     """Return (code, native name) of each selectable language; the pseudo-language only while it is in use."""
-    found = [
-        (name, str(known.get("name", name)))
-        for name, known in known_languages(folder).items()
-        if isinstance(share := known.get("share"), float) and share >= MIN_TRANSLATED_SHARE
+    languages = [
+        (name, str(metadata.get("name", name)))
+        for name, metadata in known_languages(folder).items()
+        if isinstance(share := metadata.get("share"), float) and share >= MIN_TRANSLATED_SHARE
     ]
-    return [*found, (PSEUDO_LANGUAGE, "[Pseudo]")] if language() == PSEUDO_LANGUAGE else found
+    return [*languages, (PSEUDO_LANGUAGE, "[Pseudo]")] if language() == PSEUDO_LANGUAGE else languages
 
 
 def language() -> str:
@@ -270,21 +272,21 @@ def format_list(items: Sequence[str], kind: Literal["and", "or"] = "and") -> str
 
 def number(value: float, spec: str = "g") -> str:
     """Format a number with the decimal and group separators of the current language."""
-    words = _current_catalogue()
+    catalogue = _current_catalogue()
     text = format(value, spec)
-    signs = {".": words.metadata_text("decimal", "."), ",": words.metadata_text("group", ",")}
+    signs = {".": catalogue.metadata_text("decimal", "."), ",": catalogue.metadata_text("group", ",")}
     return text if signs == {".": ".", ",": ","} else "".join(signs.get(each, each) for each in text)
 
 
 def day_text(day: int, month: int, year: int | None = None) -> str:
     """Format a date in the current language: "17 November" or "17 November 2025"."""
-    words = _current_catalogue()
+    catalogue = _current_catalogue()
     pattern = (
-        words.metadata_text("day", "{day} {month}")
+        catalogue.metadata_text("day", "{day} {month}")
         if year is None
-        else words.metadata_text("day_of_year", "{day} {month} {year}")
+        else catalogue.metadata_text("day_of_year", "{day} {month} {year}")
     )
-    return pattern.format(day=day, month=words.months()[month - 1], month_number=month, year=year)
+    return pattern.format(day=day, month=catalogue.months()[month - 1], month_number=month, year=year)
 
 
 def placeholders(text: str) -> frozenset[str]:
@@ -310,19 +312,19 @@ def known_languages(folder: Path = LOCALE_FOLDER) -> Mapping[str, Mapping[str, o
     Read from a file that ``tools/words.py compile`` generates; empty if the file is missing.
     """
     try:
-        found = json.loads((folder / "languages.json").read_text(encoding="utf-8"))
+        languages = json.loads((folder / "languages.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return languages if isinstance(languages, dict) else {}
 
 
-def best_match(wanted: str, folder: Path = LOCALE_FOLDER) -> str:
+def best_match(locale_name: str, folder: Path = LOCALE_FOLDER) -> str:
     """Return the available language for a locale name such as "es_MX.UTF-8"; English if none matches."""
-    plain = re.split(r"[.@]", wanted.replace("-", "_"))[0].lower()
-    if plain == PSEUDO_LANGUAGE:
+    code = re.split(r"[.@]", locale_name.replace("-", "_"))[0].lower()
+    if code == PSEUDO_LANGUAGE:
         return PSEUDO_LANGUAGE
     available = {name.lower(): name for name in known_languages(folder)}
-    return available.get(plain) or available.get(plain.partition("_")[0]) or ENGLISH
+    return available.get(code) or available.get(code.partition("_")[0]) or ENGLISH
 
 
 def system_language(environ: Mapping[str, str] = os.environ, platform: str = sys.platform) -> str:

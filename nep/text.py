@@ -32,8 +32,8 @@ _SURROGATE_PATTERN = re.compile("[\ud800-\udfff]")
 
 def first_control(text: str) -> str:
     r"""Return the first control character of `text`, escaped (`\x1b`), or "" if it has none."""
-    found = _CONTROL_PATTERN.search(text)
-    return "" if found is None else _escape_match(found)
+    match = _CONTROL_PATTERN.search(text)
+    return "" if match is None else _escape_match(match)
 
 
 def escaped(text: str, *, lines: bool = False) -> str:
@@ -59,11 +59,11 @@ def strip_controls(text: str, *, lines: bool = False) -> str:
     return _CONTROL_PATTERN.sub("", re.sub("[\n\t\u2028\u2029]", " ", text))
 
 
-def shortened(text: str, most: int) -> str:
-    """Return `text` if it has at most `most` characters, else its beginning followed by its length."""
-    if len(text) <= most:
+def shortened(text: str, max_length: int) -> str:
+    """Return `text` if it has at most `max_length` characters, else its beginning followed by its length."""
+    if len(text) <= max_length:
         return text
-    return _("{beginning}… ({count} characters)").format(beginning=text[:most], count=len(text))
+    return _("{beginning}… ({count} characters)").format(beginning=text[:max_length], count=len(text))
 
 
 def bounded_str(value: object, max_length: int = _MAX_QUOTED_LENGTH) -> str:
@@ -124,5 +124,5 @@ def _safe_str(value: object) -> str:
     return text or type(value).__name__
 
 
-def _escape_match(found: re.Match[str]) -> str:
-    return ascii(found.group())[1:-1]
+def _escape_match(match: re.Match[str]) -> str:
+    return ascii(match.group())[1:-1]

@@ -44,12 +44,12 @@ They are slow, need ROS 1, Node.js or a package of Studio, or don't measure time
 
 def main() -> int:
     """Run the requested benchmarks; return the exit code."""
-    own, dashes, rest = " ".join(sys.argv[1:]).partition("--")
+    own_arguments, dashes, rest = " ".join(sys.argv[1:]).partition("--")
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("names", nargs="*", choices=[*NAMES, *ASKED, []], help="all when none is given")
-    names = parser.parse_args(own.split() if dashes else None).names or NAMES
+    names = parser.parse_args(own_arguments.split() if dashes else None).names or NAMES
     codes = []
     for name in names:
         print(f"\n=== {name}", flush=True)

@@ -40,18 +40,18 @@ def page(text: str) -> str:
 
 
 def _row(block: Block) -> str:
-    told = " ".join(_HOLE.sub(lambda hole: f"({hole[1].lower()})", block.text).split())
-    does = " ".join(part for part in (block.tooltip, block.help, EXAMPLES[block.type]) if part)
-    return f"| {told} | {does} | {_python(block)} |"
+    label = " ".join(_HOLE.sub(lambda hole: f"({hole[1].lower()})", block.text).split())
+    description = " ".join(part for part in (block.tooltip, block.help, EXAMPLES[block.type]) if part)
+    return f"| {label} | {description} | {_python(block)} |"
 
 
 def _python(block: Block) -> str:
     if block.mutator in ("function", "call"):
         return "`def name(inputs): …`" if block.mutator == "function" else "`name(inputs)`"
-    shown = (_HOLE.sub(lambda hole: hole[1].lower(), each) for each in block.templates)
+    templates = (_HOLE.sub(lambda hole: hole[1].lower(), each) for each in block.templates)
     lines = (
         re.sub(r"\s*\n\s*", " ", each).replace(" body", " …").replace(" else: else", " else: …")
-        for each in shown
+        for each in templates
     )
     return f"`{' · '.join(lines)}`"
 

@@ -59,7 +59,7 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
     """Return all checks, cheapest first; `fast` omits pytest."""
     python = sys.executable
     lint_imports = str(Path(sysconfig.get_path("scripts")) / "lint-imports")
-    found = (
+    all_checks = (
         Check("ruff check", (python, "-m", "ruff", "check", ".")),
         Check("ruff format", (python, "-m", "ruff", "format", "--check", ".")),
         Check("mypy", (python, "-m", "mypy")),
@@ -68,8 +68,10 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
         Check("pytest", (python, "-m", "pytest", *side_by_side(), *pytest_arguments)),
     )
     if fast:
-        return found[:-2]
-    return (*found[:-2], found[-1]) if pytest_arguments else found  # a few tests are collected quickly anyway
+        return all_checks[:-2]
+    return (
+        (*all_checks[:-2], all_checks[-1]) if pytest_arguments else all_checks
+    )  # a few tests are collected quickly anyway
 
 
 def side_by_side() -> tuple[str, ...]:
@@ -91,7 +93,7 @@ def run(check: Check) -> Outcome:
     environ = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     begin = time.monotonic()
     out, errors = (subprocess.PIPE, subprocess.STDOUT) if check.in_background else (None, None)
-    done = subprocess.run(
+    completed = subprocess.run(
         check.command,
         cwd=ROOT,
         check=False,
@@ -101,19 +103,19 @@ def run(check: Check) -> Outcome:
         text=True,
         errors="replace",
     )
-    if check.in_background and done.returncode != 0:
-        print(f"\n=== {check.name}\n{done.stdout}", flush=True)
-    return Outcome(check.name, done.returncode == 0, time.monotonic() - begin)
+    if check.in_background and completed.returncode != 0:
+        print(f"\n=== {check.name}\n{completed.stdout}", flush=True)
+    return Outcome(check.name, completed.returncode == 0, time.monotonic() - begin)
 
 
-def run_all(found: Sequence[Check]) -> list[Outcome]:
+def run_all(all_checks: Sequence[Check]) -> list[Outcome]:
     """Run the checks in order and return their outcomes.
 
     Checks with `in_background` run in the background from the start; later checks wait for them.
     """
     with ThreadPoolExecutor() as pool:
-        background = {check: pool.submit(run, check) for check in found if check.in_background}
-        return [background[check].result() if check.in_background else run(check) for check in found]
+        background = {check: pool.submit(run, check) for check in all_checks if check.in_background}
+        return [background[check].result() if check.in_background else run(check) for check in all_checks]
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:

@@ -25,12 +25,12 @@ class Trouble(Exception):  # noqa: N818 (not a fault of this program, but of the
 def _ask(command: Sequence[str]) -> str:
     # Returns the output in English, or "" if the command can't run.
     try:
-        done = subprocess.run(
+        completed = subprocess.run(
             command, capture_output=True, text=True, check=False, env={**os.environ, "LC_ALL": "C"}
         )
     except OSError:
         return ""
-    return done.stdout
+    return completed.stdout
 
 
 def watch(command: Sequence[str], environ: Mapping[str, str], log: Path | None = None) -> int:
@@ -102,9 +102,9 @@ def venv_python(folder: Path, platform: str) -> Path:
 
 
 @contextlib.contextmanager
-def timed(what: str) -> Iterator[None]:
+def timed(description: str) -> Iterator[None]:
     """Print a description when entering the context, and the elapsed time when leaving it."""
-    print(f"· {what} …", flush=True)
+    print(f"· {description} …", flush=True)
     begin = time.monotonic()
     yield
     print(f"  done in {time.monotonic() - begin:.1f} s", flush=True)

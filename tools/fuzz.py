@@ -37,8 +37,8 @@ def seconds_each(weights: Mapping[str, int], minutes: float) -> dict[str, int]:
         minutes: Total time. Each target gets at least `MIN_S` seconds.
     """
     shares = {name: 2 if weight > 1 else 1 for name, weight in weights.items()}
-    one = minutes * 60 / max(1, sum(shares.values()))
-    return {name: max(MIN_S, round(one * share)) for name, share in shares.items()}
+    unit_s = minutes * 60 / max(1, sum(shares.values()))
+    return {name: max(MIN_S, round(unit_s * share)) for name, share in shares.items()}
 
 
 def findings_in(folder: Path) -> list[Path]:
@@ -49,12 +49,12 @@ def findings_in(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob("*") if path.suffix != ".txt") if folder.is_dir() else []
 
 
-def fuzz(computer: Computer, given: Sequence[str], folder: Path = FOLDER) -> int:
+def fuzz(computer: Computer, arguments: Sequence[str], folder: Path = FOLDER) -> int:
     """Fuzz the requested targets; return 1 if there are findings, else 0.
 
     Args:
         computer: Computer to run on.
-        given: Command-line arguments.
+        arguments: Command-line arguments.
         folder: Folder of the environment, the corpus and the findings.
     """
     parser = argparse.ArgumentParser(
@@ -64,7 +64,7 @@ def fuzz(computer: Computer, given: Sequence[str], folder: Path = FOLDER) -> int
     parser.add_argument("--minutes", type=float, default=MINUTES, help="for all targets together")
     parser.add_argument("--list", action="store_true", help="name the targets")
     parser.add_argument("--again", type=Path, metavar="FILE", help="give these bytes to their target")
-    options = parser.parse_args([each for each in given if each != "--"])
+    options = parser.parse_args([each for each in arguments if each != "--"])
     if not 0 < options.minutes <= 24 * 60:
         parser.error("--minutes is more than 0 and at most 1440")
     if computer.platform != "linux":
@@ -79,11 +79,11 @@ def fuzz(computer: Computer, given: Sequence[str], folder: Path = FOLDER) -> int
         return 0
     if unknown := [name for name in options.names if name not in weights]:
         raise Trouble(f"there is no target '{unknown[0]}'; --list names them")
-    wanted = {name: weights[name] for name in options.names or weights}
-    found = folder / "findings"
-    shutil.rmtree(found, ignore_errors=True)
-    found.mkdir(parents=True)
-    plan = [f"{name}={seconds}" for name, seconds in seconds_each(wanted, options.minutes).items()]
+    selected = {name: weights[name] for name in options.names or weights}
+    findings_folder = folder / "findings"
+    shutil.rmtree(findings_folder, ignore_errors=True)
+    findings_folder.mkdir(parents=True)
+    plan = [f"{name}={seconds}" for name, seconds in seconds_each(selected, options.minutes).items()]
     code = computer.do([*command, str(folder), *plan], computer.environ, None)
     return max(code, _told(folder / "findings"))
 
@@ -99,14 +99,14 @@ def _targets(computer: Computer, command: Sequence[str]) -> dict[str, int]:
 
 def _told(folder: Path) -> int:
     # Prints the findings; returns 1 if there are any.
-    found = findings_in(folder)
-    for path in found:
-        beside = path.with_suffix(".txt")
+    findings = findings_in(folder)
+    for path in findings:
+        report_path = path.with_suffix(".txt")
         print(f"\n=== {path}", flush=True)
         print(
-            beside.read_text(encoding="utf-8")
-            if beside.is_file()
+            report_path.read_text(encoding="utf-8")
+            if report_path.is_file()
             else "it takes too long, or too much memory"
         )
-    print(f"· {len(found)} findings in {folder}", flush=True)
-    return 1 if found else 0
+    print(f"· {len(findings)} findings in {folder}", flush=True)
+    return 1 if findings else 0

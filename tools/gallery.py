@@ -44,14 +44,14 @@ WAVE = (1.0, 3.0, 2.0, 5.0, 4.0, 6.0, 2.0, 3.0, 1.0, 4.0)
 
 def row(*widgets: QWidget) -> QWidget:
     """Create a widget that shows the given widgets side by side."""
-    made = QWidget()
-    line = QHBoxLayout(made)
+    container = QWidget()
+    line = QHBoxLayout(container)
     line.setContentsMargins(0, 0, 0, 0)
     line.setSpacing(8)
     for widget in widgets:
         line.addWidget(widget)
     line.addStretch(1)
-    return made
+    return container
 
 
 def _buttons(theme: Theme) -> list[QWidget]:
@@ -63,11 +63,11 @@ def _buttons(theme: Theme) -> list[QWidget]:
     stopping.show_state("Stopping", ring=True)
     outlined = StopButton(theme, "appBar")
     outlined.show_state("Stop", filled=False)
-    again = StopButton(theme, "toolBar")
-    again.show_state("Stop again")
+    stop_again = StopButton(theme, "toolBar")
+    stop_again.show_state("Stop again")
     return [
         row(run, idle, RunButton(theme, "Step", "step-forward"), StopButton(theme), stopping),
-        row(again, outlined, StopButton(theme, "toolBar")),
+        row(stop_again, outlined, StopButton(theme, "toolBar")),
         row(
             Button(theme, "Use the virtual robot", "bot", kind="primary", size="large"),
             Button(theme, "New behaviour", size="large"),
@@ -88,9 +88,9 @@ def _fields(theme: Theme) -> list[QWidget]:
     languages: list[tuple[str, str, str | None]] = [
         ("en", "English", None), ("fr", "French", None), ("ja", "Japanese", None),
     ]  # fmt: skip
-    wrong = SliderWithUnit(theme, 0, 1, step=0.05, value=0.5, unit="m", name="Distance")
-    wrong.field.setText("2.4")
-    wrong.field.editingFinished.emit()
+    invalid = SliderWithUnit(theme, 0, 1, step=0.05, value=0.5, unit="m", name="Distance")
+    invalid.field.setText("2.4")
+    invalid.field.editingFinished.emit()
     return [
         row(
             *(Chip(theme, name, name) for name in ("ok", "warn", "error", "info", "off", "running")),
@@ -103,7 +103,7 @@ def _fields(theme: Theme) -> list[QWidget]:
             Switch(theme, "loud", True),
         ),
         SliderWithUnit(theme, 0, 100, value=60, unit="%", name="Volume"),
-        wrong,
+        invalid,
         ColourSwatches(theme, "#3ab7ff"),
     ]
 
@@ -118,9 +118,9 @@ def _rest(theme: Theme) -> list[QWidget]:
         "error", "The camera of Pepper has been silent for 4 s.", "The behaviour waits.", "Look", 2
     )
     card = Card(theme)
-    inside = QVBoxLayout(card)
-    inside.addWidget(label("Create a behaviour", "heading"))
-    inside.addWidget(label("Start with an empty page.", "bodyLarge", role="textSecondary"))
+    layout = QVBoxLayout(card)
+    layout.addWidget(label("Create a behaviour", "heading"))
+    layout.addWidget(label("Start with an empty page.", "bodyLarge", role="textSecondary"))
     empty = EmptyState(
         theme,
         "radio-tower",
@@ -135,14 +135,14 @@ def _rest(theme: Theme) -> list[QWidget]:
 
 def page(theme: Theme) -> QWidget:
     """Create a page with all widgets."""
-    made = QWidget()
-    made.setAutoFillBackground(True)
-    column = QVBoxLayout(made)
+    container = QWidget()
+    container.setAutoFillBackground(True)
+    column = QVBoxLayout(container)
     column.setSpacing(12)
     column.addWidget(label("What would you like to do?", "display"))
     for widget in (*_buttons(theme), *_fields(theme), *_rest(theme)):
         column.addWidget(widget)
-    return made
+    return container
 
 
 def pictures(percent: int) -> QPixmap:
@@ -151,37 +151,37 @@ def pictures(percent: int) -> QPixmap:
     for mode in ("light", "dark"):
         theme = Theme("light" if mode == "light" else "dark")
         theme.set_text_percent(percent)
-        made = page(theme)
-        made.resize(820, 980)
-        made.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen)
-        made.show()
-        shots.append(made.grab())
-        made.close()
-    whole = QPixmap(sum(shot.width() for shot in shots), max(shot.height() for shot in shots))
-    whole.fill(QColor(Qt.GlobalColor.gray))
-    painter = QPainter(whole)
+        widget = page(theme)
+        widget.resize(820, 980)
+        widget.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen)
+        widget.show()
+        shots.append(widget.grab())
+        widget.close()
+    combined = QPixmap(sum(shot.width() for shot in shots), max(shot.height() for shot in shots))
+    combined.fill(QColor(Qt.GlobalColor.gray))
+    painter = QPainter(combined)
     left = 0
     for shot in shots:
         painter.drawPixmap(left, 0, shot)
         left += shot.width()
     painter.end()
-    return whole
+    return combined
 
 
 def main() -> int:
     """Show the gallery or save its image."""
-    asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("picture", nargs="?", type=Path)
-    asked.add_argument("--text", type=int, default=100)
-    options = asked.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("picture", nargs="?", type=Path)
+    parser.add_argument("--text", type=int, default=100)
+    options = parser.parse_args()
     application = QApplication(sys.argv[:1])
     fonts.load()
     if options.picture is not None:
         return 0 if pictures(options.text).save(str(options.picture)) else 1
     theme = Theme("system")
     theme.apply()
-    shown = page(theme)
-    shown.show()
+    gallery = page(theme)
+    gallery.show()
     return application.exec()
 
 

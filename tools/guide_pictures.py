@@ -46,11 +46,11 @@ TAB = "document.querySelector('.nepTab:not([hidden])')"
 TALK, SWING = "talk", "swing"  # blocks highlighted in the images
 
 
-def variable(kind: str, *, id: str = "", **given: object) -> Block:
+def variable(kind: str, *, id: str = "", **kwargs: object) -> Block:
     """Create a block that uses the variable "points"."""
-    made = block(kind, id=id, **given)
-    made["fields"] = {"VAR": {"id": "points"}}
-    return made
+    result = block(kind, id=id, **kwargs)
+    result["fields"] = {"VAR": {"id": "points"}}
+    return result
 
 
 def placed(x: int, y: int, script: Block) -> Block:
@@ -74,8 +74,8 @@ def hello() -> list[Block]:
 
 def beginning() -> list[Block]:
     """Return one script: a start block with one block below it."""
-    say = pepper("do_say", id=TALK, TEXT=text("Hello! I am Pepper."))
-    return [placed(28, 28, chain(block("events_started"), say))]
+    say_block = pepper("do_say", id=TALK, TEXT=text("Hello! I am Pepper."))
+    return [placed(28, 28, chain(block("events_started"), say_block))]
 
 
 def counting() -> list[Block]:
@@ -204,15 +204,15 @@ class GuidePictures(SelfDrive):
         # Drags a block from the toolbox to the end of the script.
         labels = f"[...{TAB}.querySelectorAll('.blocklyToolboxCategoryLabel')]"
         movement = f"{labels}.find(e => e.textContent === {json.dumps(translate('category', 'Movement'))})"
-        turn = f"{TAB}.querySelector('.blocklyFlyout .robot_pepper_do_turn')"
+        turn_block = f"{TAB}.querySelector('.blocklyFlyout .robot_pepper_do_turn')"
         last = f"{TAB}.querySelector('[data-id={TALK}] > .blocklyPath')"
 
         def open_it() -> None:
-            at = self._place(movement).center()
-            QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=at)
+            position = self._place(movement).center()
+            QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=position)
 
         def carry() -> None:
-            start, end = self._place(turn).topLeft() + QPoint(12, 18), self._place(last).bottomLeft()
+            start, end = self._place(turn_block).topLeft() + QPoint(12, 18), self._place(last).bottomLeft()
             QTest.mouseMove(self._target, start)
             QTest.mousePress(self._target, Qt.MouseButton.LeftButton, pos=start)
             self._way = [start + (end + QPoint(36, 34) - start) * part / WAY for part in range(1, WAY + 1)]
@@ -220,14 +220,14 @@ class GuidePictures(SelfDrive):
         def move() -> bool:
             # One step per call, so that the page repaints in between.
             if self._way:
-                at = self._way.pop(0)
-                QTest.mouseMove(self._target, at)
-                self._mouse = self._target.mapTo(self._window, at)
+                position = self._way.pop(0)
+                QTest.mouseMove(self._target, position)
+                self._mouse = self._target.mapTo(self._window, position)
             return not self._way
 
         return [
             Step("its categories", lambda: None, lambda: self._is_there(movement), 20),
-            Step("a category", open_it, lambda: self._is_there(turn) and self._is_there(last), 20),
+            Step("a category", open_it, lambda: self._is_there(turn_block) and self._is_there(last), 20),
             Step("a block in the hand", carry, move, 10, "toolbox", 1.0),
             Step("it is let go", self._let_go, lambda: True, settle_s=1.0),
         ]
@@ -243,16 +243,16 @@ class GuidePictures(SelfDrive):
         first = f"{TAB}.querySelector('.blocklyBlockCanvas .robot_pepper_do_turn > .blocklyPath')"
 
         def choose() -> None:
-            at = self._place(first).topLeft() + QPoint(10, 12)
-            QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=at)
+            position = self._place(first).topLeft() + QPoint(10, 12)
+            QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=position)
 
         def pack() -> None:
             keys = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
             QTest.keyClick(self._target, Qt.Key.Key_P, keys)
 
         def look_into() -> None:
-            at = self._place(button).center()
-            QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=at)
+            position = self._place(button).center()
+            QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=position)
 
         return [
             Step("the blocks", lambda: None, lambda: self._is_there(first) and self._is_there(button), 20),
@@ -278,10 +278,10 @@ class GuidePictures(SelfDrive):
     def _target(self) -> QWidget:
         # The widget that receives mouse and key events.
         web = self._editor.web
-        found = web.keyboard_target() if web is not None else None
-        if not isinstance(found, QWidget):
+        target = web.keyboard_target() if web is not None else None
+        if not isinstance(target, QWidget):
             raise TypeError("the page of the blocks is not there yet")
-        return found
+        return target
 
     def _page_is_there(self) -> bool:
         return getattr(getattr(self._window.editor(), "editor", None), "is_ready", False)
@@ -293,10 +293,10 @@ class GuidePictures(SelfDrive):
 
     def _place(self, element: str) -> QRect:
         # The last known position.
-        place = self._answers[element]
-        if not isinstance(place, list):
+        rect = self._answers[element]
+        if not isinstance(rect, list):
             raise TypeError(f"{element} is not there")
-        return QRect(*(round(each) for each in place))
+        return QRect(*(round(each) for each in rect))
 
     def _ask(self, element: str) -> None:
         script = (
@@ -304,8 +304,8 @@ class GuidePictures(SelfDrive):
             f" return r ? JSON.stringify([r.left, r.top, r.width, r.height]) : ''; }})({element})"
         )
 
-        def take(answer: object) -> None:
-            self._answers[element] = json.loads(answer) if isinstance(answer, str) and answer else None
+        def take(result: object) -> None:
+            self._answers[element] = json.loads(result) if isinstance(result, str) and result else None
 
         if self._page_is_there() and self._editor.web is not None:
             self._editor.web.page.runJavaScript(script, take)
@@ -324,9 +324,9 @@ class GuidePictures(SelfDrive):
         picture = self._window.grab(crop()) if crop is not None else self._window.grab()
         if self._mouse is not None and crop is not None:
             paint_mouse(picture, self._mouse - crop().topLeft())
-        most = round(WIDE * IMAGE_PIXEL_RATIO)
-        if picture.width() > most:
-            picture = picture.scaledToWidth(most, Qt.TransformationMode.SmoothTransformation)
+        max_width = round(WIDE * IMAGE_PIXEL_RATIO)
+        if picture.width() > max_width:
+            picture = picture.scaledToWidth(max_width, Qt.TransformationMode.SmoothTransformation)
         path = self._folder / f"{name}.png"
         if picture.save(str(path)):
             self.pictures.append(path)
@@ -369,8 +369,8 @@ def take_all(folder: Path) -> int:
     for language in languages:
         for theme in THEMES:
             environ = {**os.environ, LANG_VARIABLE: language, "QT_SCALE_FACTOR": f"{IMAGE_PIXEL_RATIO:g}"}
-            into = folder / language / theme
-            command = [sys.executable, "-m", "tools.guide_pictures", str(into), "--theme", theme]
+            target_folder = folder / language / theme
+            command = [sys.executable, "-m", "tools.guide_pictures", str(target_folder), "--theme", theme]
             failed += subprocess.run(command, env=environ, cwd=ROOT, check=False).returncode != 0
     return min(failed, 1)
 
@@ -380,8 +380,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("folder", nargs="?", type=Path, default=FOLDER)
     parser.add_argument("--theme", choices=THEMES, help="only these colours, in the language of now")
-    asked = parser.parse_args(arguments)
-    return take_screenshots(asked.folder, asked.theme) if asked.theme else take_all(asked.folder)
+    options = parser.parse_args(arguments)
+    return take_screenshots(options.folder, options.theme) if options.theme else take_all(options.folder)
 
 
 if __name__ == "__main__":

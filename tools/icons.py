@@ -22,10 +22,10 @@ def inside(svg: str) -> str:
     Raises:
         ValueError: The text isn't a Lucide icon.
     """
-    found = HEAD.fullmatch(svg)
-    if found is None:
+    match = HEAD.fullmatch(svg)
+    if match is None:
         raise ValueError("no svg element")
-    return re.sub(r"\s*/>", "/>", re.sub(r">\s+<", "><", found.group(1).strip()))
+    return re.sub(r"\s*/>", "/>", re.sub(r">\s+<", "><", match.group(1).strip()))
 
 
 def main(package: Path) -> int:

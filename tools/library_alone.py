@@ -43,13 +43,13 @@ def installed() -> list[str]:
 def modules() -> list[str]:
     """Check that all modules of nep, including back ends, can be imported; return the failures."""
     faults = []
-    for found in pkgutil.walk_packages(nep.__path__, "nep."):
-        if found.name == "nep.__main__":  # this runs the command itself
+    for module_info in pkgutil.walk_packages(nep.__path__, "nep."):
+        if module_info.name == "nep.__main__":  # this runs the command itself
             continue
         try:
-            importlib.import_module(found.name)
+            importlib.import_module(module_info.name)
         except ImportError as error:
-            faults.append(f"{found.name} is not imported: {error}")
+            faults.append(f"{module_info.name} is not imported: {error}")
     return faults
 
 
@@ -61,10 +61,13 @@ def messages(master: str | None) -> list[str]:
     """
     backend = "zeromq" if master else "memory"
     faults = []
-    with nep.node("talker", backend, master=master) as one, nep.node("hearer", backend, master=master) as two:
+    with (
+        nep.node("talker", backend, master=master) as talker,
+        nep.node("hearer", backend, master=master) as two,
+    ):
         for msg_type, sent in MESSAGES.items():
             subscriber = two.new_sub(msg_type, msg_type)
-            one.new_pub(msg_type, msg_type).publish(sent)
+            talker.new_pub(msg_type, msg_type).publish(sent)
             message = subscriber.receive(WAIT_S)
             if message is None or message.payload != sent:
                 faults.append(f"{backend}: {sent!r} came as {message!r}")
@@ -77,10 +80,10 @@ def _added_up(request: Any) -> dict[str, int]:  # noqa: ANN401 - whatever JSON a
 
 def services(master: str) -> list[str]:
     """Check a service whose server runs in a separate thread; return the failures."""
-    with nep.node("server", master=master) as one, nep.node("caller", master=master) as two:
-        one.new_server("sum", _added_up, threads=1)
-        answer = two.new_client("sum", timeout_s=WAIT_S).call({"of": [1, 2, 3]})
-    return [] if answer == {"sum": 6} else [f"the service answered {answer!r}"]
+    with nep.node("server", master=master) as server, nep.node("caller", master=master) as two:
+        server.new_server("sum", _added_up, threads=1)
+        reply = two.new_client("sum", timeout_s=WAIT_S).call({"of": [1, 2, 3]})
+    return [] if reply == {"sum": 6} else [f"the service answered {reply!r}"]
 
 
 def sentences(master: str) -> list[str]:
@@ -107,11 +110,13 @@ def command_line(master: str) -> list[str]:
     """Check the installed command `nep`; return the failures."""
     faults = []
     for arguments in (["--help"], ["--master", master, "topic", "list"], ["--master", master, "doctor"]):
-        done = _said(arguments)
+        completed = _said(arguments)
         # The doctor may find a problem of this computer.
         allowed = {0, 1} if "doctor" in arguments else {0}
-        if "Traceback" in done.stderr or done.returncode not in allowed:
-            faults.append(f"nep {' '.join(arguments)} ended with {done.returncode}: {done.stderr[-500:]}")
+        if "Traceback" in completed.stderr or completed.returncode not in allowed:
+            faults.append(
+                f"nep {' '.join(arguments)} ended with {completed.returncode}: {completed.stderr[-500:]}"
+            )
     if _said(["--help"], "es").stdout == _said(["--help"]).stdout:
         faults.append("nep --help says the same in Spanish and in English: its translations are missing")
     return faults

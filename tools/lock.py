@@ -42,17 +42,17 @@ def command(uv: str, extra: str, output: Path, upgrade: bool) -> list[str]:
         output: File to write.
         upgrade: True to pin the newest versions; otherwise existing pins are retained.
     """
-    found = [uv, "pip", "compile", "--quiet", "--universal", "--python-version", OLDEST_PYTHON]
-    found += ["--generate-hashes", "--no-annotate", "--no-header", "--no-emit-package", "nep-studio"]
-    found += ["--output-file", str(output)]
+    arguments = [uv, "pip", "compile", "--quiet", "--universal", "--python-version", OLDEST_PYTHON]
+    arguments += ["--generate-hashes", "--no-annotate", "--no-header", "--no-emit-package", "nep-studio"]
+    arguments += ["--output-file", str(output)]
     if extra == INSTALLER:
-        return [*found, *(["--upgrade"] if upgrade else []), "-"]
+        return [*arguments, *(["--upgrade"] if upgrade else []), "-"]
     if extra != PLAIN:
-        found += ["--extra", extra]
-    found += [f"--constraint={output.with_name(f'{each}.txt')}" for each in LOCKED[: LOCKED.index(extra)]]
+        arguments += ["--extra", extra]
+    arguments += [f"--constraint={output.with_name(f'{each}.txt')}" for each in LOCKED[: LOCKED.index(extra)]]
     if upgrade:
-        found.append("--upgrade")
-    return [*found, "pyproject.toml", "-"]
+        arguments.append("--upgrade")
+    return [*arguments, "pyproject.toml", "-"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,12 +71,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for extra in (*LOCKED, INSTALLER):
         output = ROOT / "requirements" / f"{extra}.txt"
         output.parent.mkdir(exist_ok=True)
-        wanted = "uv>=0.9" if extra == INSTALLER else builds
-        done = subprocess.run(
-            command(uv, extra, output, options.upgrade), cwd=ROOT, input=wanted, text=True, check=False
+        requirements = "uv>=0.9" if extra == INSTALLER else builds
+        completed = subprocess.run(
+            command(uv, extra, output, options.upgrade), cwd=ROOT, input=requirements, text=True, check=False
         )
-        if done.returncode != 0:
-            return done.returncode
+        if completed.returncode != 0:
+            return completed.returncode
     return 0
 
 

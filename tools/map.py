@@ -43,17 +43,17 @@ def graph() -> grimp.ImportGraph:
     return grimp.build_graph("nep", "app")
 
 
-def child_imports(of: grimp.ImportGraph, package: str) -> Imports:
+def child_imports(import_graph: grimp.ImportGraph, package: str) -> Imports:
     """Return the imports between a package's children; imports of a child's subpackages are included.
 
     The children have no import cycles.
     """
-    children = of.find_children(package)
+    children = import_graph.find_children(package)
     return {
         child: frozenset(
             other
             for other in children - {child}
-            if of.direct_import_exists(importer=child, imported=other, as_packages=True)
+            if import_graph.direct_import_exists(importer=child, imported=other, as_packages=True)
         )
         for child in sorted(children)
     }
@@ -63,25 +63,27 @@ def transitive_reduction(imports: Imports) -> Imports:
     """Return the imports without those that are implied by others."""
 
     def reachable(begin: str, seen: set[str]) -> set[str]:
-        for each in imports[begin] - seen:
-            seen.add(each)
-            reachable(each, seen)
+        for imported in imports[begin] - seen:
+            seen.add(imported)
+            reachable(imported, seen)
         return seen
 
     return {
         name: frozenset(
-            other for other in others if not any(other in reachable(each, set()) for each in others - {other})
+            other
+            for other in others
+            if not any(other in reachable(imported, set()) for imported in others - {other})
         )
         for name, others in imports.items()
     }
 
 
-def diagram(of: grimp.ImportGraph, package: str) -> str:
+def diagram(import_graph: grimp.ImportGraph, package: str) -> str:
     """Return a Mermaid diagram of the imports between a package's children."""
     lines = ["```mermaid", "graph TD"]
-    reduced = transitive_reduction(child_imports(of, package))
+    reduced = transitive_reduction(child_imports(import_graph, package))
     short = {name: name.rpartition(".")[2] for name in reduced}
-    folders = {name for name in reduced if of.find_children(name)}
+    folders = {name for name in reduced if import_graph.find_children(name)}
     lines += [
         f"  {short[name]}{f'[{short[name]}/]' if name in folders else f'({short[name]})'}" for name in reduced
     ]
@@ -108,10 +110,10 @@ def listing(package: str) -> str:
     """Return a list of all packages with their summaries, indented by depth."""
     home = ROOT / package
     lines = []
-    for each in packages(home):
-        depth = len(each.relative_to(home).parts)
-        name = f"`{each.relative_to(ROOT).as_posix()}/`" if depth == 0 else f"`{each.name}/`"
-        lines.append(f"{'  ' * depth}- {name} {summary(each)}")
+    for folder in packages(home):
+        depth = len(folder.relative_to(home).parts)
+        name = f"`{folder.relative_to(ROOT).as_posix()}/`" if depth == 0 else f"`{folder.name}/`"
+        lines.append(f"{'  ' * depth}- {name} {summary(folder)}")
     return "\n".join(lines)
 
 
@@ -136,10 +138,10 @@ def with_table(text: str) -> str:
 
 def page() -> str:
     """Return the text of docs/map.md."""
-    of = graph()
+    import_graph = graph()
     parts = [HEAD, "## Packages", listing("app"), listing("nep"), "## Imports"]
     for package in DIAGRAMS:
-        parts += [f"### {package}", diagram(of, package)]
+        parts += [f"### {package}", diagram(import_graph, package)]
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 

@@ -21,11 +21,11 @@ _ACCENTS = str.maketrans(
 
 def pseudo(english: str) -> str:
     """Convert `Run` to `[Ŕúñ ~~]`: a third longer, with brackets and accents; placeholders stay unchanged."""
-    pieces, at = [], 0
-    for found in _KEPT.finditer(english):
-        pieces += [english[at : found.start()].translate(_ACCENTS), found.group()]
-        at = found.end()
-    pieces.append(english[at:].translate(_ACCENTS))
+    pieces, offset = [], 0
+    for match in _KEPT.finditer(english):
+        pieces += [english[offset : match.start()].translate(_ACCENTS), match.group()]
+        offset = match.end()
+    pieces.append(english[offset:].translate(_ACCENTS))
     text = "".join(pieces)
     # Before a placeholder or command, "[" would become markup after formatting.
     begin = "[" if text[:1] and text[0] not in "{%[`<" else "[~"
@@ -39,13 +39,13 @@ def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
     from app.blocks.toolbox.catalogue import english_categories, is_translatable  # noqa: PLC0415
     from app.blocks.toolbox.help import EXAMPLES, english_slot_name  # noqa: PLC0415
 
-    found: dict[tuple[str | None, str], str] = {}
+    file_by_text: dict[tuple[str | None, str], str] = {}
     for category in english_categories():
-        place = f"app/blocks/categories/{category.name}.py"
+        file = f"app/blocks/categories/{category.name}.py"
 
-        def say(context: str | None, english: str, place: str = place) -> str:
+        def say(context: str | None, english: str, file: str = file) -> str:
             if is_translatable(english):
-                found.setdefault((context, english), place)
+                file_by_text.setdefault((context, english), file)
             return english
 
         category.translated(say)
@@ -53,11 +53,11 @@ def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
             for argument in block.arguments:
                 say("gap", english_slot_name(argument))
     for title in GROUPS:
-        found.setdefault(("category", title), "app/blocks/categories/robot.py")
+        file_by_text.setdefault(("category", title), "app/blocks/categories/robot.py")
     for example in EXAMPLES.values():
-        found.setdefault((None, example), "app/blocks/toolbox/help.py")
-    for (context, english), place in found.items():
-        yield context, english, place
+        file_by_text.setdefault((None, example), "app/blocks/toolbox/help.py")
+    for (context, english), file in file_by_text.items():
+        yield context, english, file
 
 
 def sentences_of_examples() -> Iterator[tuple[str, str, str]]:
@@ -65,14 +65,14 @@ def sentences_of_examples() -> Iterator[tuple[str, str, str]]:
     from app.core.documents.examples import translated  # noqa: PLC0415 - as above
     from app.core.documents.file_format import read_file  # noqa: PLC0415
 
-    found: dict[tuple[str, str], str] = {}
+    file_by_text: dict[tuple[str, str], str] = {}
     for path in sorted((ROOT / "resources" / "examples").glob("*.nepb")):
-        place = path.relative_to(ROOT).as_posix()
+        file = path.relative_to(ROOT).as_posix()
 
-        def say(context: str, english: str, place: str = place) -> str:
-            found.setdefault((context, english), place)
+        def say(context: str, english: str, file: str = file) -> str:
+            file_by_text.setdefault((context, english), file)
             return english
 
         translated(read_file(path), say)
-    for (context, english), place in found.items():
-        yield context, english, place
+    for (context, english), file in file_by_text.items():
+        yield context, english, file

@@ -135,7 +135,7 @@ def words_of(docstring: str, names: Iterable[str]) -> Words:
         docstring: Text of the docstring.
         names: Names of the documented object's arguments or attributes.
     """
-    known, told, raises = frozenset(names), dict[str, str](), list[str]()
+    known_names, descriptions, raises = frozenset(names), dict[str, str](), list[str]()
     paragraphs: list[str] = []
     is_first = True
     for paragraph in re.split(r"\n\s*\n", inspect.cleandoc(docstring)):
@@ -144,29 +144,31 @@ def words_of(docstring: str, names: Iterable[str]) -> Words:
             continue
         if section := _SECTION.match(paragraph):
             is_first = False
-            _add_section(section[1], paragraph[section.end() :], paragraphs, told, raises)
+            _add_section(section[1], paragraph[section.end() :], paragraphs, descriptions, raises)
             continue
-        listed = _listed(paragraph)
-        if listed:
-            told.update(listed)
+        entries = _listed(paragraph)
+        if entries:
+            descriptions.update(entries)
             continue
-        kept = []
+        remaining = []
         for sentence in _SENTENCE.split(" ".join(paragraph.split())):
-            said = None if is_first else _SAID.fullmatch(sentence)
+            match = None if is_first else _SAID.fullmatch(sentence)
             is_first = False
-            if said and said.group(1) in known and said.group(1) not in told:
-                told[said.group(1)] = said.group(2) if sentence[said.end(1) + 1] == ":" else sentence
+            if match and match.group(1) in known_names and match.group(1) not in descriptions:
+                descriptions[match.group(1)] = (
+                    match.group(2) if sentence[match.end(1) + 1] == ":" else sentence
+                )
             elif sentence.startswith("Raises "):
                 raises.append(sentence.removeprefix("Raises "))
             else:
-                kept.append(sentence)
-        if kept:
-            paragraphs.append(" ".join(kept))
-    return Words(tuple(paragraphs), told, tuple(raises))
+                remaining.append(sentence)
+        if remaining:
+            paragraphs.append(" ".join(remaining))
+    return Words(tuple(paragraphs), descriptions, tuple(raises))
 
 
 def _add_section(
-    title: str, content: str, paragraphs: list[str], named: dict[str, str], raises: list[str]
+    title: str, content: str, paragraphs: list[str], descriptions: dict[str, str], raises: list[str]
 ) -> None:
     # Section in Google style.
     if title in {"Returns", "Yields"}:
@@ -181,25 +183,25 @@ def _add_section(
     if title == "Raises":
         raises += [f"`{name}`: {text}" for name, text in entries]
     else:
-        named.update(entries)
+        descriptions.update(entries)
 
 
 def _listed(paragraph: str) -> Mapping[str, str]:
     # List of names with descriptions in columns.
     if not _IN_COLUMNS.match(paragraph):
         return {}
-    found: dict[str, str] = {}
+    descriptions: dict[str, str] = {}
     last = ""
     for line in paragraph.splitlines():
         entry = _LISTED.match(line)
         if entry:
             last = entry.group(1)
-            found[last] = entry.group(2)
+            descriptions[last] = entry.group(2)
         elif last and line.startswith("  "):
-            found[last] += f" {line.strip()}"
+            descriptions[last] += f" {line.strip()}"
         else:
             return {}
-    return found
+    return descriptions
 
 
 class Reference:
@@ -226,8 +228,8 @@ class Reference:
             f"{MADE_BY} [All pages](README.md).",
             *self._filled(field.words),
         ]
-        for each in self._names_on(name):
-            parts += self._entry(each)
+        for entry_name in self._names_on(name):
+            parts += self._entry(entry_name)
         return "\n\n".join(part.rstrip() for part in parts) + "\n"
 
     def contents(self) -> str:
@@ -237,8 +239,8 @@ class Reference:
             MADE_BY,
         ]
         for page, field in PAGES.items():
-            listed = ", ".join(f"[{each}]({page}.md#{_anchor(each)})" for each in self._names_on(page))
-            lines += [f"## [{field.title}]({page}.md)", *self._filled(field.words), *self._filled(listed)]
+            links = ", ".join(f"[{each}]({page}.md#{_anchor(each)})" for each in self._names_on(page))
+            lines += [f"## [{field.title}]({page}.md)", *self._filled(field.words), *self._filled(links)]
         return "\n\n".join(lines) + "\n"
 
     @property
@@ -249,12 +251,12 @@ class Reference:
 
     def _names_on(self, page: str) -> list[str]:
         homes = PAGES[page].homes
-        placed = [
-            (next(number for number, home in enumerate(homes) if _lies_in(found.path, home)), name)
-            for name, found in self._public()
-            if any(_lies_in(found.path, home) for home in homes)
+        indexed = [
+            (next(number for number, home in enumerate(homes) if _lies_in(item.path, home)), name)
+            for name, item in self._public()
+            if any(_lies_in(item.path, home) for home in homes)
         ]
-        return [name for _, name in sorted(placed, key=lambda each: each[0])]
+        return [name for _, name in sorted(indexed, key=lambda each: each[0])]
 
     def _public(self) -> Iterator[tuple[str, griffe.Object]]:
         public = self._package["public"]
@@ -268,66 +270,70 @@ class Reference:
 
     def find(self, name: str) -> griffe.Object:
         """Return the object with the public name `name`."""
-        return next(found for each, found in self._public() if each == name)
+        return next(item for each, item in self._public() if each == name)
 
-    def members(self, of: griffe.Class) -> list[griffe.Object]:
+    def members(self, cls: griffe.Class) -> list[griffe.Object]:
         """Return the public members of a class, including those inherited from nep."""
-        bases = [base for base in of.mro() if base.path.startswith("nep.")]
-        found: dict[str, griffe.Object] = {}
-        for each in (of, *bases):
-            for name, member in each.members.items():
+        bases = [base for base in cls.mro() if base.path.startswith("nep.")]
+        members_by_name: dict[str, griffe.Object] = {}
+        for ancestor in (cls, *bases):
+            for name, member in ancestor.members.items():
                 if not name.startswith("_") and name not in INTERNAL_EVERYWHERE:
-                    found.setdefault(name, _target(member))
+                    members_by_name.setdefault(name, _target(member))
         return [
             member
-            for name, member in found.items()
+            for name, member in members_by_name.items()
             if isinstance(member, griffe.Function | griffe.Attribute)
-            and not any(f"{each.name}.{name}" in INTERNAL for each in (of, *bases))
+            and not any(f"{ancestor.name}.{name}" in INTERNAL for ancestor in (cls, *bases))
         ]
 
     def _entry(self, name: str) -> list[str]:
-        found = self.find(name)
-        if isinstance(found, griffe.Class):
-            return self._class_entry(name, found)
-        if isinstance(found, griffe.Function):
-            return [f"## {name}", *self._function(found, f"{name}")]
-        value = found.value if isinstance(found, griffe.Attribute) else ""
-        return [f"## {name}", _block(f"{name} = {value}"), *self._prose(words_of(_said(found), ()))]
+        item = self.find(name)
+        if isinstance(item, griffe.Class):
+            return self._class_entry(name, item)
+        if isinstance(item, griffe.Function):
+            return [f"## {name}", *self._function(item, f"{name}")]
+        value = item.value if isinstance(item, griffe.Attribute) else ""
+        return [f"## {name}", _block(f"{name} = {value}"), *self._prose(words_of(_said(item), ()))]
 
-    def _class_entry(self, name: str, found: griffe.Class) -> list[str]:
-        members = self.members(found)
-        attributes = [each for each in members if isinstance(each, griffe.Attribute)]
-        made = found.members.get("__init__") or found.all_members.get("__init__")
-        is_made = name in MADE_BY_HAND or found.module.path in OWN_PAGES
-        start = made if is_made and isinstance(made, griffe.Function) else None
-        arguments = [each.name for each in start.parameters if each.name != "self"] if start else []
-        words = words_of(_said(found), [*(each.name for each in attributes), *arguments])
+    def _class_entry(self, name: str, cls: griffe.Class) -> list[str]:
+        members = self.members(cls)
+        attributes = [member for member in members if isinstance(member, griffe.Attribute)]
+        constructor = cls.members.get("__init__") or cls.all_members.get("__init__")
+        is_made = name in MADE_BY_HAND or cls.module.path in OWN_PAGES
+        start = constructor if is_made and isinstance(constructor, griffe.Function) else None
+        arguments = [member.name for member in start.parameters if member.name != "self"] if start else []
+        docs = words_of(_said(cls), [*(member.name for member in attributes), *arguments])
         parts = [f"## {name}"]
         if start is not None:
             parts.append(_block(self._signature(start, name, has_result=False)))
-        parts += self._prose(words)
-        parts += [f"`nep.{short}` is the same." for short, long in self.spellings.items() if long == name]
+        parts += self._prose(docs)
+        parts += [
+            f"`nep.{short}` is the same." for short, full_name in self.spellings.items() if full_name == name
+        ]
         if start is not None and name in MADE_BY_HAND:
-            parts += self._arguments(start, words)
-            attributes = [each for each in attributes if each.name not in arguments]
-        kind = found.members.get("MSG_TYPE")
+            parts += self._arguments(start, docs)
+            attributes = [member for member in attributes if member.name not in arguments]
+        kind = cls.members.get("MSG_TYPE")
         if isinstance(kind, griffe.Attribute):
-            attributes = [each for each in attributes if each.name != "MSG_TYPE"]
+            attributes = [member for member in attributes if member.name != "MSG_TYPE"]
             parts.append(f"In the graph it is `{str(kind.value)[1:-1]}`.")
-        parts += self._attributes(attributes, words, start if isinstance(start, griffe.Function) else made)
-        parts += self._raises(words)
-        for each in members:
-            if isinstance(each, griffe.Function):
-                parts += [f"### {name}.{each.name}", *self._function(each, each.name)]
+        parts += self._attributes(
+            attributes, docs, start if isinstance(start, griffe.Function) else constructor
+        )
+        parts += self._raises(docs)
+        for member in members:
+            if isinstance(member, griffe.Function):
+                parts += [f"### {name}.{member.name}", *self._function(member, member.name)]
         return parts
 
-    def _function(self, found: griffe.Function, name: str) -> list[str]:
-        words = words_of(_said(found), [each.name for each in found.parameters])
-        parts = [_block(self._signature(found, name)), *self._prose(words)]
-        return [*parts, *self._arguments(found, words), *self._raises(words)]
+    def _function(self, function: griffe.Function, name: str) -> list[str]:
+        docs = words_of(_said(function), [each.name for each in function.parameters])
+        parts = [_block(self._signature(function, name)), *self._prose(docs)]
+        return [*parts, *self._arguments(function, docs), *self._raises(docs)]
 
-    def _prose(self, words: Words) -> list[str]:
-        return [part for paragraph in words.paragraphs for part in self._filled(paragraph)]
+    def _prose(self, docs: Words) -> list[str]:
+        return [part for paragraph in docs.paragraphs for part in self._filled(paragraph)]
 
     def _filled(self, paragraph: str) -> list[str]:
         if paragraph.startswith(_CODE):
@@ -335,77 +341,81 @@ class Reference:
         linked = self._linked(paragraph)
         return [textwrap.fill(linked, WIDTH, break_long_words=False, break_on_hyphens=False)]
 
-    def _raises(self, words: Words) -> list[str]:
-        return [part for each in words.raises for part in self._filled(f"**Raises** {each}")]
+    def _raises(self, docs: Words) -> list[str]:
+        return [part for each in docs.raises for part in self._filled(f"**Raises** {each}")]
 
-    def _arguments(self, of: griffe.Function, words: Words) -> list[str]:
-        listed = [each for each in of.parameters if each.name != "self"]
-        if not any(each.name in words.names for each in listed):
+    def _arguments(self, function: griffe.Function, docs: Words) -> list[str]:
+        parameters = [each for each in function.parameters if each.name != "self"]
+        if not any(each.name in docs.names for each in parameters):
             return []
         rows = [
             f"| `{each.name}` | {_cell(self._type(each.annotation))} | {_cell(_default(each))} "
-            f"| {self._linked(words.names.get(each.name, ''))} |"
-            for each in listed
+            f"| {self._linked(docs.names.get(each.name, ''))} |"
+            for each in parameters
         ]
         return ["\n".join(("| argument | type | default | description |", "|---|---|---|---|", *rows))]
 
-    def _attributes(self, attributes: Sequence[griffe.Attribute], words: Words, made: object) -> list[str]:
+    def _attributes(
+        self, attributes: Sequence[griffe.Attribute], docs: Words, constructor: object
+    ) -> list[str]:
         # Attributes without an annotation have the type of the constructor's argument of the same name.
-        arguments = made.parameters if isinstance(made, griffe.Function) else ()
-        given = {each.name: each.annotation for each in arguments}
+        arguments = constructor.parameters if isinstance(constructor, griffe.Function) else ()
+        given = {attribute.name: attribute.annotation for attribute in arguments}
         rows = []
-        for each in attributes:
-            said = " ".join(_said(each).split()) or words.names.get(each.name, "")
-            known = each.annotation if each.annotation is not None else given.get(each.name)
-            kind = self._type(known) or _BEGINNINGS.get(str(each.value), "")
-            rows.append(f"| `{each.name}` | {_cell(kind)} | {self._linked(said)} |")
+        for attribute in attributes:
+            description = " ".join(_said(attribute).split()) or docs.names.get(attribute.name, "")
+            annotation = (
+                attribute.annotation if attribute.annotation is not None else given.get(attribute.name)
+            )
+            kind = self._type(annotation) or _BEGINNINGS.get(str(attribute.value), "")
+            rows.append(f"| `{attribute.name}` | {_cell(kind)} | {self._linked(description)} |")
         return ["\n".join(("| attribute | type | description |", "|---|---|---|", *rows))] if rows else []
 
-    def _signature(self, found: griffe.Function, name: str, *, has_result: bool = True) -> str:
-        result = self._type(found.returns) if has_result else ""
+    def _signature(self, function: griffe.Function, name: str, *, has_result: bool = True) -> str:
+        result = self._type(function.returns) if has_result else ""
         end = f") -> {result}" if result else ")"
-        before = "async " if "async" in found.labels else ""
-        listed = _parameters(found, self._type)
-        one_line = f"{before}{name}({', '.join(listed)}{end}"
+        before = "async " if "async" in function.labels else ""
+        parameters = _parameters(function, self._type)
+        one_line = f"{before}{name}({', '.join(parameters)}{end}"
         if len(one_line) <= 100:
             return one_line
-        return "\n".join((f"{before}{name}(", *(f"    {each}," for each in listed), end))
+        return "\n".join((f"{before}{name}(", *(f"    {each}," for each in parameters), end))
 
     def _type(self, annotation: str | griffe.Expr | None) -> str:
         # Resolves nep's internal type aliases.
-        said = "" if annotation is None else str(annotation)
-        if '"' not in said:
-            said = said.replace("'", '"')
+        text = "" if annotation is None else str(annotation)
+        if '"' not in text:
+            text = text.replace("'", '"')
         if not isinstance(annotation, griffe.Expr):
-            return said
-        for each in annotation.iterate(flat=True):
-            if isinstance(each, griffe.ExprName) and each.name not in self._pages:
-                alias = self._alias(each)
+            return text
+        for element in annotation.iterate(flat=True):
+            if isinstance(element, griffe.ExprName) and element.name not in self._pages:
+                alias = self._alias(element)
                 if alias:
-                    said = re.sub(rf"\b{each.name}\b", alias.replace("\\", r"\\"), said)
-        return said
+                    text = re.sub(rf"\b{element.name}\b", alias.replace("\\", r"\\"), text)
+        return text
 
     def _alias(self, name: griffe.ExprName) -> str:
         path = name.canonical_path
         if not path.startswith("nep."):
             return ""
         try:
-            found = _target(self._package[path.removeprefix("nep.")])
+            item = _target(self._package[path.removeprefix("nep.")])
         except (KeyError, griffe.AliasResolutionError):
             return ""
-        value = found.value if isinstance(found, griffe.Attribute) else None
+        value = item.value if isinstance(item, griffe.Attribute) else None
         return self._type(value) if isinstance(value, griffe.Expr) and not _is_call(value) else ""
 
     def _linked(self, text: str) -> str:
         # Turns public names into links.
 
-        def link(found: re.Match[str]) -> str:
-            whole = found.group(1)
-            page = self._pages.get(whole.removeprefix("nep.").partition(".")[0])
-            name = whole.removeprefix("nep.")
+        def link(match: re.Match[str]) -> str:
+            full_name = match.group(1)
+            page = self._pages.get(full_name.removeprefix("nep.").partition(".")[0])
+            name = full_name.removeprefix("nep.")
             if page is None or not self._is_place(name):
-                return found.group(0)
-            return f"[`{whole}`]({page}.md#{_anchor(name)})"
+                return match.group(0)
+            return f"[`{full_name}`]({page}.md#{_anchor(name)})"
 
         return _PAGE.sub(r"[\1](../\1)", re.sub(r"`([A-Za-z_][\w.]*)`", link, text))
 
@@ -414,11 +424,11 @@ class Reference:
         owner, _, member = name.partition(".")
         if owner not in self._pages or owner[0].islower():
             return not member and owner in self._pages and "_" in owner
-        found = self.find(owner)
+        item = self.find(owner)
         if not member:
             return True
-        return isinstance(found, griffe.Class) and any(
-            each.name == member and isinstance(each, griffe.Function) for each in self.members(found)
+        return isinstance(item, griffe.Class) and any(
+            each.name == member and isinstance(each, griffe.Function) for each in self.members(item)
         )
 
 
@@ -426,8 +436,8 @@ def _target(member: griffe.Object | griffe.Alias) -> griffe.Object:
     return member.final_target if isinstance(member, griffe.Alias) else member
 
 
-def _said(found: griffe.Object) -> str:
-    return found.docstring.value if found.docstring else ""
+def _said(item: griffe.Object) -> str:
+    return item.docstring.value if item.docstring else ""
 
 
 def _lies_in(path: str, home: str) -> bool:
@@ -451,49 +461,49 @@ def _block(code: str) -> str:
     return f"```python\n{code}\n```"
 
 
-def _default(of: griffe.Parameter) -> str:
-    if of.default is None:
+def _default(parameter: griffe.Parameter) -> str:
+    if parameter.default is None:
         return ""
-    said = _value(of.default)
-    if '"' not in said:
-        said = said.replace("'", '"')
-    is_internal = said.startswith(("field(", "_"))
-    return "" if is_internal else said
+    text = _value(parameter.default)
+    if '"' not in text:
+        text = text.replace("'", '"')
+    is_internal = text.startswith(("field(", "_"))
+    return "" if is_internal else text
 
 
-def _value(of: str | griffe.Expr) -> str:
+def _value(value: str | griffe.Expr) -> str:
     # Source text of a value; constants of nep are replaced by their values.
-    if isinstance(of, griffe.ExprName) and isinstance(of.parent, griffe.Object):
+    if isinstance(value, griffe.ExprName) and isinstance(value.parent, griffe.Object):
         try:
-            found = _target(of.parent.modules_collection[of.canonical_path])
+            item = _target(value.parent.modules_collection[value.canonical_path])
         except (KeyError, griffe.AliasResolutionError):
-            return str(of)
-        if isinstance(found, griffe.Attribute) and found.value is not None:
-            return _value(found.value)
-    return str(of)
+            return str(value)
+        if isinstance(item, griffe.Attribute) and item.value is not None:
+            return _value(item.value)
+    return str(value)
 
 
-def _parameters(of: griffe.Function, type_of: Callable[[str | griffe.Expr | None], str]) -> list[str]:
-    listed: list[str] = []
+def _parameters(function: griffe.Function, type_of: Callable[[str | griffe.Expr | None], str]) -> list[str]:
+    parameters: list[str] = []
     is_by_name = False
-    for each in of.parameters:
-        if each.name == "self":
+    for parameter in function.parameters:
+        if parameter.name == "self":
             continue
-        if each.kind is griffe.ParameterKind.keyword_only and not is_by_name:
-            listed.append("*")
-        is_by_name = is_by_name or each.kind in {
+        if parameter.kind is griffe.ParameterKind.keyword_only and not is_by_name:
+            parameters.append("*")
+        is_by_name = is_by_name or parameter.kind in {
             griffe.ParameterKind.keyword_only,
             griffe.ParameterKind.var_positional,
         }
         stars = {griffe.ParameterKind.var_positional: "*", griffe.ParameterKind.var_keyword: "**"}
-        said = f"{stars.get(each.kind, '')}{each.name}"
-        annotation = type_of(each.annotation)
-        said += f": {annotation}" if annotation else ""
-        default = "" if each.kind in stars else _default(each)
-        if default or (each.default is not None and each.kind not in stars):
-            said += f" = {default or '...'}" if annotation else f"={default or '...'}"
-        listed.append(said)
-    return listed
+        text = f"{stars.get(parameter.kind, '')}{parameter.name}"
+        annotation = type_of(parameter.annotation)
+        text += f": {annotation}" if annotation else ""
+        default = "" if parameter.kind in stars else _default(parameter)
+        if default or (parameter.default is not None and parameter.kind not in stars):
+            text += f" = {default or '...'}" if annotation else f"={default or '...'}"
+        parameters.append(text)
+    return parameters
 
 
 def reference() -> Reference:
@@ -504,8 +514,11 @@ def reference() -> Reference:
 
 def pages() -> dict[str, str]:
     """Return the Markdown text of all pages by file name."""
-    found = reference()
-    return {"README.md": found.contents(), **{f"{each}.md": found.page(each) for each in PAGES}}
+    documentation = reference()
+    return {
+        "README.md": documentation.contents(),
+        **{f"{each}.md": documentation.page(each) for each in PAGES},
+    }
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -514,11 +527,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; 1 when a page is old")
     options = parser.parse_args(arguments)
     now = pages()
-    there = {path.name: path.read_text(encoding="utf-8") for path in FOLDER.glob("*.md")}
+    existing = {path.name: path.read_text(encoding="utf-8") for path in FOLDER.glob("*.md")}
     if options.check:
-        return 0 if there == now else 1
+        return 0 if existing == now else 1
     FOLDER.mkdir(exist_ok=True)
-    for name in there.keys() - now.keys():
+    for name in existing.keys() - now.keys():
         (FOLDER / name).unlink()
     for name, page in now.items():
         (FOLDER / name).write_text(page, encoding="utf-8")

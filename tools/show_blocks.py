@@ -33,13 +33,13 @@ for (const label of document.querySelectorAll('.blocklyToolboxCategoryLabel'))
 
 def options() -> argparse.Namespace:
     """Parse the command line."""
-    made = argparse.ArgumentParser(description=__doc__)
-    made.add_argument("folder", type=Path)
-    made.add_argument("--definitions", type=Path, default=SAMPLE / "definitions.json")
-    made.add_argument("--workspace", type=Path, default=SAMPLE / "picture.json")
-    made.add_argument("--open", metavar="CATEGORY", help="click this category first")
-    made.add_argument("--size", default="1031x586")
-    return made.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--definitions", type=Path, default=SAMPLE / "definitions.json")
+    parser.add_argument("--workspace", type=Path, default=SAMPLE / "picture.json")
+    parser.add_argument("--open", metavar="CATEGORY", help="click this category first")
+    parser.add_argument("--size", default="1031x586")
+    return parser.parse_args()
 
 
 class Photographer(QObject):
@@ -93,17 +93,17 @@ class Photographer(QObject):
 
 def main() -> int:
     """Create the images; return 0 on success."""
-    asked = options()
+    arguments = options()
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         os.environ.setdefault("QTWEBENGINE_DISABLE_SANDBOX", "1")
     scheme.register_scheme()
     QApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     application = QApplication(sys.argv[:1])
     view = BlocklyView()
-    view.resize(*(int(each) for each in asked.size.split("x")))
-    view.set_definitions(json.loads(asked.definitions.read_text("utf-8")))
-    view.load(json.loads(asked.workspace.read_text("utf-8")))
-    photographer = Photographer(view, asked.folder, asked.open)
+    view.resize(*(int(each) for each in arguments.size.split("x")))
+    view.set_definitions(json.loads(arguments.definitions.read_text("utf-8")))
+    view.load(json.loads(arguments.workspace.read_text("utf-8")))
+    photographer = Photographer(view, arguments.folder, arguments.open)
     view.show()
     code = application.exec()
     del photographer

@@ -19,19 +19,19 @@ EXACT = 0.4375  # share of the table for the most frequent colours; the others a
 SAMPLE, ROUNDS = 40_000, 12
 
 
-def shrink(path: Path, most: int = COLOURS) -> int:
-    """Rewrite an image file with at most `most` colours; return the new size in bytes."""
+def shrink(path: Path, max_colours: int = COLOURS) -> int:
+    """Rewrite an image file with at most `max_colours` colours; return the new size in bytes."""
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:
         raise OSError(f"{path} is no picture")
     height, width = picture.shape[:2]
     packed = picture.astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
-    colours, place, counts = np.unique(packed.ravel(), return_inverse=True, return_counts=True)
-    table = _table(colours, counts, most)
-    index = _nearest(_channels(colours), table)[place].astype(np.uint8).reshape(height, width)
-    made = QImage(index.tobytes(), width, height, width, QImage.Format.Format_Indexed8)
-    made.setColorTable([0xFF000000 | (r << 16) | (g << 8) | b for b, g, r in table.astype(int).tolist()])
-    if not made.save(str(path), quality=0):
+    colours, inverse, counts = np.unique(packed.ravel(), return_inverse=True, return_counts=True)
+    table = _table(colours, counts, max_colours)
+    index = _nearest(_channels(colours), table)[inverse].astype(np.uint8).reshape(height, width)
+    image = QImage(index.tobytes(), width, height, width, QImage.Format.Format_Indexed8)
+    image.setColorTable([0xFF000000 | (r << 16) | (g << 8) | b for b, g, r in table.astype(int).tolist()])
+    if not image.save(str(path), quality=0):
         raise OSError(f"{path} can't be written")
     return path.stat().st_size
 
@@ -41,30 +41,32 @@ def _channels(colours: np.ndarray) -> np.ndarray:
     return np.stack([colours & 255, colours >> 8 & 255, colours >> 16 & 255], axis=1).astype(np.float32)
 
 
-def _table(colours: np.ndarray, counts: np.ndarray, most: int) -> np.ndarray:
+def _table(colours: np.ndarray, counts: np.ndarray, max_colours: int) -> np.ndarray:
     # The most frequent colours, and cluster centres of the others.
     order = np.argsort(counts)[::-1]
-    as_they_are = round(EXACT * most)
-    exact, rest, found = order[:as_they_are], order[as_they_are:], most - as_they_are
+    as_they_are = round(EXACT * max_colours)
+    exact, rest, cluster_count = order[:as_they_are], order[as_they_are:], max_colours - as_they_are
     table = _channels(colours[exact])
-    if len(rest) <= found:
+    if len(rest) <= cluster_count:
         return np.vstack([table, _channels(colours[rest])])
     chance = np.random.default_rng(7)  # fixed seed, for reproducible files
     share = counts[rest] / counts[rest].sum()
     sample = _channels(colours[chance.choice(rest, SAMPLE, p=share)])
     cv2.setRNGSeed(7)
-    ends = (cv2.TERM_CRITERIA_MAX_ITER, ROUNDS, 0.0)
-    _, _, middles = cv2.kmeans(sample, found, np.zeros(0, np.int32), ends, 1, cv2.KMEANS_PP_CENTERS)
+    criteria = (cv2.TERM_CRITERIA_MAX_ITER, ROUNDS, 0.0)
+    _, _, middles = cv2.kmeans(
+        sample, cluster_count, np.zeros(0, np.int32), criteria, 1, cv2.KMEANS_PP_CENTERS
+    )
     return np.vstack([table, np.rint(middles)])
 
 
 def _nearest(colours: np.ndarray, table: np.ndarray) -> np.ndarray:
     # Index of the nearest table colour for each colour.
-    found = np.empty(len(colours), np.int64)
+    nearest = np.empty(len(colours), np.int64)
     for begin in range(0, len(colours), 4096):
-        some = colours[begin : begin + 4096]
-        found[begin : begin + 4096] = ((some[:, None, :] - table[None]) ** 2).sum(axis=2).argmin(axis=1)
-    return found
+        batch = colours[begin : begin + 4096]
+        nearest[begin : begin + 4096] = ((batch[:, None, :] - table[None]) ** 2).sum(axis=2).argmin(axis=1)
+    return nearest
 
 
 if __name__ == "__main__":

@@ -59,21 +59,21 @@ TEST_PACKAGES = {
 
 def wanted_packages(computer: Computer) -> list[str]:
     """Return the required packages; ``a|b`` stands for a package with different names in some releases."""
-    wanted = list(QT_LIBRARIES)
+    packages = list(QT_LIBRARIES)
     if not computer.has_screen:
-        wanted.append("xvfb")
+        packages.append("xvfb")
     if not computer.has_ensurepip:
-        wanted.append("python{}.{}-venv".format(*computer.version))
-    return wanted
+        packages.append("python{}.{}-venv".format(*computer.version))
+    return packages
 
 
 def missing_packages(computer: Computer) -> list[str]:
     """Return the entries of `wanted_packages` that are not installed under any of their names."""
-    wanted = wanted_packages(computer)
-    names = [name for entry in wanted for name in entry.split("|")]
+    required = wanted_packages(computer)
+    names = [name for entry in required for name in entry.split("|")]
     lines = computer.ask(["dpkg-query", "-W", "-f", "${Package} ${db:Status-Status}\n", *names]).splitlines()
     installed = {line.split()[0] for line in lines if line.endswith(" installed")}
-    return [entry for entry in wanted if installed.isdisjoint(entry.split("|"))]
+    return [entry for entry in required if installed.isdisjoint(entry.split("|"))]
 
 
 def available(computer: Computer, entries: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -87,16 +87,18 @@ def available(computer: Computer, entries: Sequence[str]) -> tuple[list[str], li
         The first available name of each entry, and the entries of which apt knows no name.
     """
     names = [name for entry in entries for name in entry.split("|")]
-    can: set[str] = set()
+    installable: set[str] = set()
     name = ""
     for line in computer.ask(["apt-cache", "policy", *names]).splitlines():
         if line and not line.startswith(" "):
             name = line.rstrip(":").split(":")[0]
         elif line.strip().startswith("Candidate:") and "(none)" not in line:
-            can.add(name)
-    found = [next((name for name in entry.split("|") if name in can), "") for entry in entries]
-    unknown = [entry for entry, name in zip(entries, found, strict=True) if not name]
-    return [name for name in found if name], unknown
+            installable.add(name)
+    available_names = [
+        next((name for name in entry.split("|") if name in installable), "") for entry in entries
+    ]
+    unknown = [entry for entry, name in zip(entries, available_names, strict=True) if not name]
+    return [name for name in available_names if name], unknown
 
 
 def bring_system_packages(computer: Computer) -> None:
@@ -166,8 +168,8 @@ def apt_install(computer: Computer, missing: Sequence[str], names: list[str], un
             f"apt knows no package for {', '.join(unknown)}; is its list of servers complete? ('{log}')"
         )
     if computer.do([*install, *names], environ, log) != 0:
-        words = "".join(log.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)[-12:])
-        raise Trouble(f"apt could not install the system libraries ('{log}'); its last words:\n{words}")
+        log_tail = "".join(log.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)[-12:])
+        raise Trouble(f"apt could not install the system libraries ('{log}'); its last words:\n{log_tail}")
 
 
 def main(computer: Computer | None = None) -> int:

@@ -34,31 +34,31 @@ A user can copy the samples, with their ``.meta`` files, to a project.
 
 def package_files() -> dict[str, bytes]:
     """Return the content of each file by its path in the package."""
-    placed = {
+    sources = {
         "package.json": UNITY / "package.json",
         "LICENSE.md": ROOT / "LICENSE",
         "Runtime/Nep/Nep.asmdef": UNITY / "Nep.asmdef",
     }
     for source in (CSHARP / "src").rglob("*.cs"):
-        placed[f"Runtime/Nep/{source.relative_to(CSHARP / 'src').as_posix()}"] = source
+        sources[f"Runtime/Nep/{source.relative_to(CSHARP / 'src').as_posix()}"] = source
     for source in (UNITY / "Runtime").glob("*.*"):
-        placed[f"Runtime/Unity/{source.name}"] = source
+        sources[f"Runtime/Unity/{source.name}"] = source
     for source in (UNITY / "Samples~").rglob("*.cs"):
-        placed[source.relative_to(UNITY).as_posix()] = source
+        sources[source.relative_to(UNITY).as_posix()] = source
     readme = (CSHARP / "README.md").read_text("utf-8")
     for page in re.findall(r"\(\.\./\.\./docs/([\w-]+\.md)", readme):
-        placed[f"Documentation~/{page}"] = ROOT / "docs" / page
-    files = {path: source.read_bytes() for path, source in placed.items()}
+        sources[f"Documentation~/{page}"] = ROOT / "docs" / page
+    files = {path: source.read_bytes() for path, source in sources.items()}
     files["README.md"] = readme.replace("(../../docs/", "(Documentation~/").encode()
     return dict(sorted((files | _metas(files)).items()))
 
 
 def _metas(files: dict[str, bytes]) -> dict[str, bytes]:
-    shown = [PurePosixPath(path) for path in files if not path.startswith("Documentation~/")]
-    folders = {parent for path in shown for parent in path.parents if parent.name}
+    visible_paths = [PurePosixPath(path) for path in files if not path.startswith("Documentation~/")]
+    folders = {parent for path in visible_paths for parent in path.parents if parent.name}
     return {
         f"{path}.meta": _meta(path, is_folder=path in folders)
-        for path in {*shown, *folders}
+        for path in {*visible_paths, *folders}
         if path.name not in HIDDEN
     }
 

@@ -57,9 +57,9 @@ def found(computer: Computer, home: Path | None = None) -> dict[str, str]:
     have: dict[str, str] = {}
     for version in PROMISED:
         for command in _candidates(computer, version, home or Path.home()):
-            said = re.fullmatch(r"(\S+) cpython (.+)", computer.ask([*command, "-c", WHO]).strip())
-            if said and said[1] == version:
-                have[version] = said[2]
+            match = re.fullmatch(r"(\S+) cpython (.+)", computer.ask([*command, "-c", WHO]).strip())
+            if match and match[1] == version:
+                have[version] = match[2]
                 break
     return have
 
@@ -100,25 +100,34 @@ def environment(
         is_for_oldest: On a Mac, install wheels that run on `OLDEST_MACOS`. By default pip chooses
             wheels for the current macOS, which may not run on older ones (numpy's require macOS 14).
     """
-    made = venv_python(folder, computer.platform)
+    interpreter = venv_python(folder, computer.platform)
     stamp = folder / "nep-stamp"
     if stamp.is_file() and stamp.read_text(encoding="utf-8") == _stamp(requirements):
-        return made
+        return interpreter
     pinned = ["--require-hashes", "-r", f"requirements/{requirements}.txt"]
-    steps = [[python, "-m", "venv", "--clear", str(folder)], [*pip(made), *pinned]]
+    steps = [[python, "-m", "venv", "--clear", str(folder)], [*pip(interpreter), *pinned]]
     if is_for_oldest and computer.platform == "darwin":
         wheels, platform = str(folder / "wheels"), f"macosx_{OLDEST_MACOS}_{computer.machine}"
-        chosen = ["--no-deps", "--only-binary=:all:", "--platform", platform, "--dest", wheels]
+        options = ["--no-deps", "--only-binary=:all:", "--platform", platform, "--dest", wheels]
         steps[1:] = [
-            [str(made), "-m", "pip", "download", "--disable-pip-version-check", "--quiet", *chosen, *pinned],
-            [*pip(made), "--no-deps", "--no-index", "--find-links", wheels, *pinned],
+            [
+                str(interpreter),
+                "-m",
+                "pip",
+                "download",
+                "--disable-pip-version-check",
+                "--quiet",
+                *options,
+                *pinned,
+            ],
+            [*pip(interpreter), "--no-deps", "--no-index", "--find-links", wheels, *pinned],
         ]
     with timed(f"making the environment {folder.name}"):
         for step in steps:
             if computer.do(step, computer.environ, None) != 0:
                 raise Trouble(f"{folder} could not be made; the words of Python or pip are above")
     stamp.write_text(_stamp(requirements), encoding="utf-8")
-    return made
+    return interpreter
 
 
 def pip(python: Path) -> list[str]:
@@ -128,31 +137,35 @@ def pip(python: Path) -> list[str]:
 
 def try_plain(computer: Computer, python: str, folder: Path, distribution: str = ".") -> list[str]:
     """Install the distribution without extras and test it from another folder; return the failed steps."""
-    made = environment(computer, python, folder, "library")
-    ours = [*pip(made), "--no-deps", "--no-build-isolation", "--force-reinstall", distribution]
+    interpreter = environment(computer, python, folder, "library")
+    install = [*pip(interpreter), "--no-deps", "--no-build-isolation", "--force-reinstall", distribution]
     # -I: test the installed package, not the local sources.
-    use = [str(made), "-I", str(ROOT / "tools" / "library_alone.py")]
-    for what, step in (("install", ours), ("pip check", [str(made), "-m", "pip", "check"]), ("use", use)):
+    use = [str(interpreter), "-I", str(ROOT / "tools" / "library_alone.py")]
+    for step_name, step in (
+        ("install", install),
+        ("pip check", [str(interpreter), "-m", "pip", "check"]),
+        ("use", use),
+    ):
         if computer.do(step, computer.environ, None) != 0:
-            return [f"plain: {what}"]
+            return [f"plain: {step_name}"]
     return []
 
 
 def try_tests(computer: Computer, python: str, folder: Path, arguments: Sequence[str]) -> list[str]:
     """Run the library's tests in an environment with their requirements; return the failed steps."""
-    made = environment(computer, python, folder, "test")
-    ours = [*pip(made), "--no-deps", "--no-build-isolation", "-e", "."]
-    pytest = [str(made), "-m", "pytest", "-q", *arguments]
+    interpreter = environment(computer, python, folder, "test")
+    install = [*pip(interpreter), "--no-deps", "--no-build-isolation", "-e", "."]
+    pytest = [str(interpreter), "-m", "pytest", "-q", *arguments]
     if not any((ROOT / each.partition("::")[0]).exists() for each in arguments):
         pytest += TESTS
-    for what, step in (("install", ours), ("tests", pytest)):
+    for step_name, step in (("install", install), ("tests", pytest)):
         if computer.do(step, computer.environ, None) != 0:
-            return [what]
+            return [step_name]
     return []
 
 
 def versions(
-    computer: Computer, given: Sequence[str], folder: Path = FOLDER, home: Path | None = None
+    computer: Computer, arguments: Sequence[str], folder: Path = FOLDER, home: Path | None = None
 ) -> int:
     """Run the requested tests; return 0 if they passed with all Python versions found, else 1."""
     parser = argparse.ArgumentParser(
@@ -164,15 +177,15 @@ def versions(
         "--install", metavar="FILE", help="this wheel or source distribution, not this folder"
     )
     parser.add_argument("pytest_arguments", nargs="*", help="arguments for pytest, after --")
-    options = parser.parse_args(given)
-    wanted = [each for each in PROMISED if each in (options.only or PROMISED)]
+    options = parser.parse_args(arguments)
+    selected = [each for each in PROMISED if each in (options.only or PROMISED)]
     if options.install and not Path(options.install).is_file():
         raise Trouble(
             f"there is no file {options.install}; python -m build makes dist/*.whl and dist/*.tar.gz"
         )
     distribution = str(Path(options.install).resolve()) if options.install else "."
-    have = {version: python for version, python in found(computer, home).items() if version in wanted}
-    absent = [version for version in wanted if version not in have]
+    have = {version: python for version, python in found(computer, home).items() if version in selected}
+    absent = [version for version in selected if version not in have]
     if absent:
         print(f"· not on this computer: Python {', '.join(absent)}", flush=True)
     if not have:

@@ -50,7 +50,7 @@ def as_text(value: Any) -> Any:  # noqa: ANN401 - any plain value
 
 def filters() -> list[dict[str, Any]]:
     """Return valid and malformed filters of subscribers: topics, hellos, and answers to echoes and offers."""
-    made: list[dict[str, Any]] = [
+    cases: list[dict[str, Any]] = [
         {"name": "topic", "filter": wire.topic_part(TOPIC).hex(), "means": {"kind": "topic", "topic": TOPIC}},
         {
             "name": "topic beyond ASCII",
@@ -61,7 +61,7 @@ def filters() -> list[dict[str, Any]]:
     levels: tuple[dict[str, bool], ...] = ({}, {"one_part": True}, {"tells": True}, {"batches": True})
     for level, options in enumerate(levels):
         for subscriber, topic in ((SUBSCRIBER, TOPIC), (1, "/a/b"), (2**63 - 1, "/größe")):
-            made.append(
+            cases.append(
                 {
                     "name": f"hello of level {level} for {topic}",
                     "filter": wire.hello_part(subscriber, topic, **options).hex(),
@@ -73,9 +73,9 @@ def filters() -> list[dict[str, Any]]:
                     },
                 }
             )
-    for seq, wanted in ((1, 24 * 2**20), (2**40, 192 * 2**20), (2**64 - 1, 2**64 - 1)):
-        read = wire.Acknowledgement(SUBSCRIBER, PUBLISHER, seq, wanted)
-        made.append(
+    for seq, bound_bytes in ((1, 24 * 2**20), (2**40, 192 * 2**20), (2**64 - 1, 2**64 - 1)):
+        read = wire.Acknowledgement(SUBSCRIBER, PUBLISHER, seq, bound_bytes)
+        cases.append(
             {
                 "name": f"read up to {seq}",
                 "filter": wire.acknowledgement_part(read).hex(),
@@ -84,14 +84,14 @@ def filters() -> list[dict[str, Any]]:
         )
     for generation in (1, 2**32 - 1):
         shares = wire.OfferAcceptance(SUBSCRIBER, PUBLISHER, generation)
-        made.append(
+        cases.append(
             {
                 "name": f"reads shared memory of generation {generation}",
                 "filter": wire.acceptance_part(shares).hex(),
                 "means": {"kind": "shares", **as_text(shares._asdict())},
             }
         )
-    return [*made, *malformed_filters()]
+    return [*cases, *malformed_filters()]
 
 
 def malformed_filters() -> list[dict[str, Any]]:
@@ -132,7 +132,7 @@ def notices() -> list[dict[str, Any]]:
         ),
         ("alone", "alone", wire.Header(1, 0, 43, STAMP_NS, PUBLISHER, len(PAYLOAD)), PAYLOAD),
     ]
-    made = []
+    cases = []
     for kind, name, header, payload in kinds:
         means = {
             "kind": kind,
@@ -147,8 +147,8 @@ def notices() -> list[dict[str, Any]]:
             **({} if payload is None else {"payload": payload.hex()}),
         }
         parts = [hello, header.pack(), *([] if payload is None else [payload])]
-        made.append({"name": name, "parts": [each.hex() for each in parts], "means": means})
-    return made
+        cases.append({"name": name, "parts": [each.hex() for each in parts], "means": means})
+    return cases
 
 
 def node(key: str, name: str) -> requests.NodeRecord:
@@ -282,12 +282,12 @@ class _Master:
 
 def master() -> dict[str, Any]:
     """Return requests with the master's replies, and the messages that the master pushes."""
-    asked = []
+    request_cases = []
     for name, before, last in ASKED:
-        answers = _Master()
-        first = [{"from": each[0], "request": answers.ask(each)[0].hex()} for each in before]
-        request, reply, _pushes = answers.ask(last)
-        asked.append(
+        fake_master = _Master()
+        first = [{"from": each[0], "request": fake_master.ask(each)[0].hex()} for each in before]
+        request, reply, _pushes = fake_master.ask(last)
+        request_cases.append(
             {
                 "name": name,
                 "before": first,
@@ -300,9 +300,9 @@ def master() -> dict[str, Any]:
         )
     pushed = []
     for name, before, last in PUSHED:
-        answers = _Master()
-        first = [{"from": each[0], "request": answers.ask(each)[0].hex()} for each in before]
-        request, _reply, (push,) = answers.ask(last)
+        fake_master = _Master()
+        first = [{"from": each[0], "request": fake_master.ask(each)[0].hex()} for each in before]
+        request, _reply, (push,) = fake_master.ask(last)
         pushed.append(
             {
                 "name": name,
@@ -315,12 +315,12 @@ def master() -> dict[str, Any]:
             }
         )
     ping = encode_request(requests.Ping(), 1)
-    done = msgpack.packb({"is": "done", "re": 1, "what": write(requests.DoneReply(1, 0))})
+    done_reply = msgpack.packb({"is": "done", "re": 1, "what": write(requests.DoneReply(1, 0))})
     return {
         "epoch": str(EPOCH),
-        "asked": asked,
+        "asked": request_cases,
         "pushed": pushed,
-        "ping": {"request": ping.hex(), "answer": done.hex()},
+        "ping": {"request": ping.hex(), "answer": done_reply.hex()},
     }
 
 
@@ -331,11 +331,11 @@ class _Bytes:
         self._seed, self._count = seed, 0
 
     def bytes(self, size: int) -> bytes:
-        found = b""
-        while len(found) < size:
+        data = b""
+        while len(data) < size:
             self._count += 1
-            found += sha256(f"{self._seed}/{self._count}".encode()).digest()
-        return found[:size]
+            data += sha256(f"{self._seed}/{self._count}".encode()).digest()
+        return data[:size]
 
     def below(self, limit: int) -> int:
         return int.from_bytes(self.bytes(8), "little") % limit
@@ -363,159 +363,159 @@ _NO_UTF8 = (
 )
 
 
-def _header(some: _Bytes, codec: int = 1, flags: int = 0, size: int = 0, version: int = 1) -> bytes:
-    numbers = some.below(2**40) + 1, STAMP_NS + some.below(10**9), some.below(2**62) + 1
+def _header(rng: _Bytes, codec: int = 1, flags: int = 0, size: int = 0, version: int = 1) -> bytes:
+    numbers = rng.below(2**40) + 1, STAMP_NS + rng.below(10**9), rng.below(2**62) + 1
     return struct.pack("<BBHIQQQ", version, codec, flags, size, *numbers)
 
 
-def _part_count(some: _Bytes) -> Parts:
-    head, payload = _header(some), some.bytes(some.below(20))
+def _part_count(rng: _Bytes) -> Parts:
+    header, payload = _header(rng), rng.bytes(rng.below(20))
     return [
-        *some.of(
+        *rng.of(
             (
                 [],
                 [_GOOD_TOPIC],
-                [_GOOD_TOPIC + head[: some.below(32)]],
-                [some.bytes(some.below(60)).replace(b"\0", b"a")],
-                [_GOOD_TOPIC, head],
-                [_GOOD_TOPIC, head, payload, _EXTENSION],
-                [_GOOD_TOPIC, head, payload, _EXTENSION, payload],
-                [_GOOD_TOPIC, _header(some, flags=wire.EXTENSION), payload],
-                [_GOOD_TOPIC + _header(some, flags=wire.EXTENSION) + payload],
-                [_GOOD_TOPIC, head, payload, payload, payload, payload],
+                [_GOOD_TOPIC + header[: rng.below(32)]],
+                [rng.bytes(rng.below(60)).replace(b"\0", b"a")],
+                [_GOOD_TOPIC, header],
+                [_GOOD_TOPIC, header, payload, _EXTENSION],
+                [_GOOD_TOPIC, header, payload, _EXTENSION, payload],
+                [_GOOD_TOPIC, _header(rng, flags=wire.EXTENSION), payload],
+                [_GOOD_TOPIC + _header(rng, flags=wire.EXTENSION) + payload],
+                [_GOOD_TOPIC, header, payload, payload, payload, payload],
             )
         )
     ]
 
 
-def _topic_end(some: _Bytes) -> Parts:
-    first = some.of((b"", b"example", b"example\0a", b"\0example", "größe".encode(), b"a" * 201, b"\xff"))
-    return [first, _header(some), some.bytes(some.below(20))]
+def _topic_end(rng: _Bytes) -> Parts:
+    first = rng.of((b"", b"example", b"example\0a", b"\0example", "größe".encode(), b"a" * 201, b"\xff"))
+    return [first, _header(rng), rng.bytes(rng.below(20))]
 
 
-def _topic(some: _Bytes) -> Parts:
-    letter = some.of(_NO_TOPIC).encode()
-    name = some.of((b"%sa", b"a%sb", b"/robot/%s")) % some.of((letter, letter, letter, some.of(_NO_UTF8)))
-    name = some.of((name, name, name, name, b"", b"x" * 201, "ü".encode() * 101, b"a\0b"))
-    tail = _header(some), some.bytes(some.below(20))
-    return [name + b"\0", *tail] if some.below(2) or b"\0" in name else [name + b"\0" + b"".join(tail)]
+def _topic(rng: _Bytes) -> Parts:
+    letter = rng.of(_NO_TOPIC).encode()
+    name = rng.of((b"%sa", b"a%sb", b"/robot/%s")) % rng.of((letter, letter, letter, rng.of(_NO_UTF8)))
+    name = rng.of((name, name, name, name, b"", b"x" * 201, "ü".encode() * 101, b"a\0b"))
+    tail = _header(rng), rng.bytes(rng.below(20))
+    return [name + b"\0", *tail] if rng.below(2) or b"\0" in name else [name + b"\0" + b"".join(tail)]
 
 
-def _header_size(some: _Bytes) -> Parts:
-    head = _header(some) + bytes(8)
-    size = some.of((0, 1, 4, 16, 24, 31, 33, 40))
-    tail: Parts = some.of(([], [b"{}"], [b"{}", _EXTENSION], [b""]))
-    return [_GOOD_TOPIC, head[:size], *tail]
+def _header_size(rng: _Bytes) -> Parts:
+    header = _header(rng) + bytes(8)
+    size = rng.of((0, 1, 4, 16, 24, 31, 33, 40))
+    tail: Parts = rng.of(([], [b"{}"], [b"{}", _EXTENSION], [b""]))
+    return [_GOOD_TOPIC, header[:size], *tail]
 
 
-def _version(some: _Bytes) -> Parts:
-    number = some.of((0, 2, 3, 9, 128, 255))
-    payload = some.bytes(some.below(20))
-    head = _header(some, some.below(256), some.below(2**16), some.below(2**32), version=number)
-    return some.of(([_GOOD_TOPIC, head, payload], [_GOOD_TOPIC + head + payload], [_GOOD_TOPIC, head]))  # type: ignore[no-any-return]
+def _version(rng: _Bytes) -> Parts:
+    number = rng.of((0, 2, 3, 9, 128, 255))
+    payload = rng.bytes(rng.below(20))
+    header = _header(rng, rng.below(256), rng.below(2**16), rng.below(2**32), version=number)
+    return rng.of(([_GOOD_TOPIC, header, payload], [_GOOD_TOPIC + header + payload], [_GOOD_TOPIC, header]))  # type: ignore[no-any-return]
 
 
-def _payload_size(some: _Bytes) -> Parts:
-    payload = some.bytes(some.below(40))
-    claimed = some.of((len(payload) + 1, len(payload) + 32, 2**31, 2**32 - 1, max(1, len(payload) - 1)))
+def _payload_size(rng: _Bytes) -> Parts:
+    payload = rng.bytes(rng.below(40))
+    claimed = rng.of((len(payload) + 1, len(payload) + 32, 2**31, 2**32 - 1, max(1, len(payload) - 1)))
     claimed += claimed == len(payload)
-    head = _header(some, size=claimed)
-    extended = _header(some, flags=wire.EXTENSION, size=claimed)
-    return some.of(  # type: ignore[no-any-return]
+    header = _header(rng, size=claimed)
+    extended = _header(rng, flags=wire.EXTENSION, size=claimed)
+    return rng.of(  # type: ignore[no-any-return]
         (
-            [_GOOD_TOPIC, head, payload],
-            [_GOOD_TOPIC + head + payload],
+            [_GOOD_TOPIC, header, payload],
+            [_GOOD_TOPIC + header + payload],
             [_GOOD_TOPIC, extended, payload, _EXTENSION],
         )
     )
 
 
-def _extension(some: _Bytes) -> Parts:
-    cut = 1 + some.below(len(_EXTENSION) - 1)
-    part = some.of(
+def _extension(rng: _Bytes) -> Parts:
+    cut = 1 + rng.below(len(_EXTENSION) - 1)
+    part = rng.of(
         (
             b"",
             _EXTENSION[:cut],
-            _EXTENSION + some.bytes(1 + some.below(5)),
-            msgpack.packb(some.of((None, True, 7, "text", [1, 2], 0.5))),
-            msgpack.packb({1 + some.below(100): "a"}),
+            _EXTENSION + rng.bytes(1 + rng.below(5)),
+            msgpack.packb(rng.of((None, True, 7, "text", [1, 2], 0.5))),
+            msgpack.packb({1 + rng.below(100): "a"}),
             b"\xc1",
-            b"\x81\xa1a" + b"\x91" * (64 + some.below(200)) + b"\xc0",
+            b"\x81\xa1a" + b"\x91" * (64 + rng.below(200)) + b"\xc0",
             b"\x81\xa1a\xdd\xff\xff\xff\xff",
             b"\xdf\xff\xff\xff\xff\xa1a\xc0",
             b"\x81\xa1a\xdb\xff\xff\xff\xffabc",
         )
     )
-    return [_GOOD_TOPIC, _header(some, flags=wire.EXTENSION), some.bytes(some.below(20)), part]
+    return [_GOOD_TOPIC, _header(rng, flags=wire.EXTENSION), rng.bytes(rng.below(20)), part]
 
 
-def _table(some: _Bytes, count: int, sizes: Sequence[int]) -> bytes:
-    stamps = [STAMP_NS + some.below(10**9) for _each in sizes]
+def _table(rng: _Bytes, count: int, sizes: Sequence[int]) -> bytes:
+    stamps = [STAMP_NS + rng.below(10**9) for _each in sizes]
     return struct.pack(f"<I{len(sizes)}I{len(sizes)}Q", count, *sizes, *stamps)
 
 
-def _batch(some: _Bytes, body: bytes, flags: int = wire.BATCH, size: int | None = None) -> Parts:
-    head = _header(some, flags=flags, size=len(body) if size is None else size)
-    return [_GOOD_TOPIC + head + body]
+def _batch(rng: _Bytes, body: bytes, flags: int = wire.BATCH, size: int | None = None) -> Parts:
+    header = _header(rng, flags=flags, size=len(body) if size is None else size)
+    return [_GOOD_TOPIC + header + body]
 
 
-def _whole(some: _Bytes) -> bytes:
-    sizes = [some.below(12) for _each in range(1 + some.below(4))]
-    return _table(some, len(sizes), sizes) + some.bytes(sum(sizes))
+def _whole(rng: _Bytes) -> bytes:
+    sizes = [rng.below(12) for _each in range(1 + rng.below(4))]
+    return _table(rng, len(sizes), sizes) + rng.bytes(sum(sizes))
 
 
-def _batch_form(some: _Bytes) -> Parts:
-    body = _whole(some)
-    other = some.of((wire.LATCHED, wire.BYE, wire.SHARED, wire.OFFER, 64, 2**15))
-    (one,) = _batch(some, body)
+def _batch_form(rng: _Bytes) -> Parts:
+    body = _whole(rng)
+    other = rng.of((wire.LATCHED, wire.BYE, wire.SHARED, wire.OFFER, 64, 2**15))
+    (frame,) = _batch(rng, body)
     cut = len(_GOOD_TOPIC)
-    return some.of(  # type: ignore[no-any-return]
+    return rng.of(  # type: ignore[no-any-return]
         (
-            _batch(some, body, wire.BATCH | other),
-            _batch(some, body, wire.BATCH | other, size=len(body) + 1),
-            [one[:cut], one[cut : cut + 32], one[cut + 32 :]],
-            [_GOOD_TOPIC, _header(some, flags=wire.BATCH | wire.EXTENSION), body, _EXTENSION],
+            _batch(rng, body, wire.BATCH | other),
+            _batch(rng, body, wire.BATCH | other, size=len(body) + 1),
+            [frame[:cut], frame[cut : cut + 32], frame[cut + 32 :]],
+            [_GOOD_TOPIC, _header(rng, flags=wire.BATCH | wire.EXTENSION), body, _EXTENSION],
         )
     )
 
 
-def _batch_size(some: _Bytes) -> Parts:
-    body = _whole(some)
-    return _batch(some, body, size=some.of((0, len(body) - 1, len(body) + 1, 2**32 - 1)))
+def _batch_size(rng: _Bytes) -> Parts:
+    body = _whole(rng)
+    return _batch(rng, body, size=rng.of((0, len(body) - 1, len(body) + 1, 2**32 - 1)))
 
 
-def _batch_count(some: _Bytes) -> Parts:
-    count = some.of((0, 257, 258, 1000, 2**31, 2**32 - 1))
-    sizes = [some.below(5) for _each in range(some.below(4))]
-    body = _table(some, count, sizes) + some.bytes(sum(sizes))
-    return _batch(some, some.of((body, body, body, b"", body[: 1 + some.below(3)])))
+def _batch_count(rng: _Bytes) -> Parts:
+    count = rng.of((0, 257, 258, 1000, 2**31, 2**32 - 1))
+    sizes = [rng.below(5) for _each in range(rng.below(4))]
+    body = _table(rng, count, sizes) + rng.bytes(sum(sizes))
+    return _batch(rng, rng.of((body, body, body, b"", body[: 1 + rng.below(3)])))
 
 
-def _batch_table(some: _Bytes) -> Parts:
-    sizes = [some.below(5) for _each in range(1 + some.below(5))]
-    table = _table(some, len(sizes), sizes)
-    return _batch(some, some.of((table[: 4 + some.below(len(table) - 4)], struct.pack("<I", 256))))
+def _batch_table(rng: _Bytes) -> Parts:
+    sizes = [rng.below(5) for _each in range(1 + rng.below(5))]
+    table = _table(rng, len(sizes), sizes)
+    return _batch(rng, rng.of((table[: 4 + rng.below(len(table) - 4)], struct.pack("<I", 256))))
 
 
-def _batch_sizes(some: _Bytes) -> Parts:
-    sizes = [some.below(9) for _each in range(1 + some.below(5))]
-    payloads = some.bytes(sum(sizes))
+def _batch_sizes(rng: _Bytes) -> Parts:
+    sizes = [rng.below(9) for _each in range(1 + rng.below(5))]
+    payloads = rng.bytes(sum(sizes))
     claimed = list(sizes)
-    claimed[some.below(len(claimed))] += some.of((1, 7, 2**31, 2**32 - 9))
-    short = _table(some, len(sizes), sizes) + payloads + some.bytes(1 + some.below(4))
-    return _batch(some, some.of((_table(some, len(claimed), claimed) + payloads, short)))
+    claimed[rng.below(len(claimed))] += rng.of((1, 7, 2**31, 2**32 - 9))
+    short = _table(rng, len(sizes), sizes) + payloads + rng.bytes(1 + rng.below(4))
+    return _batch(rng, rng.of((_table(rng, len(claimed), claimed) + payloads, short)))
 
 
-def _codec(some: _Bytes) -> Parts:
-    number = some.of((0, 6, 7, 99, 128, 255))
-    payload = some.bytes(some.below(20))
-    head = _header(some, number, size=some.of((0, len(payload))))
+def _codec(rng: _Bytes) -> Parts:
+    number = rng.of((0, 6, 7, 99, 128, 255))
+    payload = rng.bytes(rng.below(20))
+    header = _header(rng, number, size=rng.of((0, len(payload))))
     batch = struct.pack("<IIQ", 1, len(payload), STAMP_NS) + payload
-    return some.of(  # type: ignore[no-any-return]
+    return rng.of(  # type: ignore[no-any-return]
         (
-            [_GOOD_TOPIC, head, payload],
-            [_GOOD_TOPIC + head + payload],
-            [_GOOD_TOPIC + _header(some, number, wire.BATCH, len(batch)) + batch],
+            [_GOOD_TOPIC, header, payload],
+            [_GOOD_TOPIC + header + payload],
+            [_GOOD_TOPIC + _header(rng, number, wire.BATCH, len(batch)) + batch],
         )
     )
 
@@ -552,8 +552,8 @@ def malformed() -> Iterator[list[str]]:
 
 def files() -> dict[str, str]:
     """Return the text of each generated file by its name."""
-    whole: dict[str, Any] = {"filters": filters(), "notices": notices(), "master": master()}
-    texts = {f"{name}.json": json.dumps(value, indent=1) + "\n" for name, value in whole.items()}
+    contents: dict[str, Any] = {"filters": filters(), "notices": notices(), "master": master()}
+    texts = {f"{name}.json": json.dumps(value, indent=1) + "\n" for name, value in contents.items()}
     lines = ",\n".join(json.dumps(each, separators=(",", ":")) for each in malformed())
     return {**texts, "malformed.json": f"[\n{lines}\n]\n"}
 

@@ -82,24 +82,24 @@ def template(root: Path = ROOT) -> Catalog:
     # imported here because hatch_build.py runs with only the build requirements installed
     from nep.cli.app import docstrings  # noqa: PLC0415
 
-    made = Catalog(project="NEP Studio", creation_date=_MADE, header_comment=_HEADER, fuzzy=False)
+    catalog = Catalog(project="NEP Studio", creation_date=_MADE, header_comment=_HEADER, fuzzy=False)
     for folder, pattern, method in SOURCES:
         for path in sorted((root / folder).rglob(pattern)):
             if "node_modules" in path.parts or path == root / "nep" / "i18n.py":
                 continue
-            for found, comments, context in _marked(method, path, path.stat().st_mtime_ns):
-                ids = tuple(found) if isinstance(found, (list, tuple)) else (found,)
-                place = path.relative_to(root).as_posix()
-                made.add(_id(ids), locations=[(place, 0)], auto_comments=comments, context=context)
+            for messages, comments, context in _marked(method, path, path.stat().st_mtime_ns):
+                ids = tuple(messages) if isinstance(messages, (list, tuple)) else (messages,)
+                file = path.relative_to(root).as_posix()
+                catalog.add(_id(ids), locations=[(file, 0)], auto_comments=comments, context=context)
     for english in FOREIGN:
-        made.add(english, locations=[("typer", 0)])
+        catalog.add(english, locations=[("typer", 0)])
     for _command, english in docstrings():
-        made.add(english, locations=[("nep/cli", 0)])
-    for english, place in sentences_of_robots(root):
-        made.add(english, locations=[(place, 0)], context="robot")
-    for context, english, place in (*sentences_of_blocks(), *sentences_of_examples()):
-        made.add(english, locations=[(place, 0)], context=context)
-    return made
+        catalog.add(english, locations=[("nep/cli", 0)])
+    for english, file in sentences_of_robots(root):
+        catalog.add(english, locations=[(file, 0)], context="robot")
+    for context, english, file in (*sentences_of_blocks(), *sentences_of_examples()):
+        catalog.add(english, locations=[(file, 0)], context=context)
+    return catalog
 
 
 @cache
@@ -107,10 +107,10 @@ def _marked(
     method: str, path: Path, _changed_ns: int
 ) -> list[tuple[str | tuple[str, ...], list[str], str | None]]:
     # (texts, comments for translators, context) of the marked texts in a file; cached by modification time.
-    found = extract_from_file(
+    extracted = extract_from_file(
         method, path, keywords=KEYWORDS, comment_tags=("Translators:",), strip_comment_tags=True
     )
-    return [(words, comments, context) for _line, words, comments, context in found]
+    return [(texts, comments, context) for _line, texts, comments, context in extracted]
 
 
 def sentences_of_robots(root: Path) -> Iterator[tuple[str, str]]:
@@ -118,31 +118,31 @@ def sentences_of_robots(root: Path) -> Iterator[tuple[str, str]]:
     from app.blocks.toolbox.catalogue import is_translatable  # noqa: PLC0415 - as above
 
     for path in sorted((root / "resources" / "robots").glob("*.tm.jsonld")):
-        place = path.relative_to(root).as_posix()
+        file = path.relative_to(root).as_posix()
         for english in _of_description(json.loads(path.read_text(encoding="utf-8")), is_inside=False):
             if is_translatable(english):
-                yield english, place
+                yield english, file
 
 
 def _of_description(value: object, *, is_inside: bool) -> Iterator[str]:
     # Titles, descriptions and block texts; names and choices where these are missing.
     if isinstance(value, list):
-        for each in value:
-            yield from _of_description(each, is_inside=is_inside)
+        for item in value:
+            yield from _of_description(item, is_inside=is_inside)
     if not isinstance(value, dict):
         return
-    for key, each in value.items():
-        if isinstance(each, str) and is_inside and key in {"title", "description"}:
-            yield each
+    for key, item in value.items():
+        if isinstance(item, str) and is_inside and key in {"title", "description"}:
+            yield item
         elif key == "enum":
-            yield from (str(choice).replace("_", " ") for choice in each)
+            yield from (str(choice).replace("_", " ") for choice in item)
         elif key == "rb:block":
-            yield from (each[kind]["en"] for kind in ("text", "says") if "en" in each.get(kind, {}))
+            yield from (item[kind]["en"] for kind in ("text", "says") if "en" in item.get(kind, {}))
         elif key in {"actions", "properties", "events"}:
-            yield from (name.replace("_", " ") for name, held in each.items() if "title" not in held)
-            yield from _of_description(list(each.values()), is_inside=True)
+            yield from (name.replace("_", " ") for name, member in item.items() if "title" not in member)
+            yield from _of_description(list(item.values()), is_inside=True)
         elif not key.startswith("rb:") or key == "rb:feedback":
-            yield from _of_description(each, is_inside=is_inside)
+            yield from _of_description(item, is_inside=is_inside)
 
 
 def keys(catalog: Catalog) -> set[Key]:
@@ -176,8 +176,8 @@ def languages(folder: Path) -> list[str]:
 def read(path: Path, language: str | None = None) -> Catalog:
     """Read a .po or .pot file."""
     with path.open("rb") as stream:
-        found: Catalog = read_po(stream, locale=language, domain=DOMAIN)
-    return found
+        catalog: Catalog = read_po(stream, locale=language, domain=DOMAIN)
+    return catalog
 
 
 def write(catalog: Catalog, path: Path) -> None:
@@ -185,25 +185,25 @@ def write(catalog: Catalog, path: Path) -> None:
     catalog.creation_date = _MADE
     for entry in catalog:
         entry.flags.discard("python-format")  # Babel misinterprets texts such as "%A is known"
-    held = io.BytesIO()
-    write_po(held, catalog, width=100, sort_output=True, ignore_obsolete=True, include_lineno=False)
+    buffer = io.BytesIO()
+    write_po(buffer, catalog, width=100, sort_output=True, ignore_obsolete=True, include_lineno=False)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(held.getvalue())
+    path.write_bytes(buffer.getvalue())
 
 
 def extract(folder: Path = LOCALE_FOLDER) -> Catalog:
     """Write the template with all texts and return it."""
-    made = template()
-    write(made, pot_file(folder))
-    return made
+    catalog = template()
+    write(catalog, pot_file(folder))
+    return catalog
 
 
 def update(folder: Path = LOCALE_FOLDER) -> None:
     """Update the template and all translations from the sources, and compile them."""
-    made = extract(folder)
+    pot = extract(folder)
     for language in languages(folder):
         catalog = read(po_file(folder, language), language)
-        catalog.update(made, no_fuzzy_matching=True)
+        catalog.update(pot, no_fuzzy_matching=True)
         write(catalog, po_file(folder, language))
     compile_all(folder)
 
@@ -220,13 +220,13 @@ def add(language: str, folder: Path = LOCALE_FOLDER) -> None:
 
 def compile_all(folder: Path = LOCALE_FOLDER) -> None:
     """Write the generated files: compiled languages, the pseudo-language, and languages.json."""
-    known: dict[str, Mapping[str, object]] = {ENGLISH: {"name": "English", "share": 1.0}}
+    info_by_language: dict[str, Mapping[str, object]] = {ENGLISH: {"name": "English", "share": 1.0}}
     for language in languages(folder):
         catalog = read(po_file(folder, language), language)
-        known[language] = facts(language, catalog)
+        info_by_language[language] = facts(language, catalog)
         _write_mo(catalog, po_file(folder, language).with_suffix(".mo"))
     compile_pseudo(folder)
-    (folder / "languages.json").write_text(_json(known), encoding="utf-8")
+    (folder / "languages.json").write_text(_json(info_by_language), encoding="utf-8")
 
 
 def compile_pseudo(folder: Path = LOCALE_FOLDER) -> None:
@@ -239,14 +239,14 @@ def _write_mo(catalog: Catalog, path: Path) -> None:
     for entry in catalog:
         if not is_done(entry.string):
             entry.string = ""  # Babel would use English for untranslated plurals
-    held = io.BytesIO()
-    write_mo(held, catalog)
+    buffer = io.BytesIO()
+    write_mo(buffer, catalog)
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(
+    temporary = path.with_name(
         f"{path.name}.{os.getpid()}"
     )  # so that programs starting meanwhile read either the old or the new file
-    beside.write_bytes(held.getvalue())
-    beside.replace(path)
+    temporary.write_bytes(buffer.getvalue())
+    temporary.replace(path)
     path.with_name(EDITOR_CATALOGUE).write_text(_json(_for_editor(catalog)), encoding="utf-8")
 
 
@@ -255,7 +255,7 @@ def _for_editor(catalog: Catalog) -> dict[str, str]:
     return {
         str(each.id): str(each.string)
         for each in catalog
-        if each.string and any(place.endswith(".ts") for place, _line in each.locations)
+        if each.string and any(location.endswith(".ts") for location, _line in each.locations)
     }
 
 
@@ -296,11 +296,11 @@ def _date(pattern: str) -> str:
     return re.sub(r"'([^']*)'|(y+)|(MMM+)|(M+)|(d+)", _date_part, pattern)
 
 
-def _date_part(found: re.Match[str]) -> str:
-    if found[1] is not None:
-        return str(found[1])
+def _date_part(match: re.Match[str]) -> str:
+    if match[1] is not None:
+        return str(match[1])
     names = ("{year}", "{month}", "{month_number}", "{day}")
-    return next(name for name, part in zip(names, found.groups()[1:], strict=True) if part)
+    return next(name for name, part in zip(names, match.groups()[1:], strict=True) if part)
 
 
 def is_done(string: str | Sequence[str] | None) -> bool:
@@ -310,37 +310,43 @@ def is_done(string: str | Sequence[str] | None) -> bool:
 
 def pseudo_catalog(pot: Catalog) -> Catalog:
     """Create a catalogue with all texts in the pseudo-language."""
-    made = Catalog(project="NEP Studio", creation_date=_MADE, fuzzy=False)
+    catalog = Catalog(project="NEP Studio", creation_date=_MADE, fuzzy=False)
     for entry in pot:
         if entry.id:
             forms = tuple(pseudo(each) for each in _ids(entry.id))
-            made.add(entry.id, _id(forms), locations=entry.locations, context=entry.context)
-    return made
+            catalog.add(entry.id, _id(forms), locations=entry.locations, context=entry.context)
+    return catalog
 
 
 def check(folder: Path = LOCALE_FOLDER) -> list[str]:
     """Return a sentence for each inconsistency between sources, template and translations."""
-    made, pot = template(), read(pot_file(folder))
-    wrong = [
-        f"'{_shown(key)}' is {place}; run 'python tools/words.py update'"
-        for place, found in (
-            (f"not in {DOMAIN}.pot", keys(made) - keys(pot)),
-            (f"in {DOMAIN}.pot, but no longer in the sources", keys(pot) - keys(made)),
+    current, pot = template(), read(pot_file(folder))
+    problems = [
+        f"'{_shown(key)}' is {difference}; run 'python tools/words.py update'"
+        for difference, differing_keys in (
+            (f"not in {DOMAIN}.pot", keys(current) - keys(pot)),
+            (f"in {DOMAIN}.pot, but no longer in the sources", keys(pot) - keys(current)),
         )
-        for key in sorted(found, key=str)
+        for key in sorted(differing_keys, key=str)
     ]
-    known = _read_json(folder / "languages.json")
+    info_by_language = _read_json(folder / "languages.json")
     for language in languages(folder):
         path = po_file(folder, language)
         catalog = read(path, language)
-        wrong += [f"{language}: {sentence}" for sentence in _wrong_entries(catalog)]
+        problems += [f"{language}: {problem}" for problem in _wrong_entries(catalog)]
         if keys(catalog) != keys(pot):
-            wrong.append(f"{language}: its sentences are not those of the .pot; run 'tools/words.py update'")
+            problems.append(
+                f"{language}: its sentences are not those of the .pot; run 'tools/words.py update'"
+            )
         made_of_it = (_told(catalog), _for_editor(catalog), facts(language, catalog))
-        there = (_compiled(path), _read_json(path.with_name(EDITOR_CATALOGUE)), known.get(language))
-        if made_of_it != there:
-            wrong.append(f"{language}: compiled from other words; run 'python tools/words.py compile'")
-    return wrong
+        existing = (
+            _compiled(path),
+            _read_json(path.with_name(EDITOR_CATALOGUE)),
+            info_by_language.get(language),
+        )
+        if made_of_it != existing:
+            problems.append(f"{language}: compiled from other words; run 'python tools/words.py compile'")
+    return problems
 
 
 def _wrong_entries(catalog: Catalog) -> Iterator[str]:
@@ -365,9 +371,9 @@ def _told(catalog: Catalog) -> dict[Key, tuple[str, ...]]:
     }
 
 
-def _context(told: str | bytes | None) -> str | None:
+def _context(context: str | bytes | None) -> str | None:
     # Babel returns the contexts of a .mo as bytes.
-    return (told.decode() if isinstance(told, bytes) else told) or None
+    return (context.decode() if isinstance(context, bytes) else context) or None
 
 
 def _compiled(po: Path) -> dict[Key, tuple[str, ...]]:
@@ -379,8 +385,8 @@ def _compiled(po: Path) -> dict[Key, tuple[str, ...]]:
 
 
 def _read_json(path: Path) -> Mapping[str, object]:
-    found: Mapping[str, object] = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    return found
+    content: Mapping[str, object] = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    return content
 
 
 def _shown(key: Key) -> str:
@@ -399,16 +405,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not options.language:
             parser.error("add needs a language")
         add(options.language)
-    found = check() if options.command == "check" else []
+    problems = check() if options.command == "check" else []
     if options.command in {"update", "add"}:
         update()
     elif options.command == "extract":
         extract()
     elif options.command == "compile":
         compile_all()
-    for sentence in found:
-        print(f"words: {sentence}", file=sys.stderr)
-    return 1 if found else 0
+    for problem in problems:
+        print(f"words: {problem}", file=sys.stderr)
+    return 1 if problems else 0
 
 
 if __name__ == "__main__":

@@ -172,13 +172,13 @@ def run(name: str) -> None:
     """
     prepare_streams()  # scripts may write characters that a Windows pipe can't encode
     with new_node(f"program {name}") as node:
-        found = find_robots(node, ROBOT_DISCOVERY_S)
-        for claim in found.rejected_claims:
+        discovery = find_robots(node, ROBOT_DISCOVERY_S)
+        for claim in discovery.rejected_claims:
             _print(claim)
-        owners = {robot: owner.node_id for robot, owner in found.owners.items()}
-        network = Network(node, f"program {name}", found.robots, owners=owners)
+        owners = {robot: owner.node_id for robot, owner in discovery.owners.items()}
+        network = Network(node, f"program {name}", discovery.robots, owners=owners)
         try:
-            _runtime.start(network, found.robots)
+            _runtime.start(network, discovery.robots)
             while not _runtime.finished.wait(0.1):
                 pass
         except KeyboardInterrupt:
@@ -187,9 +187,9 @@ def run(name: str) -> None:
             with without_interrupts():
                 _runtime.scheduler.stop()
                 moving = network.stop_robots(STOP_REPLY_TIMEOUT_S)
-                wrong = [network.stop_error(robot) for robot in moving]
+                stop_errors = [network.stop_error(robot) for robot in moving]
                 network.close()
-    for words in wrong:
-        _print(_("{words}. Switch it off by hand.").format(words=words))
+    for stop_error in stop_errors:
+        _print(_("{words}. Switch it off by hand.").format(words=stop_error))
     if _runtime.error is not None:
         sys.exit(_runtime.error.sentence)

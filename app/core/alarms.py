@@ -106,7 +106,7 @@ class SessionAlarms:
         self._watches: dict[str, Watch] = {}
         self._removed: tuple[AlarmRule, int] | None = None
         self._is_newer = False
-        found = self._read(self.path)
+        alarm_file = self._read(self.path)
         carriers: dict[str, ActionStarter] = {
             "banner": _complete_with_alert,
             "console": self._log_to_console,
@@ -117,7 +117,7 @@ class SessionAlarms:
             "send": self._send,
             "stop": self._stop,
         }
-        self.alarms = Alarms(found.rules, found.history, carriers, clock=clock, clock_s=clock_s)
+        self.alarms = Alarms(alarm_file.rules, alarm_file.history, carriers, clock=clock, clock_s=clock_s)
         self._written: object = self._state()
         self._view: GraphView | None = None
         self._on: set[str] = set()
@@ -185,9 +185,9 @@ class SessionAlarms:
     def restore(self) -> None:
         """Restore the last removed alarm at its position."""
         if self._removed is not None and self._has_room():
-            (rule, place), self._removed = self._removed, None
+            (rule, index), self._removed = self._removed, None
             rules = [*self.rules]
-            rules.insert(place, rule)
+            rules.insert(index, rule)
             self.alarms.set_rules(rules)
             self._update_watches()
 
@@ -221,13 +221,13 @@ class SessionAlarms:
         for event in self.alarms.tick():
             self._show_event(event)
         self.alarms.take_action_results()
-        asked = self._pending_send
-        if asked is not None and self._session.fleet.permission.question is not asked.question:
+        pending = self._pending_send
+        if pending is not None and self._session.fleet.permission.question is not pending.question:
             self._pending_send = None
-            asked.done(
+            pending.done(
                 False,
                 _("not sent: {robots} isn't allowed to move").format(
-                    robots=format_list(asked.question.names)
+                    robots=format_list(pending.question.names)
                 ),
             )
 
@@ -261,10 +261,10 @@ class SessionAlarms:
         self._commands.close()
 
     def _update_watches(self) -> None:
-        wanted = self.alarms.evaluator.topics
-        for topic in self._watches.keys() - wanted:
+        required_topics = self.alarms.evaluator.topics
+        for topic in self._watches.keys() - required_topics:
             self._watches.pop(topic).close()
-        for topic in wanted - self._watches.keys():
+        for topic in required_topics - self._watches.keys():
             self._watches[topic] = self._session.watch(topic)
         if self._view is not None:
             self.alarms.evaluator.update_graph(self._view)
@@ -285,88 +285,90 @@ class SessionAlarms:
         if event.is_snoozed or not any(action.kind == "banner" for action in rule.actions):
             alerts.dismiss(_alert_id(rule.id))
 
-    def _update_alert(self, rule: AlarmRule, seen: Scalar, count: int) -> None:
+    def _update_alert(self, rule: AlarmRule, value: Scalar, count: int) -> None:
         condition, record = rule.condition, self.history.last(rule.id)
         # use the value that triggered the alarm, if it was recorded, instead of the current one
-        words = record.cause if record is not None else event_text(condition, seen)
-        if condition.kind == "silent" and isinstance(seen, int | float) and seen >= 1:
+        alert_text = record.cause if record is not None else event_text(condition, value)
+        if condition.kind == "silent" and isinstance(value, int | float) and value >= 1:
             template = _("{topic} has been silent for {time}")
-            words = template.format(topic=subject_text(condition), time=duration_text(round(seen)))
+            alert_text = template.format(topic=subject_text(condition), time=duration_text(round(value)))
         details = [deed.text for deed in record.action_results] if record is not None else []
         now = self.alarms.evaluator.state(rule).count
-        known = next((each.count for each in self._session.alerts.active if each.id == _alert_id(rule.id)), 0)
+        previous_count = next(
+            (each.count for each in self._session.alerts.active if each.id == _alert_id(rule.id)), 0
+        )
         self._session.alerts.raise_alert(
             _alert_id(rule.id),
             severity_of(condition),
-            f"{words[:1].upper()}{words[1:]}.",
+            f"{alert_text[:1].upper()}{alert_text[1:]}.",
             ". ".join([*(each[:1].upper() + each[1:] for each in details), ""]).strip(),
             button=_("Show the alarm"),
             action=SHOW_COMMAND,
-            count=max(count, now - known) if known else max(1, count),
+            count=max(count, now - previous_count) if previous_count else max(1, count),
         )
 
     # ---- actions
 
-    def _log_to_console(self, event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
-        words = event_text(event.rule.condition, event.value)
-        self._session.console.add(severity_of(event.rule.condition), "alarms", words)
-        done(True, "")
+    def _log_to_console(self, event: AlarmEvent, _action: AlarmAction, on_done: DoneCallback) -> None:
+        text = event_text(event.rule.condition, event.value)
+        self._session.console.add(severity_of(event.rule.condition), "alarms", text)
+        on_done(True, "")
 
-    def _play_sound(self, _event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
+    def _play_sound(self, _event: AlarmEvent, _action: AlarmAction, on_done: DoneCallback) -> None:
         speaker = self._session.voices.speaker
         if speaker is None:
-            done(False, _("sound isn't available"))
+            on_done(False, _("sound isn't available"))
             return
         speaker.play(SOUND, VOLUME)
-        done(True, _("sound"))
+        on_done(True, _("sound"))
 
-    def _save_recording(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
+    def _save_recording(self, event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
         if self.keep is None:
-            done(False, _("nothing saved: recording is off"))
+            on_done(False, _("nothing saved: recording is off"))
         else:
-            self.keep(event, action, done)
+            self.keep(event, action, on_done)
 
-    def _run(self, _event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
-        why_not = _("no window is open") if self.run_behaviour is None else self.run_behaviour(action.name)
-        if why_not:
-            done(False, _("“{name}” wasn't run: {reason}").format(name=action.name, reason=why_not))
+    def _run(self, _event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
+        error_text = _("no window is open") if self.run_behaviour is None else self.run_behaviour(action.name)
+        if error_text:
+            on_done(False, _("“{name}” wasn't run: {reason}").format(name=action.name, reason=error_text))
         else:
-            done(True, _("ran “{name}”").format(name=action.name))
+            on_done(True, _("ran “{name}”").format(name=action.name))
 
-    def _stop(self, _event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
+    def _stop(self, _event: AlarmEvent, _action: AlarmAction, on_done: DoneCallback) -> None:
         self._session.runs.stop()
-        done(True, _("Stop was sent to all robots"))
+        on_done(True, _("Stop was sent to all robots"))
 
-    def _send(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
+    def _send(self, event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
         fleet, (topic, msg_type) = self._session.fleet, (action.name, action.msg_type)
         if not fleet.gate.is_permitted(topic, msg_type) and fleet.permission.question is not None:
-            done(False, _("not sent: waiting for permission to move a robot"))
+            on_done(False, _("not sent: waiting for permission to move a robot"))
             return
         reason = _("An alarm wants to send a message on {topic} ({what}).").format(
             topic=topic, what=event_text(event.rule.condition, event.value)
         )
-        go_on = partial(self._resume_send, event, action, done)
+        go_on = partial(self._resume_send, event, action, on_done)
         if not fleet.gate.request_permission(topic, go_on, msg_type, reason=reason):
             question = fleet.permission.question
-            self._pending_send = None if question is None else _PendingSend(question, done)
+            self._pending_send = None if question is None else _PendingSend(question, on_done)
             return
         moved = fleet.gate.robots_moved_by(topic, msg_type)
         if moved:
             self.on_moved(moved, "alarm")
-        self._submit_command(event, action, done)
+        self._submit_command(event, action, on_done)
 
-    def _resume_send(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
+    def _resume_send(self, event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
         self._pending_send = None
-        self._send(event, action, done)
+        self._send(event, action, on_done)
 
-    def _submit_command(self, _event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
-        asked = self._clock()
+    def _submit_command(self, _event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
+        requested_s = self._clock()
 
         def job(node: Node) -> None:
-            if self._clock() - asked > MAX_MESSAGE_AGE_S:
-                done(False, _("no master was running"))
+            if self._clock() - requested_s > MAX_MESSAGE_AGE_S:
+                on_done(False, _("no master was running"))
             else:
-                self._commands.start_action(node, action, done)
+                self._commands.start_action(node, action, on_done)
 
         self._session.source.submit(ACTION_FAILED_MESSAGE, job)
 
@@ -382,28 +384,28 @@ class SessionAlarms:
         self._written = state
         # an incomplete rule could not be read back
         rules = [rule for rule in self.rules if problem_of(rule) is None]
-        kept = AlarmHistory([replace(record) for record in self.history.records])
+        history = AlarmHistory([replace(record) for record in self.history.records])
 
         def write() -> bool:
-            write_atomically(path, encode_alarms(rules, kept), durable=False, private=True)
+            write_atomically(path, encode_alarms(rules, history), durable=False, private=True)
             return True
 
         self._worker.submit(FILE_NAME, write)
 
     def _read(self, path: Path) -> AlarmFile:
         def parse(data: bytes) -> tuple[AlarmFile, str]:
-            found = parse_alarms(data, path.name, lenient=True)
-            return found, next(iter(found.problems), "")
+            alarm_file = parse_alarms(data, path.name, lenient=True)
+            return alarm_file, next(iter(alarm_file.problems), "")
 
-        kept = read_stored(path, parse, NewerAlarmsError, _MAX_FILE_BYTES)
-        self._is_newer = kept.is_newer
-        if kept.problem:
-            some = kept.value is not None
-            title = _("Some alarms couldn't be read.") if some else _("The alarms couldn't be read.")
+        stored = read_stored(path, parse, NewerAlarmsError, _MAX_FILE_BYTES)
+        self._is_newer = stored.is_newer
+        if stored.problem:
+            is_partial = stored.value is not None
+            title = _("Some alarms couldn't be read.") if is_partial else _("The alarms couldn't be read.")
             self._session.alerts.raise_alert(
-                "alarms:file", "warn", title, kept.problem, button=_("Show the alarms"), action=SHOW_COMMAND
+                "alarms:file", "warn", title, stored.problem, button=_("Show the alarms"), action=SHOW_COMMAND
             )
-        return kept.value if kept.value is not None else AlarmFile()
+        return stored.value if stored.value is not None else AlarmFile()
 
 
 def _ignore_event(_event: AlarmEvent) -> None: ...
@@ -413,5 +415,5 @@ def _alert_id(rule_id: str) -> str:
     return f"alarm:{rule_id}"
 
 
-def _complete_with_alert(_event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
-    done(True, "")
+def _complete_with_alert(_event: AlarmEvent, _action: AlarmAction, on_done: DoneCallback) -> None:
+    on_done(True, "")

@@ -48,7 +48,7 @@ class Alerts:
     def active(self) -> Sequence[ActiveAlert]:
         """All active alerts, sorted by severity (errors, warnings, infos) and then by age, oldest first."""
         if self._sorted is None:
-            order = {severity: place for place, severity in enumerate(SEVERITIES)}
+            order = {severity: rank for rank, severity in enumerate(SEVERITIES)}
             self._sorted = tuple(
                 sorted(self._alerts.values(), key=lambda alert: (order[alert.severity], alert.since_s))
             )

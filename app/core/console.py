@@ -78,12 +78,12 @@ class Console:
         """
         if dropped:
             self.left_out += dropped
-            words = ngettext(
+            message = ngettext(
                 "{count} log record was dropped: too many at once",
                 "{count} log records were dropped: too many at once",
                 dropped,
             )
-            self.add("warn", "studio", words.format(count=dropped))
+            self.add("warn", "studio", message.format(count=dropped))
         if messages:
             self._append(messages)
 
@@ -126,23 +126,29 @@ class Console:
     def _decode_records(self, message: Message) -> Sequence[ConsoleRecord]:
         try:
             if message.topic == log_handler.LAST_ERRORS_TOPIC:
-                given = self._errors.new_records(message.payload)
+                records = self._errors.new_records(message.payload)
             else:
-                one = log_handler.LogRecord.from_plain(message.payload, message.stamp_ns)
-                given = [one] if self._errors.is_new(one) else []
+                record = log_handler.LogRecord.from_plain(message.payload, message.stamp_ns)
+                records = [record] if self._errors.is_new(record) else []
         except NepError:
             return ()  # an alert reports it, as for every topic
-        return [self._decode_record(each) for each in given if each.pid is None or each.pid not in self._own]
+        return [
+            self._decode_record(each) for each in records if each.pid is None or each.pid not in self._own
+        ]
 
-    def _decode_record(self, given: log_handler.LogRecord) -> ConsoleRecord:
-        place = f"{given.file}:{given.line}" if given.file and given.line else given.file or ""
+    def _decode_record(self, log_record: log_handler.LogRecord) -> ConsoleRecord:
+        location = (
+            f"{log_record.file}:{log_record.line}"
+            if log_record.file and log_record.line
+            else log_record.file or ""
+        )
         return ConsoleRecord(
-            given.stamp_ns / 1e9 if given.stamp_ns else self._clock(),
-            _LEVELS.get(given.level, given.level),
-            given.node or given.name or _("unknown sender"),
-            _truncate(given.text),
-            logger="" if given.name == given.node else given.name,
-            location=place,
+            log_record.stamp_ns / 1e9 if log_record.stamp_ns else self._clock(),
+            _LEVELS.get(log_record.level, log_record.level),
+            log_record.node or log_record.name or _("unknown sender"),
+            _truncate(log_record.text),
+            logger="" if log_record.name == log_record.node else log_record.name,
+            location=location,
         )
 
 

@@ -47,17 +47,21 @@ _log = logging.getLogger("studio")
 
 def log_folder() -> Path:
     """Return the folder of the log files: the system's log folder, or ``log`` below ``$NEP_STUDIO_HOME``."""
-    chosen = os.environ.get("NEP_STUDIO_HOME")
-    return Path(chosen) / "log" if chosen else Path(platformdirs.user_log_dir("nep-studio", appauthor=False))
+    studio_home = os.environ.get("NEP_STUDIO_HOME")
+    return (
+        Path(studio_home) / "log"
+        if studio_home
+        else Path(platformdirs.user_log_dir("nep-studio", appauthor=False))
+    )
 
 
 @contextmanager
-def log_errors(what: str) -> Iterator[None]:
-    """Return a context manager that logs exceptions as "can't ``what``" and suppresses them."""
+def log_errors(operation: str) -> Iterator[None]:
+    """Return a context manager that logs exceptions as "can't ``operation``" and suppresses them."""
     try:
         yield
     except Exception:  # noqa: BLE001  the caller must continue after any error
-        _log.exception("can't %s", what)
+        _log.exception("can't %s", operation)
 
 
 class RepeatFilter:
@@ -86,10 +90,10 @@ class RepeatFilter:
             return record
         if count < 10 or str(count).strip("0") != "1":
             return None
-        again = logging.makeLogRecord(record.__dict__)
-        again.msg, again.args = f"{record.getMessage()} ({count} times)", ()
-        again.exc_info, again.exc_text = None, None  # the first record has the traceback
-        return again
+        summary_record = logging.makeLogRecord(record.__dict__)
+        summary_record.msg, summary_record.args = f"{record.getMessage()} ({count} times)", ()
+        summary_record.exc_info, summary_record.exc_text = None, None  # the first record has the traceback
+        return summary_record
 
 
 def _make_formattable(record: logging.LogRecord) -> logging.LogRecord:
@@ -113,8 +117,8 @@ def _raise_location(record: logging.LogRecord) -> tuple[object, ...] | None:
     kind, _error, trace = record.exc_info
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
-    where = (trace.tb_frame.f_code.co_filename, trace.tb_lineno) if trace is not None else ()
-    return (kind, *where)
+    location = (trace.tb_frame.f_code.co_filename, trace.tb_lineno) if trace is not None else ()
+    return (kind, *location)
 
 
 class LogFile(RotatingFileHandler):
@@ -136,9 +140,9 @@ class LogFile(RotatingFileHandler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write the record unless it is a repetition."""
-        shown = self._repeat_filter.filter(record)
-        if shown is not None:
-            super().emit(shown)
+        filtered = self._repeat_filter.filter(record)
+        if filtered is not None:
+            super().emit(filtered)
 
     def _open(self) -> io.TextIOWrapper:
         path = Path(self.baseFilename)
@@ -218,47 +222,49 @@ class FaultAlerts:
         self._faults: dict[str, _Fault] = {}
 
     @contextmanager
-    def guarded(self, what: str, **holes: object) -> Iterator[None]:
+    def guarded(self, operation: str, **holes: object) -> Iterator[None]:
         """Return a context manager that logs exceptions of one step, raises an alert and suppresses them.
 
         Args:
-            what: Translatable phrase that completes "can't ..."; mark it with `lazy`.
-            holes: Values for the placeholders in ``what``.
+            operation: Translatable phrase that completes "can't ..."; mark it with `lazy`.
+            holes: Values for the placeholders in ``operation``.
         """
         try:
             yield
         except Exception as error:  # noqa: BLE001  the following steps must run after any error
-            english, translated = what.format(**holes), _(what).format(**holes)
+            english, translated = operation.format(**holes), _(operation).format(**holes)
             _log.exception("can't %s", english)
             self._record_failure(
                 english, _("Studio can't {what}: {error}").format(what=translated, error=error_text(error))
             )
         else:
-            if self._faults and what in self._faults:
-                self._faults[what].has_recovered = True
+            if self._faults and operation in self._faults:
+                self._faults[operation].has_recovered = True
 
     def check(self) -> None:
         """Remove resolved faults, and resolve the alert if none is left. Called once a second."""
         now = self._clock()
-        over = [
-            what
-            for what, fault in self._faults.items()
+        expired = [
+            operation
+            for operation, fault in self._faults.items()
             if now - fault.last_failure_s >= (RECOVERY_S if fault.has_recovered else EXPIRY_S)
         ]
-        for what in over:
-            del self._faults[what]
-        if over and not self._faults:
+        for operation in expired:
+            del self._faults[operation]
+        if expired and not self._faults:
             self._alerts.resolve(ALERT_ID)
-        elif over:
+        elif expired:
             self._update_alert(next(iter(self._faults.values())), count=0)
 
-    def _record_failure(self, what: str, said: str) -> None:
-        is_new = what not in self._faults
+    def _record_failure(self, operation: str, message: str) -> None:
+        is_new = operation not in self._faults
         while is_new and len(self._faults) >= MAX_FAULTS:
             del self._faults[next(iter(self._faults))]
-        self._faults[what] = _Fault(said, self._clock())
+        self._faults[operation] = _Fault(message, self._clock())
         if not self._alerts.has(ALERT_ID):
-            self._update_alert(self._faults[what], count=1)  # further faults and repetitions are in the log
+            self._update_alert(
+                self._faults[operation], count=1
+            )  # further faults and repetitions are in the log
 
     def _update_alert(self, fault: _Fault, *, count: int) -> None:
         title = _("Something went wrong in Studio. It may show outdated values.")

@@ -25,8 +25,8 @@ def studio_command(theme: str | None = None) -> list[str]:
     Args:
         theme: Theme to use instead of the current one.
     """
-    own = [sys.executable] if getattr(sys, "frozen", False) else [sys.executable, "-m", "app"]
-    return [*own, *(("--theme", theme) if theme is not None else ())]
+    command = [sys.executable] if getattr(sys, "frozen", False) else [sys.executable, "-m", "app"]
+    return [*command, *(("--theme", theme) if theme is not None else ())]
 
 
 def fresh_environ(environ: Mapping[str, str]) -> dict[str, str]:

@@ -247,8 +247,8 @@ class Session:
     @property
     def starting_robots(self) -> tuple[str, ...]:
         """Names of the virtual robots that are starting."""
-        there = {link.name for link in self.fleet.connected}
-        return tuple(name for name in self.launcher.starting_robots if name not in there)
+        connected = {link.name for link in self.fleet.connected}
+        return tuple(name for name in self.launcher.starting_robots if name not in connected)
 
     def start(self) -> None:
         """Start the threads. If no master replies, start a master."""
@@ -341,14 +341,14 @@ class Session:
         if not was_open and replay.opened is not None:
             self.source_revision += 1  # its topics and start time are available from now on
 
-    def guarded(self, what: str, **holes: object) -> AbstractContextManager[None]:
+    def guarded(self, phrase: str, **holes: object) -> AbstractContextManager[None]:
         """Return a context manager that logs exceptions of one step, raises an alert and suppresses them.
 
         Args:
-            what: Translatable phrase that completes "can't ..."; mark it with `lazy`.
-            holes: Values for the placeholders in ``what``.
+            phrase: Translatable phrase that completes "can't ..."; mark it with `lazy`.
+            holes: Values for the placeholders in ``phrase``.
         """
-        return self._faults.guarded(what, **holes)
+        return self._faults.guarded(phrase, **holes)
 
     def _check(self, now: float) -> None:
         self._faults.check()
@@ -381,14 +381,14 @@ class Session:
 
     def _close_replays(self) -> None:
         self.return_to_live()
-        for each in self._closing_replays:
-            each.close()
+        for replay in self._closing_replays:
+            replay.close()
         self._closing_replays.clear()
 
     def close(self) -> None:
         """Stop the running program and all threads and child processes; errors are logged, not raised."""
         live = self.live
-        ends: list[tuple[str, Callable[[], object]]] = [
+        steps: list[tuple[str, Callable[[], object]]] = [
             ("stop the program", self.runs.close),
             ("stop sending by hand", self.acting.close),
             ("save the tabs", lambda: self.tabs.save(ended_well=True)),
@@ -410,8 +410,8 @@ class Session:
             ("end the reach", self.remote_access.close),
             ("end the web server", self.web_pages.close),
         ]
-        for what, end in ends:
-            with log_errors(what):
+        for description, end in steps:
+            with log_errors(description):
                 end()
 
     # -- private ---------------------------------------------------------------------------------------------
@@ -421,9 +421,9 @@ class Session:
             self.live.networks.watch(topic)
             return
         self.source.watch(topic)
-        known = self.live.topics.get(topic)
-        if known is not None:
-            known.is_watched = True
+        live_topic = self.live.topics.get(topic)
+        if live_topic is not None:
+            live_topic.is_watched = True
 
     def _stop_watch(self, topic: str) -> None:
         if split_key(topic)[0]:
@@ -457,9 +457,9 @@ class Session:
             self.room.add_messages(batches)
             self.room.tick()
         with self.guarded(lazy("check messages")):
-            found = self._checks.pop_results()
+            results = self._checks.pop_results()
             self._health.update(
-                {topic: what for topic, what in found.items() if self._watches.is_watched(topic)}
+                {topic: result for topic, result in results.items() if self._watches.is_watched(topic)}
             )
         if drained.lost_event_count:
             self.alerts.raise_alert(

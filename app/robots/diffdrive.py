@@ -133,11 +133,11 @@ class DiffDrive:
     @drives("move %distance m", "footprints", "moves %distance m", unit="m", moved=True)
     def move(self, call: Call, distance: Distance = 0.5) -> Mapping[str, object]:
         """Move straight ahead, or backwards if the distance is negative."""
-        left = abs(distance)
-        made = self._drive_straight(
-            call, distance, lambda moved: {"moved": moved, "to_go": _remaining(left, moved)}
+        total_m = abs(distance)
+        moved_m = self._drive_straight(
+            call, distance, lambda moved: {"moved": moved, "to_go": _remaining(total_m, moved)}
         )
-        return {"moved": round(made, 3)}
+        return {"moved": round(moved_m, 3)}
 
     @drives("turn %angle °", "rotate-ccw", "turns %angle °", unit="deg")
     def turn(self, call: Call, angle: Annotated[float, Range(-360, 360, 5, "deg", "angle")] = 90.0) -> None:
@@ -148,12 +148,14 @@ class DiffDrive:
     def go_to(self, call: Call, x: Distance = 0.0, y: Distance = 0.0) -> None:
         """Turn to a position and move there in a straight line. The robot doesn't avoid obstacles."""
         here_x, here_y, facing = self.wheels.pose()
-        away = math.hypot(x - here_x, y - here_y)
-        if away < MIN_DISTANCE_M:
+        distance_m = math.hypot(x - here_x, y - here_y)
+        if distance_m < MIN_DISTANCE_M:
             return
-        turn = math.degrees(math.atan2(y - here_y, x - here_x)) - facing
-        self._turn_on_spot(call, (turn + 180.0) % 360.0 - 180.0, lambda _: {"to_go": round(away, 2)})
-        self._drive_straight(call, away, lambda moved: {"to_go": _remaining(away, moved)})
+        turn_deg = math.degrees(math.atan2(y - here_y, x - here_x)) - facing
+        self._turn_on_spot(
+            call, (turn_deg + 180.0) % 360.0 - 180.0, lambda _: {"to_go": round(distance_m, 2)}
+        )
+        self._drive_straight(call, distance_m, lambda moved: {"to_go": _remaining(distance_m, moved)})
 
     @action(
         "light %colour",
@@ -203,21 +205,23 @@ class DiffDrive:
         return driven_m
 
     def _drive_straight(
-        self, call: Call, distance: float, told: Callable[[float], dict[str, object]]
+        self, call: Call, distance: float, create_feedback: Callable[[float], dict[str, object]]
     ) -> float:
-        made = self.odometer()
+        read_distance = self.odometer()
 
-        def steer(left: float) -> None:
-            speed = min(SPEED, max(SLOWEST, math.sqrt(2 * SLOW_DOWN * left)))
+        def steer(remaining: float) -> None:
+            speed = min(SPEED, max(SLOWEST, math.sqrt(2 * SLOW_DOWN * remaining)))
             self._set_speeds(call, math.copysign(speed, distance), 0.0)
 
         def send_feedback(moved: float) -> None:
-            call.feedback(**told(round(moved, 2)))
+            call.feedback(**create_feedback(round(moved, 2)))
 
-        self._steer(call, abs(distance), ARRIVED_M, made, steer, send_feedback)
-        return made()
+        self._steer(call, abs(distance), ARRIVED_M, read_distance, steer, send_feedback)
+        return read_distance()
 
-    def _turn_on_spot(self, call: Call, angle: float, told: Callable[[float], dict[str, object]]) -> None:
+    def _turn_on_spot(
+        self, call: Call, angle: float, create_feedback: Callable[[float], dict[str, object]]
+    ) -> None:
         last = [self.wheels.pose()[2]]
         turned = [0.0]
 
@@ -227,12 +231,12 @@ class DiffDrive:
             last[0] = now
             return abs(turned[0])
 
-        def steer(left: float) -> None:
-            speed = min(TURN_SPEED, max(SLOWEST_TURN, math.sqrt(2 * TURN_SLOW_DOWN * left)))
+        def steer(remaining: float) -> None:
+            speed = min(TURN_SPEED, max(SLOWEST_TURN, math.sqrt(2 * TURN_SLOW_DOWN * remaining)))
             self._set_speeds(call, 0.0, math.copysign(speed, angle))
 
-        def send_feedback(done: float) -> None:
-            call.feedback(**told(round(done, 1)))
+        def send_feedback(progress: float) -> None:
+            call.feedback(**create_feedback(round(progress, 1)))
 
         self._steer(call, abs(angle), ARRIVED_DEG, turned_deg, steer, send_feedback)
 
@@ -240,27 +244,27 @@ class DiffDrive:
         self,
         call: Call,
         amount: float,
-        near: float,
-        made: Callable[[], float],
+        tolerance: float,
+        read_progress: Callable[[], float],
         steer: Callable[[float], None],
-        tell: Callable[[float], None],
+        send_feedback: Callable[[float], None],
     ) -> None:
         steps = 0
         try:
-            while (left := amount - made()) > near:
+            while (remaining := amount - read_progress()) > tolerance:
                 if steps and self.wheels.bumped() and self.wheels.still():
                     raise Failed(_("{action}: something is in the way").format(action=call.action))
-                steer(left)
+                steer(remaining)
                 if steps % FEEDBACK_PERIOD_STEPS == 0:
-                    tell(made())
+                    send_feedback(read_progress())
                 steps += 1
                 call.wait(STEP_INTERVAL_S)
         finally:
             self._brake()
 
 
-def _remaining(amount: float, done: float) -> float:
-    return round(max(0.0, amount - done), 2)
+def _remaining(amount: float, progress: float) -> float:
+    return round(max(0.0, amount - progress), 2)
 
 
 class DiffDriveTemplate(DiffDrive):

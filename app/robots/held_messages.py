@@ -34,15 +34,15 @@ class PendingMessages:
 
     def add(self, message: Message) -> None:
         """Store a message; see the class for the limits."""
-        held = self._messages.get(message.publisher)
-        if held is None:
+        messages = self._messages.get(message.publisher)
+        if messages is None:
             if len(self._messages) >= self._publishers:
                 return
-            held = self._messages[message.publisher] = deque(maxlen=self._per_publisher)
-        held.append(message)
+            messages = self._messages[message.publisher] = deque(maxlen=self._per_publisher)
+        messages.append(message)
 
     def pop_all(self) -> list[Message]:
         """Remove and return all messages; messages of one publisher are in order of arrival."""
-        taken = [message for held in self._messages.values() for message in held]
+        pending = [message for messages in self._messages.values() for message in messages]
         self._messages.clear()
-        return taken
+        return pending

@@ -67,8 +67,8 @@ def publisher_nodes(view: GraphView, topic: str) -> tuple[str, ...]:
     Programs of the original NEP are represented by the gateway, whose node publishes their messages.
     """
     info = view.topics.get(topic)
-    found = (each.node_id for each in info.publishers) if info is not None else ()
-    return tuple(dict.fromkeys(id for id in found if _is_native(view, id)))
+    node_ids = (each.node_id for each in info.publishers) if info is not None else ()
+    return tuple(dict.fromkeys(id for id in node_ids if _is_native(view, id)))
 
 
 def subscriber_nodes(view: GraphView, topic: str) -> tuple[str, ...]:
@@ -77,9 +77,9 @@ def subscriber_nodes(view: GraphView, topic: str) -> tuple[str, ...]:
     Programs of the original NEP are included instead of the gateway that subscribes for them.
     """
     info = view.topics.get(topic)
-    found = (each.node_id for each in info.subscribers) if info is not None else ()
+    node_ids = (each.node_id for each in info.subscribers) if info is not None else ()
     nodes = view.nodes
-    return tuple(dict.fromkeys(id for id in found if id not in nodes or nodes[id].generation != GATEWAY))
+    return tuple(dict.fromkeys(id for id in node_ids if id not in nodes or nodes[id].generation != GATEWAY))
 
 
 def _is_native(view: GraphView, node_id: str) -> bool:
@@ -94,8 +94,8 @@ def first_announcer(view: GraphView, topic: str) -> Identity | None:
         view: Graph of the network.
         topic: Description topic of the robot.
     """
-    found = publisher_nodes(view, topic)
-    return identity_of(view, found[0]) if found else None
+    node_ids = publisher_nodes(view, topic)
+    return identity_of(view, node_ids[0]) if node_ids else None
 
 
 def description_topic_problem(robot: Robot, topic: str) -> str | None:
@@ -156,19 +156,21 @@ def stop_error_text(name: str, error: object) -> str:
         name: Name of the robot.
         error: Error in the robot's reply, of any type.
     """
-    words = "".join(
+    message = "".join(
         sign if sign.isprintable() else " "
         for sign in bounded_str(error or _("the stop command failed"), MAX_ERROR_LENGTH)
     )
-    words = " ".join(words[:MAX_STOP_ERROR_LENGTH].split()).rstrip(".")
-    return words if is_may_move_error(name, words) else _(MAY_MOVE_MESSAGE).format(robot=name, why=words)
+    message = " ".join(message[:MAX_STOP_ERROR_LENGTH].split()).rstrip(".")
+    return (
+        message if is_may_move_error(name, message) else _(MAY_MOVE_MESSAGE).format(robot=name, why=message)
+    )
 
 
-def is_may_move_error(name: str, words: str) -> bool:
+def is_may_move_error(name: str, message: str) -> bool:
     """Return True if an error says that the robot may still move, in the current language or in English."""
     return any(
-        words.startswith(sentence.partition("{why}")[0].rstrip(": ").format(robot=name))
-        for sentence in (MAY_MOVE_MESSAGE, _(MAY_MOVE_MESSAGE))
+        message.startswith(template.partition("{why}")[0].rstrip(": ").format(robot=name))
+        for template in (MAY_MOVE_MESSAGE, _(MAY_MOVE_MESSAGE))
     )
 
 
@@ -181,11 +183,11 @@ def topic_conflict(robot: Robot, others: Iterable[Robot]) -> str | None:
         robot: Robot to check.
         others: All known robots.
     """
-    known = [other for other in others if other.name != robot.name]
+    other_robots = [other for other in others if other.name != robot.name]
     for topic in set(reserved_topics(robot)) - SHARED_TOPICS:
         if is_own_topic(robot.name, topic):
             continue
-        for other in known:
+        for other in other_robots:
             if is_own_topic(other.name, topic) or topic in reserved_topics(other):
                 return _("{robot} claims {topic}, which belongs to {other}").format(
                     robot=robot.name, topic=topic, other=other.name

@@ -28,8 +28,8 @@ _FAILED_MESSAGE = lazy("{robot} couldn't {action}")
 @lru_cache(maxsize=1)
 def thing_model() -> Mapping[str, object]:
     """Return the Thing Model that all robots of RIZE share."""
-    found = json.loads(resources.path("robots", "rize.tm.jsonld").read_text(encoding="utf-8"))
-    return as_object(found)
+    document = json.loads(resources.path("robots", "rize.tm.jsonld").read_text(encoding="utf-8"))
+    return as_object(document)
 
 
 def robot(name: str) -> Robot:
@@ -43,11 +43,13 @@ def robot(name: str) -> Robot:
 
 def ready(message: object) -> str | None:
     """Return the name of the robot that a message on ``rize_event`` announces; None for other messages."""
-    said = as_object(message)
-    return text(said.get("name")) if said.get("robot") == "ready" else None
+    fields = as_object(message)
+    return text(fields.get("name")) if fields.get("robot") == "ready" else None
 
 
-def to_command(robot: Robot, action: str, given: Mapping[str, object], command_id: str) -> dict[str, object]:
+def to_command(
+    robot: Robot, action: str, action_input: Mapping[str, object], command_id: str
+) -> dict[str, object]:
     """Return the message for ``robot_action`` that executes an action.
 
     A stop is sent as the cancel of RIZE's older drivers. The message has all keys of an action, because
@@ -57,7 +59,7 @@ def to_command(robot: Robot, action: str, given: Mapping[str, object], command_i
     Args:
         robot: Description of the robot.
         action: Name of the action.
-        given: Input of the action; defaults are added.
+        action_input: Input of the action; defaults are added.
         command_id: Id of the command.
 
     Raises:
@@ -72,15 +74,15 @@ def to_command(robot: Robot, action: str, given: Mapping[str, object], command_i
             "times": 0,
             "id": command_id,
         }
-    known = robot.action(action)
-    if known is None:
+    action_info = robot.action(action)
+    if action_info is None:
         raise RobotInputError((_("{name} can't “{action}”").format(name=robot.name, action=action),))
-    sentences = known.check(given)
-    if sentences:
-        raise RobotInputError(sentences)
+    problems = action_info.check(action_input)
+    if problems:
+        raise RobotInputError(problems)
     return {
         "node": "action",
-        "primitives": _primitive(robot, action, known.complete(given)),
+        "primitives": _primitive(robot, action, action_info.complete(action_input)),
         "robots": robot.name,
         "state": "idle",
         "times": 0,
@@ -88,12 +90,12 @@ def to_command(robot: Robot, action: str, given: Mapping[str, object], command_i
     }
 
 
-def _primitive(robot: Robot, action: str, given: Mapping[str, object]) -> dict[str, object]:
+def _primitive(robot: Robot, action: str, action_input: Mapping[str, object]) -> dict[str, object]:
     hint = object_member(object_member(object_member(robot.source, "actions"), action), "rb:rize")
-    options = {name: given[name] for name in names(hint.get("options")) if name in given}
+    options = {name: action_input[name] for name in names(hint.get("options")) if name in action_input}
     return {
         "primitive": text(hint.get("primitive")) or action,
-        "input": _as_text(given.get(text(hint.get("input")) or "", "")),
+        "input": _as_text(action_input.get(text(hint.get("input")) or "", "")),
         "options": options or "none",
     }
 
@@ -106,19 +108,19 @@ def _as_text(value: object) -> str:
 
 def from_reply(message: object) -> dict[str, object] | None:
     """Convert a message of ``action_state`` to a ``robot/answer`` payload; None if it isn't a final reply."""
-    said = as_object(message)
-    state = _STATES.get(bounded_str(said.get("state")))
-    wanted = text(said.get("id"))
-    if state is None or wanted is None:
+    fields = as_object(message)
+    state = _STATES.get(bounded_str(fields.get("state")))
+    command_id = text(fields.get("id"))
+    if state is None or command_id is None:
         return None
-    primitives = said.get("primitives")
+    primitives = fields.get("primitives")
     first = as_object(primitives[0] if isinstance(primitives, list) and primitives else primitives)
     action = bounded_str(first.get("primitive") or "")
     error = _(_FAILED_MESSAGE).format(
-        robot=bounded_str(said.get("robots") or _("the robot")), action=action or _("perform the action")
+        robot=bounded_str(fields.get("robots") or _("the robot")), action=action or _("perform the action")
     )
     return {
-        "id": wanted,
+        "id": command_id,
         "op": "invoke",
         "action": action,
         "state": state,

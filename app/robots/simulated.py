@@ -38,21 +38,21 @@ Target: TypeAlias = Annotated[
 ]
 
 
-def _rize_turn(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
+def _rize_turn(rize_input: str, options: Mapping[str, object]) -> Mapping[str, object]:
     degrees = to_number(options.get("degrees"))
-    return {"direction": given} | ({} if degrees is None else {"angle": degrees})
+    return {"direction": rize_input} | ({} if degrees is None else {"angle": degrees})
 
 
-def _rize_walk(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
+def _rize_walk(rize_input: str, options: Mapping[str, object]) -> Mapping[str, object]:
     metres = to_number(options.get("meters"))
-    sign = {"forwards": 1.0, "backwards": -1.0}[given]
+    sign = {"forwards": 1.0, "backwards": -1.0}[rize_input]
     return {"distance": sign * (0.5 if metres is None else metres)}
 
 
-def _rize_light(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
+def _rize_light(rize_input: str, options: Mapping[str, object]) -> Mapping[str, object]:
     parts = [to_number(options.get(name)) for name in "RGB"]
     colour = "".join(f"{min(255, max(0, int(part or 0))):02x}" for part in parts)
-    return {"where": "eyes" if given == "eyes" else "both", "colour": f"#{colour}"}
+    return {"where": "eyes" if rize_input == "eyes" else "both", "colour": f"#{colour}"}
 
 
 class VirtualPepper(SimulatedActions):
@@ -304,9 +304,9 @@ def create_room(seed: int | None) -> Room:
     """
     if seed is None:
         return Room()
-    places = random.Random(seed)  # noqa: S311 - furniture, not secrets
-    room = Room().with_moved("ball", places.uniform(1.2, 2.6), places.uniform(-1.4, -0.5))
-    return room.with_moved("person", places.uniform(0.8, 1.6), places.uniform(-0.3, 0.6))
+    generator = random.Random(seed)  # noqa: S311 - furniture, not secrets
+    room = Room().with_moved("ball", generator.uniform(1.2, 2.6), generator.uniform(-1.4, -0.5))
+    return room.with_moved("person", generator.uniform(0.8, 1.6), generator.uniform(-0.3, 0.6))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -318,8 +318,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--seed", type=int, default=None)
-    chosen, others = parser.parse_known_args(arguments)
-    body = type("VirtualPepper", (VirtualPepper,), {"start_room": create_room(chosen.seed)})
+    options, others = parser.parse_known_args(arguments)
+    body = type("VirtualPepper", (VirtualPepper,), {"start_room": create_room(options.seed)})
     return drive(replace(ROBOT, body=body), others)
 
 

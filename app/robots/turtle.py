@@ -158,13 +158,13 @@ class VirtualWheels:
             with self._lock:
                 body = self.body
                 room, lens = body.room, Lens((body.x, body.y, _EYE_HEIGHT), body.theta_deg, _EYE_PITCH)
-            taken = self._camera.picture(room, lens)
+            image = self._camera.picture(room, lens)
             if is_watched:
-                self._link.sense("camera", taken)
-            found = colours_in(taken)
-            for name in found.keys() - self._seen:
-                self._link.happen("colour", name=name, x=found[name].x, area=found[name].area)
-            self._seen = set(found)
+                self._link.sense("camera", image)
+            colours = colours_in(image)
+            for name in colours.keys() - self._seen:
+                self._link.happen("colour", name=name, x=colours[name].x, area=colours[name].area)
+            self._seen = set(colours)
 
     def apply_change(self, change: Mapping[str, object]) -> None:
         """Apply a change of the world by the user.
@@ -175,7 +175,7 @@ class VirtualWheels:
         moved, x, y = change.get("move"), finite_float(change.get("x")), finite_float(change.get("y"))
         with self._lock:
             if isinstance(change.get("hold"), bool):
-                self.body.set_lifted(held=change["hold"] is True)
+                self.body.set_lifted(is_lifted=change["hold"] is True)
             if isinstance(moved, str) and x is not None and y is not None:
                 if moved == ROBOT_ITSELF:
                     self.body.carry(x, y)
@@ -186,8 +186,8 @@ class VirtualWheels:
             if "start" in change:
                 self._shared.return_to_start(change["start"])
         if isinstance(change.get("happen"), str):
-            event, given = parse_event(change)
-            data = {**({"x": 0.0, "area": 0.1} if event == "colour" else {}), **given}
+            event, data_fields = parse_event(change)
+            data = {**({"x": 0.0, "area": 0.1} if event == "colour" else {}), **data_fields}
             if not is_valid_event(self._link, event, data):
                 return
             if event == "bump":
@@ -208,8 +208,8 @@ class VirtualTurtle(DiffDrive):
 
     def odometer(self) -> Callable[[], float]:
         """Return a function that returns the distance in m rolled from now on, not counting being carried."""
-        began = self._wheels.driven_m()
-        return lambda: self._wheels.driven_m() - began
+        start_m = self._wheels.driven_m()
+        return lambda: self._wheels.driven_m() - start_m
 
 
 ROBOT = replace(

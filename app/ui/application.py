@@ -106,8 +106,8 @@ def make_application() -> QApplication:
     translate_qt(application)
     refused = fonts.load()
     if refused:
-        words = _("Qt can't load the fonts {fonts}; using fallback fonts").format(fonts=", ".join(refused))
-        sys.stderr.write(f"{words}\n")
+        message = _("Qt can't load the fonts {fonts}; using fallback fonts").format(fonts=", ".join(refused))
+        sys.stderr.write(f"{message}\n")
     return application
 
 
@@ -158,9 +158,9 @@ def make_window(session: Session, options: Options) -> MainWindow:
     theme = Theme("light")
     # must come first: before the event loop runs, Qt doesn't notify widgets of a changed font
     WindowState(session.settings, _log.warning).apply_theme(theme)
-    chosen = next((mode for mode in MODES if mode == options.theme), None)
-    if chosen is not None:
-        theme.set_mode(chosen)
+    theme_mode = next((mode for mode in MODES if mode == options.theme), None)
+    if theme_mode is not None:
+        theme.set_mode(theme_mode)
     window = MainWindow(session, theme, PanelRegistry(), read_examples(resources.folder() / "examples"))
     window.setWindowIcon(QIcon(LogoEngine(theme)))
     if not window.state.restore_geometry(window):
@@ -205,9 +205,9 @@ def save_version(window: MainWindow, now_s: float) -> None:
         now_s: Current Unix time in s.
     """
     settings = window.session.settings
-    kept = studio_versions.add_this_version(settings.all(), now_s, is_first=settings.are_new)
-    if kept is not None:
-        window.state.save(studio_versions.SETTING_KEY, kept)
+    versions = studio_versions.add_this_version(settings.all(), now_s, is_first=settings.are_new)
+    if versions is not None:
+        window.state.save(studio_versions.SETTING_KEY, versions)
 
 
 def close_on_signals(window: MainWindow, this_run: StudioRun) -> None:
@@ -229,15 +229,15 @@ def close_on_signals(window: MainWindow, this_run: StudioRun) -> None:
         )
 
 
-def handle_start_request(window: MainWindow, asked: StartRequest) -> None:
+def handle_start_request(window: MainWindow, request: StartRequest) -> None:
     """Execute a start request and bring the window to the front.
 
     Args:
-        asked: Request of this process, or of a process that was started later.
+        request: Request of this process, or of a process that was started later.
     """
-    if asked.files:
-        window.commands.files.open_all(asked.files)
-    elif asked.demo:
+    if request.files:
+        window.commands.files.open_all(request.files)
+    elif request.demo:
         window.commands.behaviours.start_demo()
     if window.isVisible():
         window.setWindowState(window.windowState() & ~Qt.WindowState.WindowMinimized)
@@ -251,49 +251,56 @@ def last_layout(window: MainWindow) -> str:
     This is the last layout, unless it was Behaviour and all behaviours are empty.
     """
     last = window.state.layout
-    there = {"developer": True, "behaviour": any(not each.is_blank for each in window.session.documents)}
-    return last if there.get(last, False) else ""
+    has_content = {
+        "developer": True,
+        "behaviour": any(not each.is_blank for each in window.session.documents),
+    }
+    return last if has_content.get(last, False) else ""
 
 
-def offer_first_steps(window: MainWindow, *, asked: bool) -> None:
+def offer_first_steps(window: MainWindow, *, has_request: bool) -> None:
     """Offer the first steps if Studio was never started before.
 
     The first start is recorded immediately, so that it is not repeated after a crash. Nothing is
     offered if there is unsaved work to recover.
 
     Args:
-        asked: True if the command line names files or the demonstration, which suppresses the offer.
+        has_request: True if the command line names files or the demonstration, which suppresses the offer.
     """
     if not window.session.settings.are_new:
         return
     window.state.save(FIRST_START_KEY, True)
-    if not asked and not window.banner.has_offer and all(each.is_blank for each in window.session.documents):
+    if (
+        not has_request
+        and not window.banner.has_offer
+        and all(each.is_blank for each in window.session.documents)
+    ):
         window.start.offer_first_steps()
         window.start.focus_first()
 
 
 def show_first_page(window: MainWindow, options: Options) -> list[Callable[[], object]]:
     """Prepare the first page and return the steps that complete it after the first paint."""
-    left = "" if options.is_standalone else last_layout(window)
-    asked = bool(options.files or options.demo)
+    layout = "" if options.is_standalone else last_layout(window)
+    has_request = bool(options.files or options.demo)
     if options.self_drive is not None:
         window.start_session()
         # The self-drive starts the demonstration itself.
         handle_start_request(window, StartRequest(options.files, demo=False))
         return []
-    offer_first_steps(window, asked=asked)
-    if not asked and not left:
+    offer_first_steps(window, has_request=has_request)
+    if not has_request and not layout:
         return [window.start_session]
 
     def show() -> None:
-        if asked:
+        if has_request:
             handle_start_request(window, StartRequest(options.files, options.demo))
         else:
-            window.commands.view.show_layout(left)
+            window.commands.view.show_layout(layout)
         if window.bench is None:  # the file can't be opened, which an alert explains
             window.show_start()
 
-    window.show_placeholder("behaviour" if asked else left)
+    window.show_placeholder("behaviour" if has_request else layout)
     return [window.start_session, show]
 
 
@@ -329,9 +336,9 @@ def run(options: Options) -> int:
     """
     move_old_versions()
     meeting_place = single_instance.socket_name(home())
-    turn = FileLock(home() / "starting")
+    start_lock = FileLock(home() / "starting")
     if not options.is_standalone and single_instance.pass_to_running(
-        meeting_place, StartRequest(options.files, options.demo), turn
+        meeting_place, StartRequest(options.files, options.demo), start_lock
     ):
         return 0
     refused = startup_problem(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
@@ -345,7 +352,7 @@ def run(options: Options) -> int:
     logging.getLogger().addHandler(CrashLog(CrashReports()))
     application = make_application()
     with StudioRun() as this_run:
-        return _run_window(application, options, log, this_run, (meeting_place, turn), trial)
+        return _run_window(application, options, log, this_run, (meeting_place, start_lock), trial)
 
 
 def _run_window(
@@ -367,7 +374,7 @@ def _run_window(
     hearing.timeout.connect(lambda: log.drain(session.console.add))
     hearing.start(LOG_INTERVAL_MS)
     speaker = session.voices.speaker = QtSpeaker()
-    soon = DeferredSteps(window, deferred_steps(window, web=options.web))
+    deferred = DeferredSteps(window, deferred_steps(window, web=options.web))
     driver = options.make_driver(window) if options.make_driver is not None else None
     window.show()
     window.activateWindow()  # without a window manager the window would get no focus
@@ -375,16 +382,16 @@ def _run_window(
     if options.self_drive is None:
         first.append(partial(report_crashes, session, this_run))
     if not options.is_standalone:
-        meeting_place, turn = single
+        meeting_place, start_lock = single
         first.append(partial(save_version, window, time.time()))
         first.append(
             lambda: single_instance.SingleInstanceServer(
                 meeting_place, partial(handle_start_request, window), window
             )
         )
-        first.append(turn.release)
+        first.append(start_lock.release)
         first.append(partial(session.last_robots.start, session.launcher))
-    soon.prepend(first)
+    deferred.prepend(first)
     FileDropFilter(window, window.commands.files.open_all)
     if isinstance(application, Application):
         application.set_file_opener(window.commands.files.open_all)

@@ -26,21 +26,21 @@ def original_environment(environ: MutableMapping[str, str], *, is_frozen: bool) 
         environ: Environment variables, modified in place.
         is_frozen: True if Studio runs from a frozen bundle; otherwise nothing is changed.
     """
-    kept = {
+    saved = {
         name: value
         for name, value in environ.items()
         if is_frozen and (name in {_LIBRARY_PATH, _ORIGINAL_LIBRARY_PATH} or name.startswith(_FREEZER_PREFIX))
     }
-    for name in kept:
+    for name in saved:
         del environ[name]
-    if _ORIGINAL_LIBRARY_PATH in kept:
-        environ[_LIBRARY_PATH] = kept[_ORIGINAL_LIBRARY_PATH]
+    if _ORIGINAL_LIBRARY_PATH in saved:
+        environ[_LIBRARY_PATH] = saved[_ORIGINAL_LIBRARY_PATH]
     try:
         yield
     finally:
-        if kept:
+        if saved:
             environ.pop(_LIBRARY_PATH, None)
-            environ.update(kept)
+            environ.update(saved)
 
 
 def open_externally(url: QUrl) -> bool:

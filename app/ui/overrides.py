@@ -77,10 +77,10 @@ def guard(cls: type) -> type:
 
     The class is modified in place and can be decorated with this function.
     """
-    for name, made in list(vars(cls).items()):
-        answer = NEUTRAL_RESULTS.get(name, RETURN_NONE if name.endswith("Event") else None)
-        if answer is not None and isinstance(made, FunctionType) and _is_qt_override(cls, name):
-            setattr(cls, name, guard_function(made, answer))
+    for name, method in list(vars(cls).items()):
+        result_factory = NEUTRAL_RESULTS.get(name, RETURN_NONE if name.endswith("Event") else None)
+        if result_factory is not None and isinstance(method, FunctionType) and _is_qt_override(cls, name):
+            setattr(cls, name, guard_function(method, result_factory))
     return cls
 
 
@@ -88,22 +88,24 @@ def _is_qt_override(cls: type, name: str) -> bool:
     return any(name in vars(base) for base in cls.__mro__ if base.__module__.startswith("PySide6."))
 
 
-def guard_function(made: Callable[..., object], answer: Callable[[], object]) -> Callable[..., object]:
+def guard_function(
+    method: Callable[..., object], result_factory: Callable[[], object]
+) -> Callable[..., object]:
     """Return a wrapper that reports an exception and then returns a neutral value.
 
     Args:
-        made: Method to wrap.
-        answer: Factory of the neutral return value.
+        method: Method to wrap.
+        result_factory: Factory of the neutral return value.
     """
 
-    @functools.wraps(made)
-    def override(*given: object, **named: object) -> object:
+    @functools.wraps(method)
+    def override(*args: object, **kwargs: object) -> object:
         try:
-            return made(*given, **named)
+            return method(*args, **kwargs)
         except (Exception, SystemExit) as error:  # noqa: BLE001  whatever it is, it ends the process if Qt gets it
             sys.excepthook(type(error), error, error.__traceback__)
             traceback.clear_frames(error.__traceback__)  # a live frame keeps its QPainter active
-            return answer()
+            return result_factory()
 
     return override
 

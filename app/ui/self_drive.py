@@ -60,12 +60,12 @@ class Listener(Protocol):
     def step_finished(self, step: Step) -> None:
         """Called after the result of a step was visible and its screenshot was saved."""
 
-    def run_finished(self, well: bool, words: str) -> None:
+    def run_finished(self, succeeded: bool, message: str) -> None:
         """Called at the end of the run, before the window closes.
 
         Args:
-            well: True if all steps succeeded.
-            words: Summary of the run, or description of the failure.
+            succeeded: True if all steps succeeded.
+            message: Summary of the run, or description of the failure.
         """
 
 
@@ -78,9 +78,9 @@ class ResultPrinter:
     def step_finished(self, step: Step) -> None:
         """Ignore the result of a step."""
 
-    def run_finished(self, well: bool, words: str) -> None:
+    def run_finished(self, succeeded: bool, message: str) -> None:
         """Print the result to stdout, or a failure to stderr."""
-        (sys.stdout if well else sys.stderr).write(words + "\n")
+        (sys.stdout if succeeded else sys.stderr).write(message + "\n")
 
 
 class SelfDrive(QObject):
@@ -203,21 +203,21 @@ class SelfDrive(QObject):
                 self._save_screenshot(step.picture)
                 self._listener.step_finished(step)
                 self._start_next_step()
-        elif wrong := step.failure_reason():
-            self._fail(step, wrong)
+        elif reason := step.failure_reason():
+            self._fail(step, reason)
         elif now - self._began > step.timeout_s:
             self._fail(step, "")
 
-    def _fail(self, step: Step, why: str) -> None:
+    def _fail(self, step: Step, reason: str) -> None:
         self._save_screenshot(self._failed_picture)
-        if why:
-            words = _("step failed: {what}: {why}").format(what=step.expected, why=why)
+        if reason:
+            message = _("step failed: {what}: {why}").format(what=step.expected, why=reason)
         else:
             seconds = number(step.timeout_s, "g")
-            words = _("step not completed within {seconds} s: {what}").format(
+            message = _("step not completed within {seconds} s: {what}").format(
                 seconds=seconds, what=step.expected
             )
-        self._finish(False, words)
+        self._finish(False, message)
 
     def _save_screenshot(self, name: str) -> None:
         if not name:
@@ -228,12 +228,12 @@ class SelfDrive(QObject):
         else:
             sys.stderr.write(f"the picture {path} can't be written\n")
 
-    def _finish(self, well: bool, words: str) -> None:
-        self.well = well
+    def _finish(self, succeeded: bool, message: str) -> None:
+        self.well = succeeded
         self._timer.stop()
         self._step = None
         try:
-            self._listener.run_finished(well, words)
+            self._listener.run_finished(succeeded, message)
         finally:  # the window must close even if the listener fails
             for widget in QApplication.topLevelWidgets():
                 if widget is self._window:

@@ -42,13 +42,13 @@ MIN_COLOURS = 24
 class SupportsPictures(Protocol):
     """Interface of a panel that can render its blocks as an image."""
 
-    def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+    def picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
         """Render all blocks.
 
         Args:
             kind: Image format, "png" or "svg".
             white: True for a white background, False for a transparent one.
-            done: Called with the image data; b"" if there is no page or there are no blocks.
+            callback: Called with the image data; b"" if there is no page or there are no blocks.
         """
 
 
@@ -85,7 +85,7 @@ class WindowSteps:
 
     def all(self) -> list[Step]:
         """Return all steps in the order of execution."""
-        made = [
+        steps = [
             self._step("window", _("the window"), lambda: None, lambda: self._painted),
             self._step("master", _("the master"), lambda: None, self._has_master, self._master_problem),
             self._step(
@@ -94,11 +94,11 @@ class WindowSteps:
             self._step("behaviour", _("the program of the greeting"), lambda: None, self._has_program),
         ]
         if self._web:
-            made.append(
+            steps.append(
                 self._step("editor", _("its blocks in the block editor"), lambda: None, self._has_blocks)
             )
         return [
-            *made,
+            *steps,
             self._step("run", _("the program runs"), self._run, self._is_running, self._run_problem),
             self._step(
                 "moves", _("the robot speaks and moves"), lambda: None, self._has_moved, self._run_problem
@@ -118,18 +118,18 @@ class WindowSteps:
     def _step(
         self,
         name: str,
-        words: str,
-        do: Callable[[], object],
-        seen: Callable[[], bool],
-        wrong: Callable[[], str] = lambda: "",
+        expected: str,
+        action: Callable[[], object],
+        is_visible: Callable[[], bool],
+        failure_reason: Callable[[], str] = lambda: "",
     ) -> Step:
         return Step(
-            words,
-            do,
-            seen,
+            expected,
+            action,
+            is_visible,
             bounds.STEP_TIMEOUTS_S[name],
             settle_s=0.0,
-            failure_reason=wrong,
+            failure_reason=failure_reason,
             name=name,
             details=partial(self._details, name),
         )
@@ -232,9 +232,9 @@ class WindowSteps:
 
     def _has_stopped(self) -> bool:
         view, state = self._session.runs.view(), self._state()
-        still = state.get("moving") is False and not state.get("speech")
+        is_idle = state.get("moving") is False and not state.get("speech")
         proven = view.state == "proven" and bool(view.result) and view.result_status == "ok"
-        return proven and still and self._newest_message() is not self._stopped_after
+        return proven and is_idle and self._newest_message() is not self._stopped_after
 
     def _newest_message(self) -> object:
         topic = self._session.topics.get(STATE_TOPIC)
@@ -247,8 +247,8 @@ class WindowSteps:
         return payload if isinstance(payload, Mapping) else {}
 
     def _alert_text(self, id: str) -> str:
-        found = next((each for each in self._session.alerts.active if each.id == id), None)
-        return f"{found.title} {found.detail}".strip() if found is not None else ""
+        alert = next((each for each in self._session.alerts.active if each.id == id), None)
+        return f"{alert.title} {alert.detail}".strip() if alert is not None else ""
 
 
 class SelfTestListener:
@@ -266,13 +266,13 @@ class SelfTestListener:
         if not step.picture:
             self._test.record_success(step.details())
             return
-        shown = colour_count(QImage(str(self._test.place.path(PICTURE))))
-        if shown < MIN_COLOURS:
-            self._test.fail(_("the screenshot of the window has only {count} colours").format(count=shown))
+        colours = colour_count(QImage(str(self._test.place.path(PICTURE))))
+        if colours < MIN_COLOURS:
+            self._test.fail(_("the screenshot of the window has only {count} colours").format(count=colours))
         else:
-            self._test.record_success(_("{count} colours").format(count=shown))
+            self._test.record_success(_("{count} colours").format(count=colours))
 
-    def run_finished(self, well: bool, words: str) -> None:
+    def run_finished(self, succeeded: bool, message: str) -> None:
         """Record a failure, if there was one, and start the last step, the closing of the window."""
         complaints = [each for each in self._session.console.records if each.level in REPORTED_LEVELS]
         self._test.report.add_computer_info(
@@ -280,8 +280,8 @@ class SelfTestListener:
                 f"{each.level} {each.origin}: {each.text}" for each in complaints[-MAX_REPORTED_RECORDS:]
             ]
         )
-        if not well:
-            self._test.fail(words)
+        if not succeeded:
+            self._test.fail(message)
         self._test.start_step("close", _("the window closes; the robot and the program stop"))
 
 
@@ -313,7 +313,7 @@ def run_window_steps(test: SelfTest, *, web: bool) -> int:
             qt=qVersion(), pyside=PySide6.__version__, screen=QGuiApplication.platformName()
         )
         steps = WindowSteps(window, test, web=web).all()
-        told, picture = SelfTestListener(test, window.session), PICTURE.removesuffix(".png")
-        return SelfDrive(window, test.place.folder, steps, told, picture)
+        listener, picture = SelfTestListener(test, window.session), PICTURE.removesuffix(".png")
+        return SelfDrive(window, test.place.folder, steps, listener, picture)
 
     return run(Options(make_driver=make_driver, web=web))

@@ -106,7 +106,7 @@ def passes_trial(command: Sequence[str] = ()) -> bool:
         command: Command line of the test process, by default this module.
     """
     try:
-        done = subprocess.run(
+        result = subprocess.run(
             command or module_command("app.ui.speaker"),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
@@ -118,9 +118,9 @@ def passes_trial(command: Sequence[str] = ()) -> bool:
     except (OSError, subprocess.SubprocessError) as error:
         _log.warning("no speech output: the test process failed: %s", error)
         return False
-    if done.returncode != 0:
-        _log.warning("no speech output: the test process exited with %d", done.returncode)
-    return done.returncode == 0
+    if result.returncode != 0:
+        _log.warning("no speech output: the test process exited with %d", result.returncode)
+    return result.returncode == 0
 
 
 def voice_text(problem: str, *, has_engine: bool, platform: str = sys.platform) -> str:
@@ -133,8 +133,8 @@ def voice_text(problem: str, *, has_engine: bool, platform: str = sys.platform) 
     """
     if has_engine and not problem:
         return _("Robots speak with the voice of this computer.")
-    why = problem or _("This computer has no voice, so what robots say is only shown as text.")
-    return f"{why} {_(ADVICE.get(platform, ADVICE['linux']))}"
+    reason = problem or _("This computer has no voice, so what robots say is only shown as text.")
+    return f"{reason} {_(ADVICE.get(platform, ADVICE['linux']))}"
 
 
 def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
@@ -147,7 +147,7 @@ def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
     """
     import numpy as np  # noqa: PLC0415 (heavy; needed for tones only)
 
-    made = []
+    waves = []
     for hz, seconds in notes:
         count = max(1, round(seconds * rate_hz))
         wave = np.sin(np.arange(count) * (2 * math.pi * hz / rate_hz)) if hz else np.zeros(count)
@@ -156,19 +156,19 @@ def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
             rise = np.linspace(0.0, 1.0, edge)
             wave[:edge] *= rise
             wave[-edge:] *= rise[::-1]
-        made.append(wave)
-    whole = np.concatenate(made) if made else np.zeros(0)
-    return (whole * (LOUDNESS * min(1.0, max(0.0, volume)) * 32767)).astype("<i2").tobytes()
+        waves.append(wave)
+    waveform = np.concatenate(waves) if waves else np.zeros(0)
+    return (waveform * (LOUDNESS * min(1.0, max(0.0, volume)) * 32767)).astype("<i2").tobytes()
 
 
 class Engine(Protocol):
     """Interface of a speech and audio engine, which is used in one thread with a Qt event loop."""
 
-    def speak(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
+    def speak(self, text: str, language: str, volume: float, ended: Callable[[], None]) -> str:
         """Start to speak a text.
 
         Args:
-            words: Text.
+            text: Text.
             language: Language code, such as "en".
             volume: Volume from 0 to 1.
             ended: Called once when the text was spoken; not called if this method returns an error.
@@ -217,7 +217,7 @@ class QtEngine:
             ended, self._ended = self._ended, None
             ended()
 
-    def speak(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
+    def speak(self, text: str, language: str, volume: float, ended: Callable[[], None]) -> str:
         """Start to speak a text; return an error message if there is no voice for the language."""
         voice = self._get_voice()
         locales = voice.availableLocales() if voice is not None else []
@@ -227,7 +227,7 @@ class QtEngine:
         self.stop_voice()
         voice.setLocale(locale)
         voice.setVolume(volume)
-        voice.say(words)
+        voice.say(text)
         if voice.state() == voice.State.Error:
             return no_voice_message(language)
         self._ended = ended
@@ -286,15 +286,15 @@ class _SpeechWorker(QObject):
 
     def process(self) -> None:
         while self._orders:
-            what, given, turn = self._orders.popleft()
-            if what == "end":
+            kind, args, generation = self._orders.popleft()
+            if kind == "end":
                 self._stop_output("all")
                 self._engine = None
                 self.loop.quit()
-            elif what == "stop":
-                self._stop_output(str(given[0]))
-            elif self._speaker.is_valid(what, turn):
-                self._execute(what, given, turn)
+            elif kind == "stop":
+                self._stop_output(str(args[0]))
+            elif self._speaker.is_valid(kind, generation):
+                self._execute(kind, args, generation)
 
     def _stop_output(self, which: str) -> None:
         if self._engine is not None:
@@ -303,24 +303,24 @@ class _SpeechWorker(QObject):
             if which != "voice":
                 self._engine.stop_tones()
 
-    def _execute(self, what: str, given: tuple[Any, ...], turn: int) -> None:
+    def _execute(self, kind: str, args: tuple[Any, ...], generation: int) -> None:
         problem = _(NO_SOUND_TEXT)
-        first, *others = given
+        first, *others = args
         try:
             if self._engine is None:
                 self._engine = self._make()
-            if not self._speaker.is_valid(what, turn):  # Stop was called in the meantime
+            if not self._speaker.is_valid(kind, generation):  # Stop was called in the meantime
                 return
-            if what == "say":
+            if kind == "say":
                 language, volume = others
-                problem = self._engine.speak(first, language, volume, lambda: self.ended.emit(turn))
+                problem = self._engine.speak(first, language, volume, lambda: self.ended.emit(generation))
             else:
                 problem = self._engine.play(first, *others)
         except Exception:  # noqa: BLE001 - an engine of the system may raise anything; continue without sound
             _log.warning("speech or audio output failed", exc_info=True)
-        self.reported.emit(what, problem)
-        if problem and what == "say":
-            self.ended.emit(turn)
+        self.reported.emit(kind, problem)
+        if problem and kind == "say":
+            self.ended.emit(generation)
 
 
 class QtSpeaker(QObject):
@@ -348,26 +348,26 @@ class QtSpeaker(QObject):
         """Error message of the last output, or ""."""
         return self._problems.get("say", "") or self._problems.get("play", "")
 
-    def is_valid(self, what: str, turn: int) -> bool:
+    def is_valid(self, kind: str, generation: int) -> bool:
         """Return True if a request is valid, False if a stop has cancelled it. Thread-safe.
 
         Args:
-            what: Kind of the request, "say" or "play".
-            turn: Counter of its kind when the request was queued.
+            kind: Kind of the request, "say" or "play".
+            generation: Counter of its kind when the request was queued.
         """
-        return not self._closed and turn >= self._turns[what]
+        return not self._closed and generation >= self._turns[kind]
 
-    def speak(self, words: str, language: str, volume: float) -> None:
+    def speak(self, text: str, language: str, volume: float) -> None:
         """Queue a text to be spoken; an earlier text is cancelled.
 
         Args:
-            words: Text.
+            text: Text.
             language: Language code, such as "en".
             volume: Volume from 0 to 1.
         """
         self._turns["say"] += 1
         self._busy = True
-        self._enqueue("say", words, language, volume)
+        self._enqueue("say", text, language, volume)
 
     def play(self, notes: Notes, volume: float) -> None:
         """Queue tones to be played, or stop all tones.
@@ -406,10 +406,10 @@ class QtSpeaker(QObject):
             self._thread.join(JOIN_TIMEOUT_S)
         self._closed = True
 
-    def _enqueue(self, what: str, *given: object) -> None:
+    def _enqueue(self, kind: str, *args: object) -> None:
         if self._closed:
             return
-        self._orders.append((what, given, self._turns.get(what, 0)))
+        self._orders.append((kind, args, self._turns.get(kind, 0)))
         if self._thread is None:
             self._thread = threading.Thread(target=self._run_thread, name="robots' voice", daemon=True)
             self._thread.start()
@@ -425,12 +425,12 @@ class QtSpeaker(QObject):
         desk.loop.exec()
         self._desk = None
 
-    def _on_ended(self, turn: int) -> None:
-        if turn == self._turns["say"]:
+    def _on_ended(self, generation: int) -> None:
+        if generation == self._turns["say"]:
             self._busy = False
 
-    def _on_reported(self, what: str, problem: str) -> None:
-        self._problems[what] = problem
+    def _on_reported(self, kind: str, problem: str) -> None:
+        self._problems[kind] = problem
 
 
 if __name__ == "__main__":

@@ -89,7 +89,7 @@ def check_nuget(package: Path) -> None:
 
 
 def _run(command: Sequence[str], folder: Path) -> str:
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise PackageError(f"'{' '.join(command)}' failed:\n{done.stdout}{done.stderr}".rstrip())
-    return done.stdout
+    completed = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if completed.returncode:
+        raise PackageError(f"'{' '.join(command)}' failed:\n{completed.stdout}{completed.stderr}".rstrip())
+    return completed.stdout

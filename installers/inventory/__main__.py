@@ -26,12 +26,12 @@ from installers.inventory.wheels import parts_in_wheels  # noqa: E402
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit code."""
-    system, epoch, inside, folder, bill_file = sys.argv[1:] if arguments is None else arguments
+    system, epoch, program_folder, folder, bill_file = sys.argv[1:] if arguments is None else arguments
     version = metadata.version(PROJECT)
     try:
         parts = [*parts_of(), *others(ROOT / "resources")]
         parts += parts_in_wheels(tuple(parts))
-        parts += parts_in_folder(Path(inside), tuple(parts))
+        parts += parts_in_folder(Path(program_folder), tuple(parts))
         write_licences(parts, Path(folder), version)
     except InventoryError as error:
         print(f"inventory: {error}", file=sys.stderr)

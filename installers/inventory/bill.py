@@ -37,9 +37,9 @@ def write_licences(parts: Iterable[Part], folder: Path, version: str) -> None:
     Raises:
         InventoryError: A crate has no licence text.
     """
-    made = list(parts)
+    all_parts = list(parts)
     shutil.rmtree(folder / "licences", ignore_errors=True)
-    for part in made:
+    for part in all_parts:
         for name, text in part.texts:
             within = [each for each in (part.within, part.name) if each]
             target = folder.joinpath(
@@ -47,8 +47,8 @@ def write_licences(parts: Iterable[Part], folder: Path, version: str) -> None:
             )
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(text.encode() if isinstance(text, str) else text.read_bytes())
-    _write_crates([part for part in made if part.kind == "cargo"], folder / "licences")
-    qt = next(part.version for part in made if part.name == "qt")
+    _write_crates([part for part in all_parts if part.kind == "cargo"], folder / "licences")
+    qt = next(part.version for part in all_parts if part.name == "qt")
     notice = NOTICE.read_text("utf-8")
     (folder / "NOTICE.txt").write_text(notice.format(version=version, qt=qt), "utf-8", newline="\n")
 
@@ -64,12 +64,14 @@ def _write_crates(crates: Sequence[Part], licences: Path) -> None:
         for each in crates
     }
     texts = sorted({name for each in crates for name in standard_texts(each)})
-    words = "Crates of Rust, compiled into what is named below each. The texts of their licences follow.\n\n"
-    words += "".join(sorted(lines))
+    content = (
+        "Crates of Rust, compiled into what is named below each. The texts of their licences follow.\n\n"
+    )
+    content += "".join(sorted(lines))
     for name in texts:
-        words += f"\n---- {name} ----\n\n{(LICENCES / f'{name}.txt').read_text('utf-8').strip()}\n"
+        content += f"\n---- {name} ----\n\n{(LICENCES / f'{name}.txt').read_text('utf-8').strip()}\n"
     licences.mkdir(parents=True, exist_ok=True)
-    (licences / CRATES).write_text(words, "utf-8", newline="\n")
+    (licences / CRATES).write_text(content, "utf-8", newline="\n")
 
 
 def standard_texts(part: Part) -> Sequence[str]:
@@ -87,10 +89,10 @@ def standard_texts(part: Part) -> Sequence[str]:
             _SAME.get(each, each)
             for each in re.findall(r"[A-Za-z][\w.-]*\d[\w.-]*|MIT|ISC|Zlib", alternatives)
         ]
-        here = [each for each in ids if (LICENCES / f"{each}.txt").is_file()]
-        if not here:
+        available = [each for each in ids if (LICENCES / f"{each}.txt").is_file()]
+        if not available:
             raise InventoryError(f"the licence text of {part.name} is missing: {part.licence}")
-        needed += here
+        needed += available
     return needed
 
 
@@ -106,17 +108,19 @@ def bill(parts: Iterable[Part], system: str, epoch: int, version: str) -> str:
         epoch: Timestamp of the package, in seconds since 1970.
         version: Version of Studio.
     """
-    made = Bom(serial_number=uuid.uuid5(uuid.NAMESPACE_URL, f"{PROJECT}/{version}/{system}/{epoch}"))
-    made.metadata.timestamp = datetime.fromtimestamp(epoch, timezone.utc)
-    studio = made.metadata.component = _component(Part(PROJECT, version, "MIT"), ComponentType.APPLICATION)
-    inside = [part for part in parts if part.name != PROJECT]
-    components = {_key(part): _component(part, ComponentType.LIBRARY) for part in inside}
-    outer: Mapping[str, Component] = {part.name: components[_key(part)] for part in inside if not part.within}
+    bom = Bom(serial_number=uuid.uuid5(uuid.NAMESPACE_URL, f"{PROJECT}/{version}/{system}/{epoch}"))
+    bom.metadata.timestamp = datetime.fromtimestamp(epoch, timezone.utc)
+    studio = bom.metadata.component = _component(Part(PROJECT, version, "MIT"), ComponentType.APPLICATION)
+    dependencies = [part for part in parts if part.name != PROJECT]
+    components = {_key(part): _component(part, ComponentType.LIBRARY) for part in dependencies}
+    outer: Mapping[str, Component] = {
+        part.name: components[_key(part)] for part in dependencies if not part.within
+    }
     for component in components.values():
-        made.components.add(component)
-    for part in inside:
-        made.register_dependency(outer[part.within] if part.within else studio, [components[_key(part)]])
-    return make_outputter(made, OutputFormat.JSON, SchemaVersion.V1_6).output_as_string(indent=1)
+        bom.components.add(component)
+    for part in dependencies:
+        bom.register_dependency(outer[part.within] if part.within else studio, [components[_key(part)]])
+    return make_outputter(bom, OutputFormat.JSON, SchemaVersion.V1_6).output_as_string(indent=1)
 
 
 def _key(part: Part) -> tuple[str, str, str]:

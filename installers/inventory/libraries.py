@@ -196,13 +196,13 @@ _MAGIC = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\x
 
 def compiled_files(folder: Path) -> Iterator[Path]:
     """Yield the binaries of any system in a folder in sorted order, without following links."""
-    for at, folders, names in os.walk(folder):
+    for root, folders, names in os.walk(folder):
         folders.sort()
-        for path in (Path(at, name) for name in sorted(names)):
+        for path in (Path(root, name) for name in sorted(names)):
             if not path.is_symlink():
                 with path.open("rb") as file:
-                    head = file.read(4)
-                if head in _MAGIC or head[:2] == b"MZ":
+                    magic = file.read(4)
+                if magic in _MAGIC or magic[:2] == b"MZ":
                     yield path
 
 
@@ -211,38 +211,38 @@ def library_of(name: str) -> Library | None:
     return next((library for pattern, library in _PATTERNS if pattern.fullmatch(name)), None)
 
 
-def parts_in_folder(folder: Path, told: Sequence[Part]) -> Iterator[Part]:
+def parts_in_folder(folder: Path, known_parts: Sequence[Part]) -> Iterator[Part]:
     """Yield the parts of the libraries in a frozen program's folder.
 
     Args:
         folder: Folder of the frozen program.
-        told: Parts that are known already; they are not yielded again.
+        known_parts: Parts that are known already; they are not yielded again.
 
     Raises:
         InventoryError: Libraries are unknown or have no licence text; the message has a line for each.
     """
-    known = _names_of_wheels({each.name for each in told if each.kind == "pypi"})
-    names, wrong, libraries = {each.name for each in told}, list[str](), dict[str, Library]()
+    wheel_names = _names_of_wheels({each.name for each in known_parts if each.kind == "pypi"})
+    names, problems, libraries = {each.name for each in known_parts}, list[str](), dict[str, Library]()
     for path in compiled_files(folder):
         library = library_of(path.name)
         if library is not None:
             if library.of not in names:
                 libraries[path.name] = library
-        elif not _is_told(path, known):
-            wrong.append(f"'{path.relative_to(folder)}' is of nothing that is told: put it into LIBRARIES")
-    found = dict[str, Part]()
+        elif not _is_told(path, wheel_names):
+            problems.append(f"'{path.relative_to(folder)}' is of nothing that is told: put it into LIBRARIES")
+    parts_by_name = dict[str, Part]()
     packages = _debian_packages(
         name for name, library in libraries.items() if library.is_of_system or not library.of
     )
     for name, library in libraries.items():
         part = packages[name].part(library) if name in packages else _carried(name, library)
         if part is None:
-            wrong.append(f"'{name}' is of no package of this computer, so its licence text is missing")
+            problems.append(f"'{name}' is of no package of this computer, so its licence text is missing")
         else:
-            found.setdefault(part.name, part)
-    if wrong:
-        raise InventoryError("\n".join(wrong))
-    yield from found.values()
+            parts_by_name.setdefault(part.name, part)
+    if problems:
+        raise InventoryError("\n".join(problems))
+    yield from parts_by_name.values()
 
 
 class _Known(NamedTuple):
@@ -272,11 +272,11 @@ def _is_extension(path: PurePath) -> bool:
     return path.suffix in {".pyd", ".so"} and not path.name.startswith("lib")
 
 
-def _is_told(path: Path, known: _Known) -> bool:
+def _is_told(path: Path, wheel_names: _Known) -> bool:
     # True for Studio's programs, known extension modules, Qt's files and the empty FFmpeg libraries.
-    if path.name in _OURS or path.name in known.extensions or path.name in known.qt:
+    if path.name in _OURS or path.name in wheel_names.extensions or path.name in wheel_names.qt:
         return True
-    if path.name in known.python or (path.name == "Python" and "Python.framework" in path.parts):
+    if path.name in wheel_names.python or (path.name == "Python" and "Python.framework" in path.parts):
         return True
     return _FILMS.match(path.name) is not None and path.stat().st_size < _EMPTY
 
@@ -285,8 +285,8 @@ def _carried(name: str, library: Library) -> Part | None:
     # From the table above; None without a licence text.
     if not (library.rights or library.texts):
         return None
-    found = re.search(library.version, name) if library.version else None
-    version = found[1] if found else _PYTHON_KNOWS.get(library.of, "")
+    match = re.search(library.version, name) if library.version else None
+    version = match[1] if match else _PYTHON_KNOWS.get(library.of, "")
     text = own_text(library.rights, *library.texts)
     return Part(library.of, version, library.licence, text, "generic")
 
@@ -304,26 +304,26 @@ class _DebianPackage(NamedTuple):
 
 def _debian_packages(names: Iterable[str]) -> Mapping[str, _DebianPackage]:
     # Packages of this computer with libraries of these names; empty without dpkg.
-    wanted = [f"*/{name}" for name in names]
-    if not wanted or shutil.which("dpkg-query") is None:
+    patterns = [f"*/{name}" for name in names]
+    if not patterns or shutil.which("dpkg-query") is None:
         return {}
-    told = subprocess.run(
-        ["dpkg-query", "--search", *wanted], capture_output=True, text=True, check=False
+    output = subprocess.run(
+        ["dpkg-query", "--search", *patterns], capture_output=True, text=True, check=False
     ).stdout
     # "libssl3:amd64, other: /usr/lib/x86_64-linux-gnu/libssl.so.3"; the shortest path is that of the system
-    lines = sorted((line.partition(": ") for line in told.splitlines()), key=lambda each: -len(each[2]))
+    lines = sorted((line.partition(": ") for line in output.splitlines()), key=lambda each: -len(each[2]))
     by_name = {
         path.rpartition("/")[2]: packages.partition(",")[0].partition(":")[0]
         for packages, _colon, path in lines
     }
-    ask = ["dpkg-query", "--show", "--showformat=${Package} ${Version}\n", *sorted(set(by_name.values()))]
-    told = subprocess.run(ask, capture_output=True, text=True, check=False).stdout
-    versions = dict(line.split(" ", 1) for line in told.splitlines())
-    found = {
+    command = ["dpkg-query", "--show", "--showformat=${Package} ${Version}\n", *sorted(set(by_name.values()))]
+    output = subprocess.run(command, capture_output=True, text=True, check=False).stdout
+    versions = dict(line.split(" ", 1) for line in output.splitlines())
+    packages_by_name = {
         name: _DebianPackage(package, versions.get(package, ""), Path("/usr/share/doc", package, "copyright"))
         for name, package in by_name.items()
     }
-    return {name: package for name, package in found.items() if package.text.is_file()}
+    return {name: package for name, package in packages_by_name.items() if package.text.is_file()}
 
 
 def _system_kind() -> str:
@@ -332,5 +332,5 @@ def _system_kind() -> str:
         release = Path("/etc/os-release").read_text("utf-8")
     except OSError:
         return "deb"
-    found = re.search(r'^ID="?([a-z]+)"?$', release, re.MULTILINE)
-    return f"deb/{found[1]}" if found else "deb"
+    match = re.search(r'^ID="?([a-z]+)"?$', release, re.MULTILINE)
+    return f"deb/{match[1]}" if match else "deb"

@@ -89,35 +89,42 @@ def parts_of(project: str = PROJECT, extra: str = EXTRA) -> Iterator[Part]:
         extra: Extra whose dependencies are included.
     """
     waiting, seen = [Requirement(f"{project}[{extra}]")], set[tuple[str, frozenset[str]]]()
-    told = set[str]()
+    yielded = set[str]()
     while waiting:
-        wanted = waiting.pop(0)
-        name = canonicalize_name(wanted.name)
-        if (name, frozenset(wanted.extras)) in seen:
+        requirement = waiting.pop(0)
+        name = canonicalize_name(requirement.name)
+        if (name, frozenset(requirement.extras)) in seen:
             continue
-        seen.add((name, frozenset(wanted.extras)))
-        found = metadata.distribution(name)
-        for line in found.requires or ():
+        seen.add((name, frozenset(requirement.extras)))
+        distribution = metadata.distribution(name)
+        for line in distribution.requires or ():
             needed = Requirement(line)
             if needed.marker is None or any(
-                needed.marker.evaluate({"extra": each}) for each in ("", *wanted.extras)
+                needed.marker.evaluate({"extra": each}) for each in ("", *requirement.extras)
             ):
                 waiting.append(needed)
-        if name not in told:
-            told.add(name)
-            licence = _licence(found)
-            yield Part(name, found.version, licence, tuple(_texts(found)) or _common_text(licence, name))
+        if name not in yielded:
+            yielded.add(name)
+            licence = _licence(distribution)
+            yield Part(
+                name,
+                distribution.version,
+                licence,
+                tuple(_texts(distribution)) or _common_text(licence, name),
+            )
 
 
-def _licence(found: metadata.Distribution) -> str:
+def _licence(distribution: metadata.Distribution) -> str:
     # Prefers an SPDX expression.
-    said = found.metadata.get_all("License-Expression") or found.metadata.get_all("License") or []
+    declared = (
+        distribution.metadata.get_all("License-Expression") or distribution.metadata.get_all("License") or []
+    )
     classes = [
         each.rpartition(" :: ")[2]
-        for each in found.metadata.get_all("Classifier") or ()
+        for each in distribution.metadata.get_all("Classifier") or ()
         if each.startswith("License :: ")
     ]
-    short = [each for each in said if each and len(each) < 100 and "\n" not in each]
+    short = [each for each in declared if each and len(each) < 100 and "\n" not in each]
     return str(short[0]) if short else " OR ".join(classes)
 
 
@@ -131,12 +138,12 @@ def _common_text(licence: str, name: str) -> Texts:
     return ((text.name, text),)
 
 
-def _texts(found: metadata.Distribution) -> Iterator[tuple[str, Path]]:
+def _texts(distribution: metadata.Distribution) -> Iterator[tuple[str, Path]]:
     # Names are relative to the distribution's folder.
-    if canonicalize_name(found.metadata["Name"]) in QT_WHEELS:
+    if canonicalize_name(distribution.metadata["Name"]) in QT_WHEELS:
         return
-    for file in found.files or ():
-        path = Path(str(found.locate_file(file)))
+    for file in distribution.files or ():
+        path = Path(str(distribution.locate_file(file)))
         is_text = TEXT_SUFFIX.fullmatch(file.suffix) is not None
         is_beside = ".dist-info" in file.parts[0] or len(file.parts) <= 2
         if is_text and is_beside and LICENCE_FILE.search("/".join(file.parts[-2:])) and path.is_file():
@@ -147,8 +154,8 @@ def others(resources: Path) -> Iterator[Part]:
     """Yield the parts that aren't Python dependencies: CPython, Qt, npm packages, fonts and icons."""
     yield Part("cpython", platform.python_version(), "PSF-2.0", _texts_of_python(), "generic")
     qt = metadata.version("PySide6-Essentials")
-    own = [(each.name, each) for each in sorted(LICENCES.glob("*GPL-3*"))]
-    yield Part("qt", qt, LGPL, own, "generic")
+    qt_texts = [(each.name, each) for each in sorted(LICENCES.glob("*GPL-3*"))]
+    yield Part("qt", qt, LGPL, qt_texts, "generic")
     loader = metadata.distribution("pyinstaller")
     yield Part(
         "pyinstaller", loader.version, "GPL-2.0-or-later WITH Bootloader-exception", tuple(_texts(loader))
@@ -165,11 +172,11 @@ def others(resources: Path) -> Iterator[Part]:
 def _texts_of_python(base: Path = Path(sys.base_prefix)) -> Texts:
     # The interpreter's own text, which on Windows includes bundled libraries; Debian has none, so ours is
     # used.
-    beside = (
+    candidates = (
         base / "LICENSE.txt",
         Path(sysconfig.get_path("stdlib", vars={"installed_base": str(base)})) / "LICENSE.txt",
     )
-    return [("LICENSE.txt", next(filter(Path.is_file, beside), LICENCES / "PSF-2.0.txt"))]
+    return [("LICENSE.txt", next(filter(Path.is_file, candidates), LICENCES / "PSF-2.0.txt"))]
 
 
 def editor_parts(legal: Path) -> Iterator[Part]:
@@ -178,5 +185,5 @@ def editor_parts(legal: Path) -> Iterator[Part]:
     Args:
         legal: File in which the bundler lists the packages with their licences.
     """
-    for found in EDITOR_PART.finditer(legal.read_text("utf-8")):
-        yield Part(found[1], found[2], found[3], [(legal.name, legal)], "npm")
+    for match in EDITOR_PART.finditer(legal.read_text("utf-8")):
+        yield Part(match[1], match[2], match[3], [(legal.name, legal)], "npm")

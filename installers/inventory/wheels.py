@@ -174,8 +174,8 @@ def version_in(path: Path, pattern: bytes) -> str:
     if path.stat().st_size == 0:
         return ""
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-        found = re.search(pattern, content)
-        return found[1].decode() if found else ""
+        match = re.search(pattern, content)
+        return match[1].decode() if match else ""
 
 
 def parts_in_wheels(parts: Iterable[Part]) -> Iterator[Part]:
@@ -187,10 +187,10 @@ def parts_in_wheels(parts: Iterable[Part]) -> Iterator[Part]:
     for part in parts:
         if part.kind != "pypi":
             continue
-        found = metadata.distribution(part.name)
-        yield from _crates_of(found, part.name)
+        distribution = metadata.distribution(part.name)
+        yield from _crates_of(distribution, part.name)
         if part.name in _KNOWN:
-            yield from _KNOWN[part.name](found)
+            yield from _KNOWN[part.name](distribution)
 
 
 def parts_of_crates(bill: Mapping[str, Any], within: str) -> Iterator[Part]:
@@ -200,74 +200,78 @@ def parts_of_crates(bill: Mapping[str, Any], within: str) -> Iterator[Part]:
         bill: Content of the bill of materials.
         within: Name of the distribution that contains the crates.
     """
-    for each in bill.get("components", ()):
-        if str(each.get("purl", "")).startswith("pkg:cargo/") and each.get("scope") != "excluded":
-            said: Mapping[str, Any] = next(iter(each.get("licenses", ())), {})
-            licence = said.get("expression") or said.get("license", {}).get("id", "")
+    for component in bill.get("components", ()):
+        if str(component.get("purl", "")).startswith("pkg:cargo/") and component.get("scope") != "excluded":
+            licence_entry: Mapping[str, Any] = next(iter(component.get("licenses", ())), {})
+            licence = licence_entry.get("expression") or licence_entry.get("license", {}).get("id", "")
             if not licence:
-                raise InventoryError(f"the crate '{each['name']}' in {within} tells no licence")
-            authors = str(each.get("author", ""))
-            yield Part(each["name"], each["version"], licence, (), "cargo", within, authors)
+                raise InventoryError(f"the crate '{component['name']}' in {within} tells no licence")
+            authors = str(component.get("author", ""))
+            yield Part(component["name"], component["version"], licence, (), "cargo", within, authors)
 
 
-def parts_of_build(told: str, theirs: Texts) -> Iterator[Part]:
+def parts_of_build(build_info: str, licence_texts: Texts) -> Iterator[Part]:
     """Yield the libraries listed in OpenCV's build information.
 
     Args:
-        told: Build information.
-        theirs: OpenCV's third-party licence text.
+        build_info: Build information.
+        licence_texts: OpenCV's third-party licence text.
 
     Raises:
         InventoryError: A library is not in `IN_OPENCV`.
     """
-    names = _words(told, "3rdparty dependencies")
-    names += [each for each in _words(told, "Extra dependencies") if each == "avif"]
-    names += [name for name, line in (("flatbuffers", "Flatbuffers:  "), ("libpng", "PNG: ")) if line in told]
+    names = _words(build_info, "3rdparty dependencies")
+    names += [each for each in _words(build_info, "Extra dependencies") if each == "avif"]
+    names += [
+        name for name, line in (("flatbuffers", "Flatbuffers:  "), ("libpng", "PNG: ")) if line in build_info
+    ]
     for name in dict.fromkeys(names):
         if name not in IN_OPENCV:
             raise InventoryError(f"OpenCV has '{name}' inside: put it with its licence into IN_OPENCV")
-        known = IN_OPENCV[name]
-        if known is not None:
-            found = re.search(known.version, told) if known.version else None
-            texts = own_text(known.rights, *known.texts) if known.texts else theirs
-            version = found[1] if found else ""
-            yield Part(known.name, version, known.licence, texts, "generic", "opencv-python-headless")
+        library = IN_OPENCV[name]
+        if library is not None:
+            match = re.search(library.version, build_info) if library.version else None
+            texts = own_text(library.rights, *library.texts) if library.texts else licence_texts
+            version = match[1] if match else ""
+            yield Part(library.name, version, library.licence, texts, "generic", "opencv-python-headless")
 
 
-def _words(told: str, line: str) -> list[str]:
-    found = re.search(rf"{line}:(.*)", told)
-    return found[1].split() if found else []
+def _words(build_info: str, line: str) -> list[str]:
+    match = re.search(rf"{line}:(.*)", build_info)
+    return match[1].split() if match else []
 
 
-def _compiled(found: metadata.Distribution) -> Iterator[Path]:
-    for file in found.files or ():
-        path = Path(str(found.locate_file(file)))
+def _compiled(distribution: metadata.Distribution) -> Iterator[Path]:
+    for file in distribution.files or ():
+        path = Path(str(distribution.locate_file(file)))
         if (file.suffix in COMPILED or ".so." in file.name) and path.is_file():
             yield path
 
 
-def _file(found: metadata.Distribution, name: str) -> Texts:
+def _file(distribution: metadata.Distribution, name: str) -> Texts:
     # The topmost file of this name. Raises InventoryError.
-    there = [file for file in found.files or () if file.name == name and ".dist-info" in file.parts[0]]
-    if not there:
-        raise InventoryError(f"{found.metadata['Name']} has no '{name}' any more: look for the text")
-    file = min(there, key=lambda each: len(each.parts))
-    return ((name, Path(str(found.locate_file(file)))),)
+    candidates = [
+        file for file in distribution.files or () if file.name == name and ".dist-info" in file.parts[0]
+    ]
+    if not candidates:
+        raise InventoryError(f"{distribution.metadata['Name']} has no '{name}' any more: look for the text")
+    file = min(candidates, key=lambda each: len(each.parts))
+    return ((name, Path(str(distribution.locate_file(file)))),)
 
 
-def _first(found: metadata.Distribution, pattern: bytes) -> str:
-    return next(filter(None, (version_in(path, pattern) for path in _compiled(found))), "")
+def _first(distribution: metadata.Distribution, pattern: bytes) -> str:
+    return next(filter(None, (version_in(path, pattern) for path in _compiled(distribution))), "")
 
 
-def _crates_of(found: metadata.Distribution, within: str) -> Iterator[Part]:
-    for file in found.files or ():
+def _crates_of(distribution: metadata.Distribution, within: str) -> Iterator[Part]:
+    for file in distribution.files or ():
         if "sboms" in file.parts and file.suffix == ".json":
-            bill = json.loads(Path(str(found.locate_file(file))).read_text("utf-8"))
+            bill = json.loads(Path(str(distribution.locate_file(file))).read_text("utf-8"))
             yield from parts_of_crates(bill, within)
 
 
-def _in_iceoryx2(found: metadata.Distribution) -> Iterator[Part]:
-    crates = {pair for path in _compiled(found) for pair in CRATE.findall(path.read_bytes())}
+def _in_iceoryx2(distribution: metadata.Distribution) -> Iterator[Part]:
+    crates = {pair for path in _compiled(distribution) for pair in CRATE.findall(path.read_bytes())}
     for name, version in sorted((name.decode(), version.decode()) for name, version in crates):
         if name not in CRATES:
             raise InventoryError(
@@ -276,14 +280,14 @@ def _in_iceoryx2(found: metadata.Distribution) -> Iterator[Part]:
         yield Part(name, version, CRATES[name], (), "cargo", "iceoryx2")
 
 
-def _in_numpy(found: metadata.Distribution) -> Iterator[Part]:
+def _in_numpy(distribution: metadata.Distribution) -> Iterator[Part]:
     # As listed in its licence: OpenBLAS, LAPACK, GCC's Fortran runtime.
-    text = _file(found, "LICENSE.txt")
+    text = _file(distribution, "LICENSE.txt")
     blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]["version"]
-    inside = NUMPY_PART.findall(Path(text[0][1]).read_text("utf-8"))
-    if "OpenBLAS" not in {name for name, _licence in inside}:
+    components = NUMPY_PART.findall(Path(text[0][1]).read_text("utf-8"))
+    if "OpenBLAS" not in {name for name, _licence in components}:
         raise InventoryError("numpy tells in another way what is inside: see NUMPY_PART")
-    for name, licence in inside:
+    for name, licence in components:
         version = str(blas) if name == "OpenBLAS" else ""
         texts = [*text]
         if licence.startswith("LGPL-2.1"):
@@ -291,16 +295,19 @@ def _in_numpy(found: metadata.Distribution) -> Iterator[Part]:
         yield Part(canonicalize_name(name.replace(" ", "-")), version, licence, texts, "generic", "numpy")
 
 
-def _in_opencv(found: metadata.Distribution) -> Iterator[Part]:
-    told = next(
-        (each[0] for each in (BUILD.search(path.read_bytes()) for path in _compiled(found)) if each), b""
+def _in_opencv(distribution: metadata.Distribution) -> Iterator[Part]:
+    build_info = next(
+        (each[0] for each in (BUILD.search(path.read_bytes()) for path in _compiled(distribution)) if each),
+        b"",
     )
-    if not told:
+    if not build_info:
         raise InventoryError("OpenCV's library does not tell any more what was built into it")
-    yield from parts_of_build(told.decode("utf-8", "replace"), _file(found, "LICENSE-3RD-PARTY.txt"))
+    yield from parts_of_build(
+        build_info.decode("utf-8", "replace"), _file(distribution, "LICENSE-3RD-PARTY.txt")
+    )
 
 
-def _in_pynng(found: metadata.Distribution) -> Iterator[Part]:
+def _in_pynng(distribution: metadata.Distribution) -> Iterator[Part]:
     version = f"{nng.NNG_MAJOR_VERSION}.{nng.NNG_MINOR_VERSION}.{nng.NNG_PATCH_VERSION}"
     rights = (
         "Copyright 2018-2025 Staysail Systems, Inc. <info@staysail.tech>\n"
@@ -309,14 +316,16 @@ def _in_pynng(found: metadata.Distribution) -> Iterator[Part]:
         "Copyright 2017 Garrett D'Amore <garrett@damore.org>"
     )
     yield Part("nng", version, "MIT", own_text(rights, "MIT"), "generic", "pynng")
-    mbed = _first(found, rb"Mbed TLS (\d+\.\d+\.\d+)")
+    mbed = _first(distribution, rb"Mbed TLS (\d+\.\d+\.\d+)")
     text = own_text("Copyright The Mbed TLS Contributors", "Apache-2.0")
     yield Part("mbedtls", mbed, "Apache-2.0 OR GPL-2.0-or-later", text, "generic", "pynng")
 
 
-def _in_pyside(found: metadata.Distribution) -> Iterator[Part]:
+def _in_pyside(distribution: metadata.Distribution) -> Iterator[Part]:
     engine = (
-        Path(str(found.locate_file(each))) for each in found.files or () if WEB_ENGINE.fullmatch(each.name)
+        Path(str(distribution.locate_file(each)))
+        for each in distribution.files or ()
+        if WEB_ENGINE.fullmatch(each.name)
     )
     versions = (version_in(path, rb"Chrome/(\d+\.\d+\.\d+\.\d+)") for path in engine if path.is_file())
     version = next(filter(None, versions), "")
@@ -324,10 +333,10 @@ def _in_pyside(found: metadata.Distribution) -> Iterator[Part]:
     yield Part("chromium", version, "BSD-3-Clause", text, "generic", "qt")
 
 
-def _in_pyzmq(found: metadata.Distribution) -> Iterator[Part]:
-    zeromq, sodium = _file(found, "LICENSE.zeromq.txt"), _file(found, "LICENSE.libsodium.txt")
+def _in_pyzmq(distribution: metadata.Distribution) -> Iterator[Part]:
+    zeromq, sodium = _file(distribution, "LICENSE.zeromq.txt"), _file(distribution, "LICENSE.libsodium.txt")
     yield Part("libzmq", zmq.zmq_version(), "MPL-2.0", zeromq, "generic", "pyzmq")
-    yield Part("libsodium", _first(found, rb"\0(1\.0\.\d\d)\0"), "ISC", sodium, "generic", "pyzmq")
+    yield Part("libsodium", _first(distribution, rb"\0(1\.0\.\d\d)\0"), "ISC", sodium, "generic", "pyzmq")
 
 
 def _in_lz4(_found: metadata.Distribution) -> Iterator[Part]:

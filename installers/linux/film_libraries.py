@@ -30,13 +30,13 @@ def leave_out_films(context: Context) -> int:
     Raises:
         PackageError: A tool is missing or a step has failed.
     """
-    inside = context.frozen / "_internal"
-    folder = inside / "opencv_python_headless.libs"
+    internal = context.frozen / "_internal"
+    folder = internal / "opencv_python_headless.libs"
     missing = [tool for tool in ("gcc", "readelf") if shutil.which(tool) is None]
     if missing:
         raise PackageError(f"'{missing[0]}' is missing; try: apt-get install gcc binutils")
     before = size_of(folder)
-    users = [inside / "cv2" / "cv2.abi3.so"]
+    users = [internal / "cv2" / "cv2.abi3.so"]
     films = [path for path in sorted(folder.iterdir()) if FILMS.match(path.name)]
     imported = _imported_by(users)
     needed = {name for user in users for name in _needed_by(user)}
@@ -46,7 +46,7 @@ def leave_out_films(context: Context) -> int:
             continue
         _make_empty(context, path, imported)
     remove_unneeded(folder, users, _needed_by)
-    remove_dead_links(inside.iterdir())
+    remove_dead_links(internal.iterdir())
     return before - size_of(folder)
 
 
@@ -62,26 +62,26 @@ def _needed_by(path: Path) -> list[str]:
 
 def _imported_by(paths: Iterable[Path]) -> Mapping[str, set[str]]:
     # By symbol version, such as LIBAVCODEC_62.
-    found: dict[str, set[str]] = {}
+    names_by_version: dict[str, set[str]] = {}
     for path in paths:
         for _kind, name, version in _IMPORTED.findall(_read("--dyn-syms", path)):
-            found.setdefault(version, set()).add(name)
-    return found
+            names_by_version.setdefault(version, set()).add(name)
+    return names_by_version
 
 
 def _make_empty(context: Context, path: Path, imported: Mapping[str, set[str]]) -> None:
     # A library of the same name whose functions do nothing.
     versions = re.findall(r"Name: (LIB\w+)", _read("--version-info", path))
-    wanted = {version: sorted(imported.get(version, ())) for version in dict.fromkeys(versions)}
+    names_by_version = {version: sorted(imported.get(version, ())) for version in dict.fromkeys(versions)}
     source, script = context.work / "empty.c", context.work / "empty.map"
-    names = [name for each in wanted.values() for name in each]
+    names = [name for each in names_by_version.values() for name in each]
     source.write_text("".join(f"long {name}(void) {{ return 0; }}\n" for name in names), "utf-8")
     script.write_text(
         "".join(
             f"{version} {{ global: {' '.join(f'{name};' for name in each)} }};\n"
             if each
             else f"{version} {{ }};\n"
-            for version, each in wanted.items()
+            for version, each in names_by_version.items()
         ),
         "utf-8",
     )

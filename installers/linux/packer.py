@@ -52,12 +52,12 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
         leave_out_films(context)
     bill = add_licences(context, context.frozen, context.frozen)
     add_share(context, context.frozen)
-    made = [debian_package(context), archive(context), bill]
+    packages = [debian_package(context), archive(context), bill]
     tool = shutil.which("appimagetool")
     if tool is None:
         print("· no AppImage: appimagetool is not on this computer", flush=True)
-        return made
-    return [*made, app_image(context, tool)]
+        return packages
+    return [*packages, app_image(context, tool)]
 
 
 def strip(context: Context) -> None:
@@ -67,11 +67,11 @@ def strip(context: Context) -> None:
     stripping again damages some of them.
     """
     tool = shutil.which("strip")
-    inside = context.frozen / "_internal"
+    internal = context.frozen / "_internal"
     if tool is None:
         return
-    pythons = (*inside.glob("libpython3*.so*"), *inside.glob("python3*/lib-dynload/*.so"))
-    packages = (path for name in WITH_DEBUG_INFO for path in (inside / name).rglob("*.so"))
+    pythons = (*internal.glob("libpython3*.so*"), *internal.glob("python3*/lib-dynload/*.so"))
+    packages = (path for name in WITH_DEBUG_INFO for path in (internal / name).rglob("*.so"))
     for path in (*pythons, *packages):
         if not path.is_symlink():
             context.run(tool, "--strip-unneeded", path)
@@ -94,24 +94,24 @@ def add_share(context: Context, folder: Path) -> None:
             ("nep-studio", "apps", "nep-studio"),
             ("nep-behaviour", "mimetypes", "application-x-nep-behaviour"),
         ):
-            place = share / "icons" / "hicolor" / f"{size}x{size}" / kind / f"{target}.png"
-            place.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(painted / f"{name}-{size}.png", place)
+            icon_path = share / "icons" / "hicolor" / f"{size}x{size}" / kind / f"{target}.png"
+            icon_path.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(painted / f"{name}-{size}.png", icon_path)
     shutil.copyfile(HERE / "install.sh", folder / "install.sh")
     (folder / "install.sh").chmod(0o755)
 
 
 def archive(context: Context) -> Path:
     """Build the .tar.xz. Sorted names and a common time and owner make the archive reproducible."""
-    made = context.dist / f"NEP-Studio-{context.version}-linux-{context.machine}.tar.xz"
+    target = context.dist / f"NEP-Studio-{context.version}-linux-{context.machine}.tar.xz"
     top = f"NEP-Studio-{context.version}"
-    made.unlink(missing_ok=True)
+    target.unlink(missing_ok=True)
     context.run(
         "tar", "--create", "--sort=name", f"--mtime=@{context.epoch}", "--owner=0", "--group=0",
         "--numeric-owner", "--mode=u+rwX,go+rX,go-w", f"--transform=flags=r;s|^{APP}|{top}|",
-        "--use-compress-program=xz -6 -T2", f"--file={made}", f"--directory={context.frozen.parent}", APP,
+        "--use-compress-program=xz -6 -T2", f"--file={target}", f"--directory={context.frozen.parent}", APP,
     )  # fmt: skip
-    return made
+    return target
 
 
 def debian_package(context: Context) -> Path:
@@ -122,8 +122,8 @@ def debian_package(context: Context) -> Path:
     shutil.rmtree(root, ignore_errors=True)
     program = root / PREFIX
     shutil.copytree(context.frozen, program, symlinks=True)
-    for each in ("applications", "mime", "icons"):  # standard folders of all desktops
-        shutil.move(program / "share" / each, root / "usr" / "share" / each)
+    for name in ("applications", "mime", "icons"):  # standard folders of all desktops
+        shutil.move(program / "share" / name, root / "usr" / "share" / name)
     (program / "install.sh").unlink()
     (root / "usr" / "bin").mkdir(parents=True)
     (root / "usr" / "bin" / NAME).symlink_to(f"/{PREFIX}/{NAME}")
@@ -132,14 +132,14 @@ def debian_package(context: Context) -> Path:
     control = root / "DEBIAN"
     control.mkdir()
     (control / "control").write_text(control_file(context, root, control), "utf-8")
-    for each in ("postinst", "prerm"):
-        shutil.copyfile(HERE / each, control / each)
-        (control / each).chmod(0o755)
+    for name in ("postinst", "prerm"):
+        shutil.copyfile(HERE / name, control / name)
+        (control / name).chmod(0o755)
     (control / "md5sums").write_text("".join(_sums(root, control)), "utf-8")
     _give_one_time(root, context.epoch)
-    made = context.dist / f"{NAME}_{context.version}_{_architecture(context)}.deb"
-    context.run("dpkg-deb", "--root-owner-group", "-Zxz", "-z6", "--threads-max=2", "--build", root, made)
-    return made
+    target = context.dist / f"{NAME}_{context.version}_{_architecture(context)}.deb"
+    context.run("dpkg-deb", "--root-owner-group", "-Zxz", "-z6", "--threads-max=2", "--build", root, target)
+    return target
 
 
 def control_file(context: Context, root: Path, control: Path) -> str:
@@ -192,9 +192,9 @@ def _give_one_time(root: Path, epoch: int) -> None:
 
 def _sums(root: Path, control: Path) -> Iterable[str]:
     files = [path for path in sorted(root.rglob("*")) if path.is_file() and not path.is_symlink()]
-    wanted = [str(path.relative_to(root)) for path in files if control not in path.parents]
-    told = subprocess.run(["md5sum", "--", *wanted], cwd=root, capture_output=True, text=True, check=True)
-    return [told.stdout]
+    names = [str(path.relative_to(root)) for path in files if control not in path.parents]
+    completed = subprocess.run(["md5sum", "--", *names], cwd=root, capture_output=True, text=True, check=True)
+    return [completed.stdout]
 
 
 def _architecture(context: Context) -> str:
@@ -209,6 +209,6 @@ def app_image(context: Context, tool: str) -> Path:
     (folder / "AppRun").symlink_to("nep-studio")
     shutil.copyfile(HERE / "nep-studio.desktop", folder / "nep-studio.desktop")
     shutil.copyfile(paint_icons(context) / "nep-studio-256.png", folder / "nep-studio.png")
-    made = context.dist / f"NEP-Studio-{context.version}-linux-{context.machine}.AppImage"
-    context.run(tool, "--no-appstream", folder, made)
-    return made
+    target = context.dist / f"NEP-Studio-{context.version}-linux-{context.machine}.AppImage"
+    context.run(tool, "--no-appstream", folder, target)
+    return target

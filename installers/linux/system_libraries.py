@@ -64,11 +64,11 @@ def system_packages(folder: Path) -> tuple[Sequence[str], Sequence[str]]:
     Raises:
         PackageError: A library isn't in `PACKAGES`.
     """
-    inside = {path.name for path in folder.rglob("*") if path.is_file()}
+    included = {path.name for path in folder.rglob("*") if path.is_file()}
     needed, optional = set[str](), set[str]()
     for path in _binaries(folder):
         for name in _NEEDED.findall(_read(path)):
-            if name not in inside and not _OF_LIBC.match(name):
+            if name not in included and not _OF_LIBC.match(name):
                 if name not in PACKAGES:
                     raise PackageError(f"'{path.name}' needs '{name}': put it into PACKAGES, or inside")
                 (optional if "plugins" in path.parts else needed).add(PACKAGES[name])
@@ -86,8 +86,8 @@ def libc_needed(folder: Path) -> str:
 
 
 def _read(path: Path) -> str:
-    ask = ["readelf", "--dynamic", "--wide", str(path)]
-    return subprocess.run(ask, capture_output=True, text=True, check=True).stdout
+    command = ["readelf", "--dynamic", "--wide", str(path)]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
 def _binaries(folder: Path) -> Iterator[Path]:

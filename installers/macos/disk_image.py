@@ -66,20 +66,20 @@ def hfs_image(context: Context, target: Path, app: Path, background: Path, icon:
     """
     from ds_store import DSStore  # noqa: PLC0415  comes with dmgbuild, which is installed for packaging only
 
-    inside = context.work / "image"
-    shutil.rmtree(inside, ignore_errors=True)
-    inside.mkdir(parents=True)
-    shutil.copytree(app, inside / app.name, symlinks=True)
-    (inside / "Applications").symlink_to("/Applications")
-    shutil.copyfile(icon, inside / ".VolumeIcon.icns")
-    shutil.copyfile(background, inside / f".background{background.suffix}")
+    image_folder = context.work / "image"
+    shutil.rmtree(image_folder, ignore_errors=True)
+    image_folder.mkdir(parents=True)
+    shutil.copytree(app, image_folder / app.name, symlinks=True)
+    (image_folder / "Applications").symlink_to("/Applications")
+    shutil.copyfile(icon, image_folder / ".VolumeIcon.icns")
+    shutil.copyfile(background, image_folder / f".background{background.suffix}")
     left, top = _CORNER
-    wide, high = WINDOW
-    with DSStore.open(str(inside / ".DS_Store"), "w+") as store:
+    width, height = WINDOW
+    with DSStore.open(str(image_folder / ".DS_Store"), "w+") as store:
         store["."]["vSrn"] = ("long", 1)
         store["."]["icvl"] = ("type", b"icnv")
         store["."]["bwsp"] = {
-            "WindowBounds": f"{{{{{left}, {top}}}, {{{wide}, {high}}}}}",
+            "WindowBounds": f"{{{{{left}, {top}}}, {{{width}, {height}}}}}",
             "ShowSidebar": False,
             "ShowToolbar": False,
             "ShowStatusBar": False,
@@ -96,5 +96,5 @@ def hfs_image(context: Context, target: Path, app: Path, background: Path, icon:
         store[app.name]["Iloc"] = APP_AT
         store["Applications"]["Iloc"] = APPLICATIONS_AT
     target.unlink(missing_ok=True)
-    context.run("xorrisofs", "-quiet", "-V", VOLUME, "-hfsplus", "-r", "-o", target, inside)
+    context.run("xorrisofs", "-quiet", "-V", VOLUME, "-hfsplus", "-r", "-o", target, image_folder)
     return target

@@ -91,9 +91,11 @@ def source_of(key: str) -> str:
 
 def problems(entitlements: Mapping[str, object]) -> list[str]:
     """Return a sentence for each entry that Apple doesn't document or that isn't true."""
-    found = [f"Apple documents no '{key}'" for key in entitlements if key not in DOCUMENTED]
-    found += [f"'{key}' must be true or left out" for key, value in entitlements.items() if value is not True]
-    return found
+    messages = [f"Apple documents no '{key}'" for key in entitlements if key not in DOCUMENTED]
+    messages += [
+        f"'{key}' must be true or left out" for key, value in entitlements.items() if value is not True
+    ]
+    return messages
 
 
 def write(path: Path, allowed: Mapping[str, str]) -> Path:
@@ -107,7 +109,7 @@ def write(path: Path, allowed: Mapping[str, str]) -> Path:
         ValueError: A key isn't in `DOCUMENTED`.
     """
     content: dict[str, object] = dict.fromkeys(sorted(allowed), True)
-    if wrong := problems(content):
-        raise ValueError("; ".join(wrong))
+    if messages := problems(content):
+        raise ValueError("; ".join(messages))
     path.write_bytes(plistlib.dumps(content))
     return path

@@ -59,13 +59,13 @@ def _imported_by(path: Path) -> Mapping[str, set[str]]:
     # By the library that they are imported from.
     tool = "nm" if this_system() == "macos" else "llvm-nm"
     try:
-        told = subprocess.run([tool, "-m", "-u", path], capture_output=True, text=True, check=True).stdout
+        output = subprocess.run([tool, "-m", "-u", path], capture_output=True, text=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError) as error:
         raise PackageError(f"'{tool}' can't tell what '{path.name}' imports: {error}") from error
-    found: dict[str, set[str]] = {}
-    for name, library in _IMPORTED.findall(told):
-        found.setdefault(library, set()).add(name)
-    return found
+    names_by_library: dict[str, set[str]] = {}
+    for name, library in _IMPORTED.findall(output):
+        names_by_library.setdefault(library, set()).add(name)
+    return names_by_library
 
 
 def _make_empty(context: Context, path: Path, names: set[str]) -> None:

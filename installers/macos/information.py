@@ -120,10 +120,10 @@ _PAGES = "https://developer.apple.com/documentation/bundleresources/information-
 
 def apple_version(version: str) -> str:
     """Return a version as up to three numbers, as macOS requires: "0.2.0" for "0.2.0rc1"."""
-    found = re.match(r"\d+(?:\.\d+){0,2}", version)
-    if found is None:
+    match = re.match(r"\d+(?:\.\d+){0,2}", version)
+    if match is None:
         raise ValueError(f"no version '{version}'")
-    return found.group()
+    return match.group()
 
 
 def source_of(key: str, within: str = "") -> str:
@@ -143,8 +143,8 @@ def source_of(key: str, within: str = "") -> str:
 
 def sentences(language: str) -> dict[str, str]:
     """Return the texts in one of `LANGUAGES` by their keys in InfoPlist.strings."""
-    place = LANGUAGES.index(language)
-    return {key: words[place] for key, words in _WORDS.items()}
+    index = LANGUAGES.index(language)
+    return {key: texts[index] for key, texts in _WORDS.items()}
 
 
 def information(version: str, machine: str) -> dict[str, Any]:
@@ -182,7 +182,7 @@ def information(version: str, machine: str) -> dict[str, Any]:
         "NSHighResolutionCapable": True,
         "NSPrincipalClass": "NSApplication",
         "NSSupportsAutomaticGraphicsSwitching": True,
-        **{key: words[0] for key, words in _WORDS.items() if key.endswith("UsageDescription")},
+        **{key: texts[0] for key, texts in _WORDS.items() if key.endswith("UsageDescription")},
         "CFBundleDocumentTypes": [
             {
                 "CFBundleTypeName": _BEHAVIOUR_WORDS,

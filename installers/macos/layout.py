@@ -44,21 +44,23 @@ def check(app: Path, version: str, machine: str) -> list[str]:
         OSError: A file can't be read.
     """
     contents = app / "Contents"
-    found = [f"{name} is beside Contents" for name in _names(app) if name != "Contents"]
-    found += [f"{name} has no place in Contents" for name in _names(contents) if name not in _IN_CONTENTS]
-    found += _check_information(contents, version, machine)
-    found += _check_links(app)
-    found += _check_places(contents)
+    problems = [f"{name} is beside Contents" for name in _names(app) if name != "Contents"]
+    problems += [f"{name} has no place in Contents" for name in _names(contents) if name not in _IN_CONTENTS]
+    problems += _check_information(contents, version, machine)
+    problems += _check_links(app)
+    problems += _check_places(contents)
     for framework in sorted(contents.rglob("*.framework")):
         if is_bundle(framework):
-            found += _check_framework(framework, app)
-    found += _check_web(contents)
-    found += _check_linked(contents)
+            problems += _check_framework(framework, app)
+    problems += _check_web(contents)
+    problems += _check_linked(contents)
     for path in compiled(contents):
         machines = {each.machine for each in read(path)}
         if machine not in machines:
-            found.append(f"{_of(path, app)} is made for {' and '.join(sorted(machines))}, not for {machine}")
-    return found
+            problems.append(
+                f"{_of(path, app)} is made for {' and '.join(sorted(machines))}, not for {machine}"
+            )
+    return problems
 
 
 def made_for_newer(app: Path, machine: str) -> dict[Path, str]:
@@ -68,19 +70,19 @@ def made_for_newer(app: Path, machine: str) -> dict[Path, str]:
     these binaries must be tested on the oldest supported macOS.
     """
     oldest = tuple(int(each) for each in OLDEST_MACOS[machine].split("."))
-    wanted = {
+    min_versions = {
         path: max(
             (each.oldest_macos or (0, 0) for each in read(path) if each.machine == machine), default=(0, 0)
         )
         for path in compiled(app / "Contents")
     }
-    return {path: f"{wants[0]}.{wants[1]}" for path, wants in wanted.items() if wants > oldest}
+    return {path: f"{wants[0]}.{wants[1]}" for path, wants in min_versions.items() if wants > oldest}
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    for at, folders, names in os.walk(folder):
+    for root, folders, names in os.walk(folder):
         folders.sort()
-        yield from (Path(at, name) for name in sorted(names))
+        yield from (Path(root, name) for name in sorted(names))
 
 
 def _names(folder: Path) -> list[str]:
@@ -93,29 +95,29 @@ def _of(path: Path, app: Path) -> str:
 
 def _check_information(contents: Path, version: str, machine: str) -> Iterator[str]:
     try:
-        told = plistlib.loads((contents / "Info.plist").read_bytes())
+        info = plistlib.loads((contents / "Info.plist").read_bytes())
     except (OSError, ValueError, plistlib.InvalidFileException) as error:
         yield f"Contents/Info.plist can't be read: {error}"
         return
     for key, value in information(version, machine).items():
-        if told.get(key) != value:
-            yield f"Contents/Info.plist has {told.get(key)!r} for {key}, not {value!r}"
-    program = contents / "MacOS" / str(told.get("CFBundleExecutable", ""))
+        if info.get(key) != value:
+            yield f"Contents/Info.plist has {info.get(key)!r} for {key}, not {value!r}"
+    program = contents / "MacOS" / str(info.get("CFBundleExecutable", ""))
     if not program.is_file() or not any(each.is_program for each in read(program)):
         yield f"Contents/MacOS has no program '{program.name}'"
     elif not os.access(program, os.X_OK):
         yield f"Contents/MacOS/{program.name} may not be started"
-    yield from _check_resources(contents / "Resources", told)
+    yield from _check_resources(contents / "Resources", info)
 
 
-def _check_resources(resources: Path, told: Mapping[str, object]) -> Iterator[str]:
-    documents = told.get("CFBundleDocumentTypes")
-    icons = [told.get("CFBundleIconFile")]
+def _check_resources(resources: Path, info: Mapping[str, object]) -> Iterator[str]:
+    documents = info.get("CFBundleDocumentTypes")
+    icons = [info.get("CFBundleIconFile")]
     icons += [each.get("CFBundleTypeIconFile") for each in documents] if isinstance(documents, list) else []
     for icon in icons:
         path = resources / str(icon)
-        head = path.read_bytes()[:8] if path.is_file() else b""
-        if head[:4] != b"icns" or int.from_bytes(head[4:], "big") != path.stat().st_size:
+        header = path.read_bytes()[:8] if path.is_file() else b""
+        if header[:4] != b"icns" or int.from_bytes(header[4:], "big") != path.stat().st_size:
             yield f"Contents/Resources has no icon '{icon}'"
     for language in LANGUAGES:
         if not (resources / f"{language}.lproj" / "InfoPlist.strings").is_file():
@@ -124,8 +126,8 @@ def _check_resources(resources: Path, told: Mapping[str, object]) -> Iterator[st
 
 def _check_links(app: Path) -> Iterator[str]:
     root = app.resolve()
-    for at, folders, names in os.walk(app):
-        for path in (Path(at, name) for name in sorted([*folders, *names])):
+    for folder, folders, names in os.walk(app):
+        for path in (Path(folder, name) for name in sorted([*folders, *names])):
             if not path.is_symlink():
                 continue
             target = path.readlink()
@@ -143,35 +145,35 @@ def _check_places(contents: Path) -> Iterator[str]:
     for path in compiled(contents / "Resources"):
         yield f"{_of(path, app)} is code among the resources, which codesign does not sign"
     for name in _CODE_FOLDERS:
-        for at, folders, names in os.walk(contents / name):
-            inside = [Path(at, each) for each in folders]
-            folders[:] = sorted(path.name for path in inside if not is_bundle(path))
-            for path in inside:
+        for folder, folders, names in os.walk(contents / name):
+            subfolders = [Path(folder, each) for each in folders]
+            folders[:] = sorted(path.name for path in subfolders if not is_bundle(path))
+            for path in subfolders:
                 if "." in path.name and not path.is_symlink() and not is_bundle(path):
                     yield f"{_of(path, app)} has a dot in its name, so codesign takes it for a bundle"
-            for path in (Path(at, each) for each in sorted(names)):
+            for path in (Path(folder, each) for each in sorted(names)):
                 if not path.is_symlink() and not read(path):
                     yield f"{_of(path, app)} is no code, so its signature would be lost when it is copied"
 
 
 def _check_linked(contents: Path) -> Iterator[str]:
     # Linked libraries must be in the application or part of macOS.
-    there = {path.name for path in _files(contents)}
+    file_names = {path.name for path in _files(contents)}
     for path in compiled(contents):
         for name in dict.fromkeys(name for each in read(path) for name in each.needs):
             if name.startswith("/"):
-                is_there = name.startswith(_OF_MACOS)
+                is_available = name.startswith(_OF_MACOS)
             else:
-                is_there = name.rpartition("/")[2] in there
-            if not is_there:
+                is_available = name.rpartition("/")[2] in file_names
+            if not is_available:
                 yield f"{_of(path, contents.parent)} is linked with '{name}', which is not there"
 
 
 def _check_framework(framework: Path, app: Path) -> Iterator[str]:
     name = framework.stem
-    for each in sorted(framework.iterdir()):
-        if each.name != "Versions" and not each.is_symlink():
-            yield f"{_of(each, app)} is beside Versions and no link into it"
+    for path in sorted(framework.iterdir()):
+        if path.name != "Versions" and not path.is_symlink():
+            yield f"{_of(path, app)} is beside Versions and no link into it"
     current = framework / "Versions" / "Current"
     if not current.is_symlink():
         yield f"{_of(framework, app)} has no link Versions/Current"
@@ -183,15 +185,15 @@ def _check_framework(framework: Path, app: Path) -> Iterator[str]:
 
 def _check_web(contents: Path) -> Iterator[str]:
     # Files of Qt WebEngine in the places where Qt expects them.
-    found = [path for path in contents.rglob("QtWebEngineCore.framework") if is_bundle(path)]
-    if len(found) != 1:
-        yield f"there are {len(found)} QtWebEngineCore.framework, not 1"
+    frameworks = [path for path in contents.rglob("QtWebEngineCore.framework") if is_bundle(path)]
+    if len(frameworks) != 1:
+        yield f"there are {len(frameworks)} QtWebEngineCore.framework, not 1"
         return
-    process = found[0] / "Helpers" / WEB_PROCESS / "Contents" / "MacOS" / "QtWebEngineProcess"
+    process = frameworks[0] / "Helpers" / WEB_PROCESS / "Contents" / "MacOS" / "QtWebEngineProcess"
     if not process.is_file() or not read(process):
-        yield f"{_of(found[0], contents.parent)} has no Helpers/{WEB_PROCESS}"
+        yield f"{_of(frameworks[0], contents.parent)} has no Helpers/{WEB_PROCESS}"
     elif not os.access(process, os.X_OK):
         yield f"{_of(process, contents.parent)} may not be started"
     for name in _WEB_FILES:
-        if not (found[0] / "Resources" / name).is_file():
-            yield f"{_of(found[0], contents.parent)} has no Resources/{name}"
+        if not (frameworks[0] / "Resources" / name).is_file():
+            yield f"{_of(frameworks[0], contents.parent)} has no Resources/{name}"

@@ -74,10 +74,10 @@ def _slice(file: BinaryIO, start: int) -> Slice:
         command, size = struct.unpack(f"{order}2I", file.read(8))
         body = file.read(max(size - 8, 0))
         if command in {_VERSION_MIN_MACOS, _BUILD_VERSION}:
-            place = 0 if command == _VERSION_MIN_MACOS else 4
-            (packed,) = struct.unpack_from(f"{order}I", body, place)
+            offset = 0 if command == _VERSION_MIN_MACOS else 4
+            (packed,) = struct.unpack_from(f"{order}I", body, offset)
             oldest = (packed >> 16, packed >> 8 & 0xFF)
         elif command in {_LOAD, _REEXPORT}:
-            (place,) = struct.unpack_from(f"{order}I", body)
-            needs.append(body[place - 8 :].split(b"\0")[0].decode("utf-8", "replace"))
+            (offset,) = struct.unpack_from(f"{order}I", body)
+            needs.append(body[offset - 8 :].split(b"\0")[0].decode("utf-8", "replace"))
     return Slice(_MACHINES.get(cpu, hex(cpu)), kind == _PROGRAM, oldest, tuple(needs))

@@ -106,8 +106,8 @@ def finish(context: Context, app: Path, identity: signing.Identity) -> None:
     resources = app / "Contents" / "Resources"
     shutil.copyfile(_pictures(context) / DOCUMENT_ICON, resources / DOCUMENT_ICON)
     write_sentences(resources)
-    if wrong := layout.check(app, context.version, context.machine):
-        raise PackageError(f"'{app.name}' is not as macOS wants it:\n  " + "\n  ".join(wrong))
+    if problems := layout.check(app, context.version, context.machine):
+        raise PackageError(f"'{app.name}' is not as macOS wants it:\n  " + "\n  ".join(problems))
     newer = layout.made_for_newer(app, context.machine)
     if newer:
         _say(f"made for macOS {max(newer.values())}: {len(newer)} libraries; try this on the oldest macOS")

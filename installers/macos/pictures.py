@@ -66,8 +66,8 @@ def paint_background(painter: QPainter, scale: float, theme: Theme) -> None:
     painter.drawPolyline(QPolygonF(tip))
 
 
-def _painted(wide: int, high: int, paint: Paint, size: float, theme: Theme) -> QImage:
-    image = QImage(wide, high, QImage.Format.Format_ARGB32)
+def _painted(width: int, height: int, paint: Paint, size: float, theme: Theme) -> QImage:
+    image = QImage(width, height, QImage.Format.Format_ARGB32)
     image.fill(Qt.GlobalColor.transparent)
     painter = QPainter(image)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -80,13 +80,13 @@ def _argb(image: QImage) -> bytes:
     # Channels alpha, red, green, blue in runs, each preceded by its length minus one.
     converted = image.convertToFormat(QImage.Format.Format_RGBA8888)  # must outlive its bits
     pixels = bytes(converted.constBits())
-    made = bytearray(b"ARGB")
+    encoded = bytearray(b"ARGB")
     for channel in (pixels[3::4], pixels[0::4], pixels[1::4], pixels[2::4]):
         for start in range(0, len(channel), _MAX_RUN):
             run = channel[start : start + _MAX_RUN]
-            made.append(len(run) - 1)
-            made += run
-    return bytes(made)
+            encoded.append(len(run) - 1)
+            encoded += run
+    return bytes(encoded)
 
 
 def _png(image: QImage) -> bytes:
@@ -120,9 +120,9 @@ def write_pictures(folder: Path) -> None:
     theme = Theme("light")
     (folder / APP_ICON).write_bytes(icns(paint_app, theme))
     (folder / DOCUMENT_ICON).write_bytes(icns(paint_document, theme))
-    wide, high = WINDOW
+    width, height = WINDOW
     for scale, name in ((1, BACKGROUND), (2, BACKGROUND.replace(".", "@2x."))):
-        picture = _painted(wide * scale, high * scale, paint_background, scale, theme)
+        picture = _painted(width * scale, height * scale, paint_background, scale, theme)
         (folder / name).write_bytes(_png(picture))
     theme.deleteLater()
 

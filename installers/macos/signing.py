@@ -71,17 +71,17 @@ def identity_of(environ: Mapping[str, str]) -> Identity:
         PackageError: Only some of the required variables are set.
     """
     name, profile = environ.get("NEP_MACOS_IDENTITY", ""), environ.get("NEP_MACOS_NOTARY_PROFILE", "")
-    given = [part for part in _KEY_PARTS if environ.get(part)]
-    if given and len(given) < len(_KEY_PARTS):
-        missing = ", ".join(part for part in _KEY_PARTS if part not in given)
+    key_parts = [part for part in _KEY_PARTS if environ.get(part)]
+    if key_parts and len(key_parts) < len(_KEY_PARTS):
+        missing = ", ".join(part for part in _KEY_PARTS if part not in key_parts)
         raise PackageError(f"to notarise with a key, give also {missing}")
     if not name:
-        if profile or given:
+        if profile or key_parts:
             raise PackageError("what is not signed can't be notarised; give also NEP_MACOS_IDENTITY")
         return Identity(AD_HOC)
     if profile:
         return Identity(name, ("--keychain-profile", profile))
-    if given:
+    if key_parts:
         key, key_id, issuer = (environ[part] for part in _KEY_PARTS)
         return Identity(name, ("--key", key, "--key-id", key_id, "--issuer", issuer))
     return Identity(name)
@@ -92,14 +92,16 @@ def pieces(app: Path) -> list[Piece]:
     programs = {app / "Contents" / "MacOS"}
     bundles = [path for path in sorted(app.rglob("*")) if is_bundle(path)]
     mains = {_main(bundle) for bundle in (app, *bundles)}
-    found = [
+    inner_pieces = [
         Piece(path, "studio" if path.parent in programs and _is_program(path) else "")
         for path in compiled(app)
         if path not in mains
     ]
-    found += [Piece(_signed(bundle), "web" if bundle.name == WEB_PROCESS else "") for bundle in bundles]
-    found.sort(key=lambda piece: (-len(piece.path.parts), bool(piece.allowed), str(piece.path)))
-    return [*found, Piece(app, "studio")]
+    inner_pieces += [
+        Piece(_signed(bundle), "web" if bundle.name == WEB_PROCESS else "") for bundle in bundles
+    ]
+    inner_pieces.sort(key=lambda piece: (-len(piece.path.parts), bool(piece.allowed), str(piece.path)))
+    return [*inner_pieces, Piece(app, "studio")]
 
 
 def sign(context: Context, app: Path, identity: Identity) -> None:
@@ -137,14 +139,14 @@ def notarise(context: Context, path: Path, identity: Identity) -> None:
         sent = context.work / f"{path.stem}.zip"
         context.run("ditto", "-c", "-k", "--keepParent", path, sent)
     submit = ("xcrun", "notarytool", "submit", str(sent), *identity.notary)
-    answer = _asked(context, *submit, "--wait", "--output-format", "json")
+    output = _asked(context, *submit, "--wait", "--output-format", "json")
     try:
-        told = json.loads(answer)
+        result = json.loads(output)
     except ValueError:
-        raise PackageError(f"notarytool answered what can't be read: {answer.strip()}") from None
-    if told.get("status") != "Accepted":
-        log = _asked(context, "xcrun", "notarytool", "log", str(told.get("id", "")), *identity.notary)
-        raise PackageError(f"Apple did not notarise '{path.name}' ({told.get('status')}): {log.strip()}")
+        raise PackageError(f"notarytool answered what can't be read: {output.strip()}") from None
+    if result.get("status") != "Accepted":
+        log = _asked(context, "xcrun", "notarytool", "log", str(result.get("id", "")), *identity.notary)
+        raise PackageError(f"Apple did not notarise '{path.name}' ({result.get('status')}): {log.strip()}")
     context.run("xcrun", "stapler", "staple", path)
     context.run("xcrun", "stapler", "validate", path)
 
@@ -168,14 +170,16 @@ def _how(identity: Identity) -> Iterator[str]:
 
 def _asked(context: Context, *command: str) -> str:
     try:
-        done = subprocess.run(
+        completed = subprocess.run(
             command, cwd=context.root, env=dict(context.environ), capture_output=True, text=True, check=False
         )
     except OSError as error:
         raise PackageError(f"'{command[0]}' can't be run: {error.strerror}") from error
-    if done.returncode != 0:
-        raise PackageError(f"'{' '.join(command[:3])}' ended with {done.returncode}: {done.stderr.strip()}")
-    return done.stdout
+    if completed.returncode != 0:
+        raise PackageError(
+            f"'{' '.join(command[:3])}' ended with {completed.returncode}: {completed.stderr.strip()}"
+        )
+    return completed.stdout
 
 
 def _is_program(path: Path) -> bool:
@@ -187,10 +191,10 @@ def _main(bundle: Path) -> Path:
     if bundle.suffix == ".framework":
         return _signed(bundle) / bundle.stem
     try:
-        told = plistlib.loads((bundle / "Contents" / "Info.plist").read_bytes())
+        info = plistlib.loads((bundle / "Contents" / "Info.plist").read_bytes())
     except (OSError, ValueError, plistlib.InvalidFileException) as error:
         raise PackageError(f"'{bundle.name}' has no Info.plist that can be read: {error}") from error
-    return bundle / "Contents" / "MacOS" / str(told.get("CFBundleExecutable", bundle.stem))
+    return bundle / "Contents" / "MacOS" / str(info.get("CFBundleExecutable", bundle.stem))
 
 
 def _signed(bundle: Path) -> Path:

@@ -12,13 +12,13 @@ SIDES = (16, 24, 32, 48, 64, 128, 256)
 
 def ico(pictures: dict[int, bytes]) -> bytes:
     """Return an .ico file from square PNG images by their size in pixels (at most 256)."""
-    head = struct.pack("<HHH", 0, 1, len(pictures))
-    at = len(head) + 16 * len(pictures)
+    header = struct.pack("<HHH", 0, 1, len(pictures))
+    offset = len(header) + 16 * len(pictures)
     entries = b""
     for side, png in sorted(pictures.items()):
-        entries += struct.pack("<BBBBHHII", side % 256, side % 256, 0, 0, 1, 32, len(png), at)
-        at += len(png)
-    return head + entries + b"".join(png for _side, png in sorted(pictures.items()))
+        entries += struct.pack("<BBBBHHII", side % 256, side % 256, 0, 0, 1, 32, len(png), offset)
+        offset += len(png)
+    return header + entries + b"".join(png for _side, png in sorted(pictures.items()))
 
 
 def write_icon(painted: Path, name: str, target: Path) -> Path:

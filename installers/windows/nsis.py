@@ -76,10 +76,10 @@ def association(reg_file: str) -> str:
     """
     values = list(_values(reg_file))
     put = [f"WriteRegStr HKCU {quoted(key)} {quoted(name)} {text}" for key, name, text in values]
-    take: list[str] = []
+    removal: list[str] = []
     for key, name, text in values:
         if _root(key).startswith("."):
-            take += [
+            removal += [
                 f"ReadRegStr $0 HKCU {quoted(key)} {quoted(name)}",
                 f"${{If}} $0 == {text}",
                 f"  DeleteRegValue HKCU {quoted(key)} {quoted(name)}",
@@ -87,7 +87,7 @@ def association(reg_file: str) -> str:
             ]
     for key in sorted({key for key, _name, _text in values}, reverse=True):  # subkeys first
         if _root(key).startswith("."):
-            take += [
+            removal += [
                 "ClearErrors",
                 f"EnumRegValue $0 HKCU {quoted(key)} 0",
                 "${If} ${Errors}",  # no values, not even the default value
@@ -95,8 +95,8 @@ def association(reg_file: str) -> str:
                 "${EndIf}",
             ]
         elif key == f"{CLASSES}{_root(key)}":
-            take.append(f"DeleteRegKey HKCU {quoted(key)}")
-    return _macro("Associate", put) + _macro("Dissociate", take)
+            removal.append(f"DeleteRegKey HKCU {quoted(key)}")
+    return _macro("Associate", put) + _macro("Dissociate", removal)
 
 
 def _root(key: str) -> str:
@@ -137,7 +137,7 @@ def make_setup(context: Context, icon: Path, picture: Path) -> Path:
     for path in (icon, picture):  # the installer preserves their timestamps
         os.utime(path, (context.epoch, context.epoch))
     size_kb = sum(path.stat().st_size for path in _files(context.frozen)) // 1024
-    given = {
+    definitions = {
         "VERSION": context.version,
         "VERSION_NUMBERS": ".".join(map(str, version_numbers(context.version))),
         "PUBLISHER": PUBLISHER,
@@ -154,7 +154,7 @@ def make_setup(context: Context, icon: Path, picture: Path) -> Path:
     context.run(
         makensis, f"{option}V2", f"{option}INPUTCHARSET", "UTF8", f"{option}X{_target(makensis)}",
         f"{option}X!addincludedir {quoted(folder)}", f"{option}X!addincludedir {quoted(SOURCES)}",
-        *(f"{option}D{name}={value}" for name, value in given.items()),
+        *(f"{option}D{name}={value}" for name, value in definitions.items()),
         SOURCES / "nep-studio.nsi",
     )  # fmt: skip
     return target
@@ -163,17 +163,17 @@ def make_setup(context: Context, icon: Path, picture: Path) -> Path:
 def _makensis() -> Path:
     # Raises PackageError if NSIS is missing.
     usual = Path(os.environ.get("PROGRAMFILES(X86)", "C:/Program Files (x86)")) / "NSIS" / "makensis.exe"
-    found = shutil.which("makensis") or (str(usual) if usual.is_file() else None)
-    if found is None:
+    path = shutil.which("makensis") or (str(usual) if usual.is_file() else None)
+    if path is None:
         raise PackageError(
             "the setup program is made by NSIS, which is not here: 'sudo apt-get install nsis' on Debian and "
             "Ubuntu, https://nsis.sourceforge.io on Windows"
         )
-    return Path(found).resolve()
+    return Path(path).resolve()
 
 
 def _target(makensis: Path) -> str:
     # 64 bit where NSIS supports it (Debian's), otherwise 32 bit, which Wine may be unable to run.
     stubs = (makensis.parent / "Stubs", Path("/usr/share/nsis/Stubs"))
-    can = any((folder / "lzma_solid-amd64-unicode").is_file() for folder in stubs)
-    return "Target amd64-unicode" if can else "Unicode true"
+    has_stub = any((folder / "lzma_solid-amd64-unicode").is_file() for folder in stubs)
+    return "Target amd64-unicode" if has_stub else "Unicode true"

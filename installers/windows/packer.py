@@ -64,11 +64,11 @@ def refuse_files_of_wine(frozen: Path) -> None:
 
     Windows would load these libraries instead of its own.
     """
-    found = [
+    names = [
         path.name for path in _files(frozen) if path.suffix.lower() in {".dll", ".exe"} and _is_of_wine(path)
     ]
-    if found:
-        raise PackageError(f"the package would hold files of Wine: {', '.join(sorted(found))}")
+    if names:
+        raise PackageError(f"the package would hold files of Wine: {', '.join(sorted(names))}")
 
 
 def _is_of_wine(path: Path) -> bool:

@@ -21,10 +21,10 @@ VSVersionInfo(
 
 def version_numbers(version: str) -> tuple[int, int, int, int]:
     """Return a version as the four numbers that Windows requires, such as (1, 2, 3, 0) for "1.2.3rc1"."""
-    found = re.match(r"(\d+)(?:\.(\d+))?(?:\.(\d+))?", version)
-    if found is None:
+    match = re.match(r"(\d+)(?:\.(\d+))?(?:\.(\d+))?", version)
+    if match is None:
         raise ValueError(f"no version: '{version}'")
-    major, minor, patch = (int(each or 0) for each in found.groups())
+    major, minor, patch = (int(each or 0) for each in match.groups())
     return major, minor, patch, 0
 
 

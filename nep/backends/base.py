@@ -132,11 +132,11 @@ class Closable(Protocol):
 class SupportsFastPublish(Protocol):
     """Optional interface of a `PublisherTransport`: a fast path for publishing."""
 
-    def fast_publish_function(self, asked: PublishHooks) -> Callable[..., None]:
+    def fast_publish_function(self, hooks: PublishHooks) -> Callable[..., None]:
         """Return a publish function with minimal call overhead, which never blocks.
 
         Args:
-            asked: Encoder and fallbacks for the publish function.
+            hooks: Encoder and fallbacks for the publish function.
         """
 
 
@@ -348,16 +348,16 @@ def find_backend(name: str) -> Backend:
         TooManyFilesError: The process is out of file descriptors.
     """
     try:
-        own = discover_own("nep.backends", "BACKEND", Backend)
+        own_backends = discover_own("nep.backends", "BACKEND", Backend)
     except PluginsMissingError:
         check_free_descriptors(1, "a node")  # listing a folder without a free descriptor finds no files
         raise
-    backend = _find_by_name(name.lower(), own.values())
+    backend = _find_by_name(name.lower(), own_backends.values())
     if backend is None:
-        known = discover("nep.backends", "BACKEND", Backend)
-        backend = _find_by_name(name.lower(), known.values())
+        backends = discover("nep.backends", "BACKEND", Backend)
+        backend = _find_by_name(name.lower(), backends.values())
         if backend is None:
-            raise UnknownBackendError(name, sorted(known))
+            raise UnknownBackendError(name, sorted(backends))
     return backend
 
 

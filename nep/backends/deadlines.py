@@ -52,8 +52,8 @@ class Deadlines:
     def _run(self) -> None:
         while True:
             with self._changed:
-                while not self._is_closing and (left := self._due - time.monotonic()) > 0.0:
-                    self._changed.wait(min(left, threading.TIMEOUT_MAX))
+                while not self._is_closing and (remaining_s := self._due - time.monotonic()) > 0.0:
+                    self._changed.wait(min(remaining_s, threading.TIMEOUT_MAX))
                 if self._is_closing:
                     return
                 self._due = math.inf

@@ -175,11 +175,11 @@ class CallQueue:
         """Reject new calls, wake all waiting threads, and return the calls that are still queued."""
         with self._changed:
             self._is_closed = True
-            left = tuple(self._calls)
+            remaining = tuple(self._calls)
             self._calls.clear()
             self._bytes = 0
             self._changed.notify_all()
-            return left
+            return remaining
 
     def forked(self) -> None:
         """Mark the queue as closed and empty in a forked child process, without acquiring a lock."""
@@ -264,9 +264,9 @@ class ClientCalls(Generic[C]):
     def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self._lock:
-            known = self._calls.get(call.number)
-            if known is not None:
-                self._remove_locked(known)
+            existing = self._calls.get(call.number)
+            if existing is not None:
+                self._remove_locked(existing)
 
     def forked(self) -> None:
         """Mark the client as closed in a forked child process, without acquiring the lock."""
@@ -318,14 +318,14 @@ class ClientTransport(Protocol):
         """True after `close`, or after the transport was closed."""
 
     def start_call(
-        self, data: bytes | memoryview, timeout_s: float | None, then: Callable[[Outcome], None]
+        self, data: bytes | memoryview, timeout_s: float | None, callback: Callable[[Outcome], None]
     ) -> OpenCall:
         """Send a call as soon as a server is connected, without waiting.
 
         Args:
             data: Encoded request.
             timeout_s: Seconds until the call fails; None waits forever.
-            then: Called once with the outcome. May run in the I/O thread; must return soon.
+            callback: Called once with the outcome. May run in the I/O thread; must return soon.
 
         Returns:
             The call in flight, for `cancel`.
@@ -364,11 +364,11 @@ class SurveyTransport(Protocol):
         """True after `close`, or after the transport was closed."""
 
     def start_survey(
-        self, data: bytes | memoryview, timeout_s: float | None, then: Callable[[Outcome], None]
+        self, data: bytes | memoryview, timeout_s: float | None, callback: Callable[[Outcome], None]
     ) -> Sequence[OpenCall]:
         """Send a request to all connected respondents, without waiting; return one call per respondent.
 
-        `then` is called with the outcome of each call. For the arguments and errors see
+        `callback` is called with the outcome of each call. For the arguments and errors see
         `ClientTransport.start_call`.
         """
 
@@ -398,18 +398,18 @@ class ServiceTransport(Protocol):
         """
 
 
-def check_call_limits(service: str, count: int, used: int, size: int) -> None:
+def check_call_limits(service: str, count: int, total_bytes: int, size: int) -> None:
     """Raise `NepError` if a client has too many calls or bytes in flight for another call.
 
     Args:
         service: Name of the service.
         count: Number of calls in flight.
-        used: Total size of the calls in flight in bytes.
+        total_bytes: Total size of the calls in flight in bytes.
         size: Size of the new call in bytes.
     """
     if size > MAX_PAYLOAD_BYTES:
         raise NepError(_("the call can't be sent: {reason}").format(reason=size_error_text(size)))
-    if count >= MAX_CALLS or (used and used + size > MAX_CALL_BYTES):
+    if count >= MAX_CALLS or (total_bytes and total_bytes + size > MAX_CALL_BYTES):
         raise NepError(
             _("{count} calls of '{service}' are in flight; wait for their replies first").format(
                 count=count, service=service

@@ -102,14 +102,14 @@ class TypedService:
             DecodeError: The body is malformed.
             EncodeError: The codec can't encode the response.
         """
-        answer = self.response.decode(body)
+        response = self.response.decode(body)
         if not self.is_nep:
-            return Reply(CallKind.REPLY, codec.encode(answer).data, codec.number)
-        kind, number, data = answer["kind"], answer["codec"], answer["data"]
-        found = next((each for each in _KINDS if each == kind), None)
-        if found is None or not isinstance(number, int) or not isinstance(data, bytes):
+            return Reply(CallKind.REPLY, codec.encode(response).data, codec.number)
+        kind, number, data = response["kind"], response["codec"], response["data"]
+        reply_kind = next((each for each in _KINDS if each == kind), None)
+        if reply_kind is None or not isinstance(number, int) or not isinstance(data, bytes):
             raise WireError(_("not a service reply"), len(body))
-        return Reply(found, data, number)
+        return Reply(reply_kind, data, number)
 
     # ---- for servers
 

@@ -41,5 +41,5 @@ class WakingSubscriber(ABC):
     def notify_waiting(self) -> None:
         """Wake all waiting threads. Call with `changed` held."""
         self._changed.notify_all()
-        for each in self._waiting:
-            each.wake()
+        for waiter in self._waiting:
+            waiter.wake()

@@ -25,7 +25,9 @@ class AlertTracker:
     def update(self, view: GraphView) -> tuple[Sequence[Alert], Sequence[Alert]]:
         """Return (new or changed alerts, resolved alerts) since the previous call."""
         now = {alert.id: alert for alert in view.alerts}
-        resolved = [self._known.pop(id) for id in [known for known in self._known if known not in now]]
+        resolved = [
+            self._known.pop(id) for id in [alert_id for alert_id in self._known if alert_id not in now]
+        ]
         new = [alert for id, alert in now.items() if self._known.get(id) != alert]
         self._known.update({alert.id: alert for alert in new})
         return new, resolved
@@ -48,8 +50,8 @@ class AlertPrinter:
         """Print the alerts that are new, changed or resolved in `view`."""
         new, resolved = self._changes.update(view)
         for alert in resolved:
-            sentence = escaped(_("resolved: {sentence}").format(sentence=alert.sentence))
-            console(out=self._out).print(sentence, style="green", markup=False)
+            text = escaped(_("resolved: {sentence}").format(sentence=alert.sentence))
+            console(out=self._out).print(text, style="green", markup=False)
         show_alerts(new, self._out)
 
     def close(self) -> None:

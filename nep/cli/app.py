@@ -98,8 +98,8 @@ class _LazyCommands(Mapping[str, Any]):
 class _LazyGroup(TranslatedGroup):
     """Root group that imports only the commands that a command line needs."""
 
-    def __init__(self, **named: Any) -> None:  # noqa: ANN401 - see above
-        super().__init__(**{**named, "commands": _LazyCommands()})
+    def __init__(self, **kwargs: Any) -> None:  # noqa: ANN401 - see above
+        super().__init__(**{**kwargs, "commands": _LazyCommands()})
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ANN401, ARG002
         """Return the command names in the order of the help."""
@@ -135,11 +135,11 @@ def common(
 
 @cache
 def _build_command(name: str) -> typer.Typer:
-    group, found = typer.Typer(rich_markup_mode="rich", pretty_exceptions_enable=False), _COMMANDS[name]()
-    if isinstance(found, typer.Typer):
-        group.add_typer(found, name=name)
-    elif callable(found):
-        group.command(name)(found)
+    group, loaded = typer.Typer(rich_markup_mode="rich", pretty_exceptions_enable=False), _COMMANDS[name]()
+    if isinstance(loaded, typer.Typer):
+        group.add_typer(loaded, name=name)
+    elif callable(loaded):
+        group.command(name)(loaded)
     for command, english in _docstrings(group):
         command.help = _(english)
         command.cls = TranslatedCommand

@@ -157,12 +157,12 @@ def show(
     with Node(f"nep-blackboard-show-{os.getpid()}", master=master) as node:
         client = node.new_client(servers.service_name(name, "get"), timeout_s=timeout_s)
         try:
-            answer = client.call({"pattern": pattern})
+            reply = client.call({"pattern": pattern})
         except NoServerError as error:
             raise _no_blackboard_error(name) from error
         except ServiceError as error:
             raise RequestRefusedError(error.reason) from error
-    entries = _entries(answer)
+    entries = _entries(reply)
     if as_json:
         show_json(entries)
         return
@@ -170,14 +170,14 @@ def show(
         show_table(_COLUMNS, [_row(each) for each in entries])
     else:
         print_status(_("no matching values"))
-    more = answer.get("more") if isinstance(answer, Mapping) else 0
+    more = reply.get("more") if isinstance(reply, Mapping) else 0
     if more:
         print_status(_("and {count} more values").format(count=more))
 
 
-def _topic_and_key(word: str) -> tuple[str, str | None]:
-    key, equals, topic = word.partition("=")
-    return (topic, key) if equals and "/" not in key else (word, None)
+def _topic_and_key(argument: str) -> tuple[str, str | None]:
+    key, equals, topic = argument.partition("=")
+    return (topic, key) if equals and "/" not in key else (argument, None)
 
 
 def _no_blackboard_error(name: str) -> NepError:
@@ -186,18 +186,18 @@ def _no_blackboard_error(name: str) -> NepError:
     )
 
 
-def _entries(answer: object) -> Sequence[Mapping[str, object]]:
-    found = answer.get("entries") if isinstance(answer, Mapping) else None
-    if not isinstance(found, list) or not all(isinstance(each, Mapping) for each in found):
+def _entries(reply: object) -> Sequence[Mapping[str, object]]:
+    entries = reply.get("entries") if isinstance(reply, Mapping) else None
+    if not isinstance(entries, list) or not all(isinstance(each, Mapping) for each in entries):
         raise NepError(_("the service that replied isn't a blackboard; use another --name"))
-    return found
+    return entries
 
 
 def _row(entry: Mapping[str, object]) -> tuple[str, ...]:
     age_s = entry.get("age_s")
     return (
         quotable(entry.get("key")),
-        format_payload(entry.get("value"), whole=False),
+        format_payload(entry.get("value"), in_full=False),
         _format_age(age_s) if isinstance(age_s, int | float) else UNKNOWN,
         {"stamp": _("stamp"), "arrival": _("arrival")}.get(quotable(entry.get("age_by")), UNKNOWN),
         quotable(entry.get("source") or UNKNOWN),

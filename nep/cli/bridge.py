@@ -98,7 +98,7 @@ CountOption = Annotated[
 
 
 def bridge(
-    what: FileOrEndsArgument = None,
+    file_or_ends: FileOrEndsArgument = None,
     direction: DirectionOption = "both",
     rate_hz: RateOption = None,
     check: CheckOption = False,
@@ -117,7 +117,7 @@ def bridge(
     if example:
         write(EXAMPLE)
         return
-    configuration = _configuration(what or [], direction, rate_hz)
+    configuration = _configuration(file_or_ends or [], direction, rate_hz)
     _check_not_in_process(configuration)
     if check:
         check_installed(configuration)
@@ -131,8 +131,8 @@ def bridge(
         Bridge(configuration, allow_moving=allowed) as running,
         _publish_log(running),
     ):
-        for refusal in running.denial_reasons(_ROBOT_DISCOVERY_S):
-            raise typer.BadParameter(refusal)
+        for reason in running.denial_reasons(_ROBOT_DISCOVERY_S):
+            raise typer.BadParameter(reason)
         report = _report_for(running, notes, as_json=as_json)
         if not as_json:
             template = _("{name}: forwarding between a ({a}) and b ({b}); press Ctrl+C to stop")
@@ -142,28 +142,28 @@ def bridge(
         _run(report, count)
 
 
-def _configuration(what: Sequence[str], direction: str, rate_hz: float | None) -> BridgeConfiguration:
-    if len(what) == 2:
+def _configuration(file_or_ends: Sequence[str], direction: str, rate_hz: float | None) -> BridgeConfiguration:
+    if len(file_or_ends) == 2:
         if rate_hz is not None and not 1e-6 <= rate_hz <= 1e6:
             raise typer.BadParameter(
                 _("{given:g} isn't a valid rate; use messages per second, such as 10").format(given=rate_hz),
                 param_hint="--rate",
             )
-        way = parse_direction(direction)
+        parsed_direction = parse_direction(direction)
         return configuration_from_arguments(
-            *what, name=str(os.getpid()), direction=way, max_rate_hz=rate_hz or 0.0
+            *file_or_ends, name=str(os.getpid()), direction=parsed_direction, max_rate_hz=rate_hz or 0.0
         )
-    if len(what) != 1:
+    if len(file_or_ends) != 1:
         raise NepError(
             _("specify a file or two ends, such as 'zeromq:/chatter ros:/chatter'; --example prints a file")
         )
     if direction != "both" or rate_hz is not None:
         raise NepError(_("--direction and --rate can't be used with a file; set them in the file"))
-    path = Path(what[0])
-    if ":" in what[0] and not path.exists():
+    path = Path(file_or_ends[0])
+    if ":" in file_or_ends[0] and not path.exists():
         raise NepError(
             _("'{word}' is only one end of the bridge; add the other one, such as 'ros:/chatter'").format(
-                word=what[0]
+                word=file_or_ends[0]
             )
         )
     return read_configuration(path)
@@ -185,16 +185,16 @@ def _check_types(configuration: BridgeConfiguration, allowed: Sequence[str]) -> 
     for topic in configuration.topics:
         for origin in topic.origins:
             end = topic.b if origin == "a" else topic.a
-            refusal = denial_text(end.name, MovingTopics().robots_moved_by(end.name, end.msg_type), allowed)
-            if refusal and not topic.is_pattern:
-                raise typer.BadParameter(refusal)
+            reason = denial_text(end.name, MovingTopics().robots_moved_by(end.name, end.msg_type), allowed)
+            if reason and not topic.is_pattern:
+                raise typer.BadParameter(reason)
 
 
 def _show_configuration(configuration: BridgeConfiguration) -> None:
-    ways = {"a->b": "→", "b->a": "←", "both": "↔"}
+    arrows = {"a->b": "→", "b->a": "←", "both": "↔"}
     for topic in configuration.topics:
-        ends = f"{topic.a.name} {ways[topic.direction]} {topic.b.name}"
-        write(escaped(ends) + (f"  ≤ {topic.max_rate_hz:g} /s" if topic.max_rate_hz else "") + "\n")
+        route_text = f"{topic.a.name} {arrows[topic.direction]} {topic.b.name}"
+        write(escaped(route_text) + (f"  ≤ {topic.max_rate_hz:g} /s" if topic.max_rate_hz else "") + "\n")
     template = _("the file is valid: {name} connects {a} and {b}")
     print_status(
         template.format(name=configuration.name, a=configuration.a.network, b=configuration.b.network)
@@ -236,13 +236,13 @@ def _print_warnings() -> Iterator[_WarningHandler]:
 def _publish_log(running: Bridge) -> Iterator[None]:
     logger = logging.getLogger("nep")
     handlers = [side.node.log_handler for side in running.sides.values()]
-    for each in handlers:
-        logger.addHandler(each)
+    for handler in handlers:
+        logger.addHandler(handler)
     try:
         yield
     finally:
-        for each in handlers:
-            logger.removeHandler(each)
+        for handler in handlers:
+            logger.removeHandler(handler)
 
 
 # ---- the report
@@ -296,8 +296,8 @@ class _Report:
             counts.received, counts.sent, counts.lost, counts.thinned, counts.failed, counts.dropped,
             counts.waiting, counts.returned,
         )  # fmt: skip
-        figures = (UNKNOWN if each is None else str(each) for each in numbers)
-        return _Row(name, (format_rate(self.rate_hz(route, counts)), *figures), _problem_text(route, counts))
+        cells = (UNKNOWN if each is None else str(each) for each in numbers)
+        return _Row(name, (format_rate(self.rate_hz(route, counts)), *cells), _problem_text(route, counts))
 
 
 def _problem_text(route: Route, counts: RouteCounts) -> str:
@@ -336,7 +336,7 @@ class _PlainReport(_Report):
         lines = []
         if width > self._width:
             self._width = width
-            lines.append(self._line(_("topic"), [_(head) for head in _HEADINGS]))
+            lines.append(self._line(_("topic"), [_(heading) for heading in _HEADINGS]))
         for row in rows:
             counts = row.cells[1:]
             if self._shown.get(row.name) != counts:
@@ -345,9 +345,9 @@ class _PlainReport(_Report):
         if lines:
             write("".join(f"{line}\n" for line in lines))
 
-    def _line(self, name: str, figures: Sequence[str]) -> str:
+    def _line(self, name: str, cells: Sequence[str]) -> str:
         return padded(name, self._width) + "".join(
-            padded(figure, max(_CELL_WIDTH, display_width(figure) + 1), "right") for figure in figures
+            padded(cell, max(_CELL_WIDTH, display_width(cell) + 1), "right") for cell in cells
         )
 
 
@@ -390,21 +390,23 @@ class _LiveReport(_Report):
 
         rows = self.rows()
         max_rows = max(1, shutil.get_terminal_size().lines - 6)
-        rows, left = rows[:max_rows], len(rows) - max_rows
-        used = [
-            at
-            for at in range(len(_HEADINGS))
-            if at < _MIN_COLUMNS or any(row.cells[at] != "0" for row in rows)
+        rows, hidden_count = rows[:max_rows], len(rows) - max_rows
+        shown_columns = [
+            column
+            for column in range(len(_HEADINGS))
+            if column < _MIN_COLUMNS or any(row.cells[column] != "0" for row in rows)
         ]
         table = Table(box=box.SIMPLE_HEAD, header_style="dim", pad_edge=False, show_edge=False)
         table.add_column(_("topic"), style="bold", overflow="fold")  # only the name is folded, never numbers
-        for at in used:
-            table.add_column(_(_HEADINGS[at]), justify="right", no_wrap=True)
+        for column in shown_columns:
+            table.add_column(_(_HEADINGS[column]), justify="right", no_wrap=True)
         for row in rows:
-            table.add_row(Text(shortened(row.name, _MAX_NAME_WIDTH)), *(row.cells[at] for at in used))
+            table.add_row(
+                Text(shortened(row.name, _MAX_NAME_WIDTH)), *(row.cells[column] for column in shown_columns)
+            )
         below = [Text(f"! {row.name}: {row.problem}", "yellow", no_wrap=True) for row in rows if row.problem]
-        if left > 0:
-            below.append(Text(_("and {count} more topics").format(count=left), "dim"))
+        if hidden_count > 0:
+            below.append(Text(_("and {count} more topics").format(count=hidden_count), "dim"))
         return Group(table, *below[: max(1, max_rows - len(rows) + 1)])
 
 
@@ -419,8 +421,10 @@ def _run(report: _Report, count: int) -> None:
     try:
         report.start()
         for number in itertools.count(1):
-            while (left := started + number * _REPORT_PERIOD_S - time.monotonic()) > 0:
-                never.wait(min(left, _WAIT_SLICE_S))  # in slices: Ctrl+C does not interrupt a wait on Windows
+            while (remaining_s := started + number * _REPORT_PERIOD_S - time.monotonic()) > 0:
+                never.wait(
+                    min(remaining_s, _WAIT_SLICE_S)
+                )  # in slices: Ctrl+C does not interrupt a wait on Windows
             if number == count:
                 return
             report.show()

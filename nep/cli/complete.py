@@ -28,9 +28,9 @@ _MESSAGE_TIMEOUT_S = 0.6
 def complete_topic(ctx: typer.Context, incomplete: str) -> list[str]:
     """Return the topics that start with `incomplete` and are not on the command line yet."""
     view = _query_graph(ctx)
-    given = _given_arguments(ctx)
+    arguments = _given_arguments(ctx)
     names = sorted(view.topics) if view is not None else []
-    return [name for name in names if name.startswith(incomplete) and name not in given]
+    return [name for name in names if name.startswith(incomplete) and name not in arguments]
 
 
 def complete_service(ctx: typer.Context, incomplete: str) -> list[str]:
@@ -68,16 +68,16 @@ def complete_field_or_topic(ctx: typer.Context, incomplete: str) -> list[str]:
 
 
 def _given_arguments(ctx: typer.Context) -> set[str]:
-    words = [ctx.params.get("topic"), *(ctx.params.get("topics") or ()), *(ctx.params.get("more") or ())]
-    return {word for word in words if isinstance(word, str)}
+    values = [ctx.params.get("topic"), *(ctx.params.get("topics") or ()), *(ctx.params.get("more") or ())]
+    return {value for value in values if isinstance(value, str)}
 
 
 def _reachable_master(ctx: typer.Context) -> str:
-    chosen = master_address(ctx.params.get("master") or ctx.find_root().params.get("master"))
+    address = master_address(ctx.params.get("master") or ctx.find_root().params.get("master"))
     with socket.create_connection(
-        (host_of(chosen).strip("[]"), int(chosen.rpartition(":")[2])), _CONNECT_TIMEOUT_S
+        (host_of(address).strip("[]"), int(address.rpartition(":")[2])), _CONNECT_TIMEOUT_S
     ):
-        return chosen  # a closed port fails at once; an open one gets the full reply timeout
+        return address  # a closed port fails at once; an open one gets the full reply timeout
 
 
 def _query_graph(ctx: typer.Context) -> GraphView | None:
@@ -91,10 +91,10 @@ def _fields(ctx: typer.Context, topic: str) -> Iterator[str]:
     try:
         name = f"nep-complete-{os.getpid()}"
         with Node(name, master=_reachable_master(ctx), wait_s=_REPLY_TIMEOUT_S) as node:
-            known = node.graph(_REPLY_TIMEOUT_S).topics.get(topic)
-            if known is None or known.codec == "image":
+            topic_info = node.graph(_REPLY_TIMEOUT_S).topics.get(topic)
+            if topic_info is None or topic_info.codec == "image":
                 return
-            with node.new_sub(topic, known.msg_type) as subscriber:
+            with node.new_sub(topic, topic_info.msg_type) as subscriber:
                 message = subscriber.receive(_MESSAGE_TIMEOUT_S)
             if message is not None:
                 yield from leaf_paths(message.payload)

@@ -35,23 +35,27 @@ def doctor(master: MasterOption = None, as_json: JsonOption = False, topic: Sile
 
     Exit code: 0 if all checks passed, 1 with warnings, 2 with errors.
     """
-    found = doctors.diagnose(master, topic)
+    findings = doctors.diagnose(master, topic)
     if as_json:
-        show_json(doctors.to_plain(found))
+        show_json(doctors.to_plain(findings))
     else:
-        _show_findings(found)
-    raise typer.Exit(doctors.exit_code(found))
+        _show_findings(findings)
+    raise typer.Exit(doctors.exit_code(findings))
 
 
-def _show_findings(found: tuple[doctors.Finding, ...]) -> None:
+def _show_findings(findings: tuple[doctors.Finding, ...]) -> None:
     from rich.text import Text  # noqa: PLC0415 - see `nep.cli.screen.console`
 
     out = console()
     is_unicode = (out.encoding or "").lower().startswith("utf")
     signs, arrow = (_SYMBOLS, "→") if is_unicode else (_ASCII_SYMBOLS, "->")
-    for each in found:
-        out.print(Text.assemble((f"{signs[each.severity]} ", _STYLES[each.severity]), escaped(each.sentence)))
-        if each.fix:
-            out.print(Text.assemble(f"  {arrow} ", escaped(each.fix)))
-        if each.command:
-            out.print(Text.assemble("    ", (escaped(each.command), "cyan")))
+    for finding in findings:
+        out.print(
+            Text.assemble(
+                (f"{signs[finding.severity]} ", _STYLES[finding.severity]), escaped(finding.sentence)
+            )
+        )
+        if finding.fix:
+            out.print(Text.assemble(f"  {arrow} ", escaped(finding.fix)))
+        if finding.command:
+            out.print(Text.assemble("    ", (escaped(finding.command), "cyan")))

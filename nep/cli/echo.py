@@ -121,7 +121,7 @@ def echo(
             )
         picked = FieldExtractor(fields)
         names_topic = len(topics) > 1 or (is_pattern(topic) and topic not in graph.topics)
-        show: Callable[[Message], object] = MessagePrinter(picked, names_topic=names_topic, whole=full)
+        show: Callable[[Message], object] = MessagePrinter(picked, names_topic=names_topic, in_full=full)
         if as_json:
             show = partial(show_record, fields=picked)
         elif as_csv:
@@ -160,14 +160,14 @@ def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tupl
     A word is a topic if the graph contains it, if it starts with "/", or if it is a pattern.
     """
     topics, fields = [topic], []
-    for word in more:
-        if word in graph.topics or word.startswith("/") or is_pattern(word):
-            topics.append(word)
+    for argument in more:
+        if argument in graph.topics or argument.startswith("/") or is_pattern(argument):
+            topics.append(argument)
         else:
-            fields.append(word)
-    both = [word for word in more if word in graph.topics and not word.startswith("/")]
-    for word in both:
-        print_status(_("'{word}' is a topic; use .{word} for a field of that name").format(word=word))
+            fields.append(argument)
+    both = [argument for argument in more if argument in graph.topics and not argument.startswith("/")]
+    for argument in both:
+        print_status(_("'{word}' is a topic; use .{word} for a field of that name").format(word=argument))
     return list(dict.fromkeys(topics)), fields
 
 
@@ -184,7 +184,7 @@ def _receive_all(
     last, never = time.monotonic(), threading.Event()
     while True:
         subscribe_new(patterns.poll())
-        received = [message for each in subscribers if (message := each.receive(0.0)) is not None]
+        received = [message for subscriber in subscribers if (message := subscriber.receive(0.0)) is not None]
         if not received and not subscribers:
             never.wait(waiting.wait_slice_s(timeout_s))
         elif not received:
@@ -195,21 +195,25 @@ def _receive_all(
         now = time.monotonic()
         if received:
             last = now
-            for each in subscribers:
-                missing = (each.lost or 0) - lost.get(each.topic, 0)
+            for subscriber in subscribers:
+                missing = (subscriber.lost or 0) - lost.get(subscriber.topic, 0)
                 if missing > 0:
-                    lost[each.topic] = each.lost or 0
+                    lost[subscriber.topic] = subscriber.lost or 0
                     template = ngettext(
                         "{count} message of '{topic}' was lost",
                         "{count} messages of '{topic}' were lost",
                         missing,
                     )
-                    print_status(template.format(count=missing, topic=each.topic))
+                    print_status(template.format(count=missing, topic=subscriber.topic))
             yield from received
             waiting.mark_received({message.topic for message in received})
         elif timeout_s is not None and now - last >= timeout_s:
             names = format_list(
-                [f"'{each}'" for each in (*(sub.topic for sub in subscribers), *patterns.patterns)], "or"
+                [
+                    f"'{subscriber}'"
+                    for subscriber in (*(sub.topic for sub in subscribers), *patterns.patterns)
+                ],
+                "or",
             )
             raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
         else:
@@ -254,38 +258,38 @@ class MessagePrinter:
     """Printer of messages for people: time, sequence number, topic and payload, coloured on a terminal."""
 
     def __init__(
-        self, fields: FieldExtractor | None = None, *, names_topic: bool = False, whole: bool = False
+        self, fields: FieldExtractor | None = None, *, names_topic: bool = False, in_full: bool = False
     ) -> None:
         """Initialize the printer.
 
         Args:
             fields: Fields to print; None prints the whole payload.
             names_topic: Print the topic of each message.
-            whole: Print long values in full on a terminal; files and pipes always get them in full.
+            in_full: Print long values in full on a terminal; files and pipes always get them in full.
         """
         self._fields = fields
         self._names_topic = names_topic
         self._console = console()
         self._paint = json_highlighter() if self._console.is_terminal else None
-        self._whole = whole or self._paint is None
+        self._whole = in_full or self._paint is None
 
     def __call__(self, message: Message) -> None:
         """Print one message."""
-        head = _format_head(message)
+        header = _format_head(message)
         if self._names_topic:
-            head += f"  {escaped(message.topic)}"
-        room = self._console.width - display_width(head) - 2
+            header += f"  {escaped(message.topic)}"
+        room = self._console.width - display_width(header) - 2
         if self._fields is not None and self._fields.names:
             values = self._fields.extract(message)
             if values is None:
                 return
-            body = format_payload(self._fields.as_dict(values), whole=self._whole)
+            body = format_payload(self._fields.as_dict(values), in_full=self._whole)
         else:
-            body = _format_body(message, room, whole=self._whole)
+            body = _format_body(message, room, in_full=self._whole)
         if self._paint is None or len(body) > _MAX_COLOURED_CHARACTERS:
-            write(f"{head}  {body}\n")
+            write(f"{header}  {body}\n")
         else:
-            self._console.print(self._paint(head, body))
+            self._console.print(self._paint(header, body))
 
 
 def _format_head(message: Message) -> str:
@@ -300,7 +304,7 @@ def _format_head(message: Message) -> str:
     return f"{stamp}{seq}"
 
 
-def _format_body(message: Message, room: int, *, whole: bool) -> str:
+def _format_body(message: Message, room: int, *, in_full: bool) -> str:
     if message.codec == "image":
         return _image_summary(message)
     try:
@@ -314,18 +318,18 @@ def _format_body(message: Message, room: int, *, whole: bool) -> str:
         )
         return escape_for_terminal(text)
     if isinstance(payload, str):
-        return escape_for_terminal(payload if whole else shortened(payload, _MAX_SHOWN_CHARACTERS))
+        return escape_for_terminal(payload if in_full else shortened(payload, _MAX_SHOWN_CHARACTERS))
     if isinstance(payload, bytes):
         return f"{size(len(payload))}: {_format_hexadecimal(payload)}"
     # re-encoding decoded JSON is 100 times faster than formatting each value
-    is_exact = whole and message.codec == "json" and not _has_nan(message.data)
-    line = encode_json(payload).decode() if is_exact else format_payload(payload, whole=whole)
+    is_exact = in_full and message.codec == "json" and not _has_nan(message.data)
+    line = encode_json(payload).decode() if is_exact else format_payload(payload, in_full=in_full)
     if len(line) <= room and display_width(line) <= room:
         return line
     laid_out = (
         encode_json(payload, indent=True).decode()
         if is_exact
-        else format_payload(payload, whole=whole, indent=True)
+        else format_payload(payload, in_full=in_full, indent=True)
     )
     return "\n" + textwrap.indent(laid_out, "  ")
 

@@ -71,8 +71,17 @@ def hz(
     Intervals are measured with the publishers' time stamps; programs of the original NEP send none, so
     arrival times are used. Latched messages from before the start aren't counted.
     """
-    heads = (lazy("rate"), lazy("shortest"), lazy("longest"), lazy("std dev"), lazy("messages"), lazy("lost"))
-    _Report(topics, window_s, heads, _frequency_cells).run(count, timeout_s, master, backend, as_json=as_json)
+    headings = (
+        lazy("rate"),
+        lazy("shortest"),
+        lazy("longest"),
+        lazy("std dev"),
+        lazy("messages"),
+        lazy("lost"),
+    )
+    _Report(topics, window_s, headings, _frequency_cells).run(
+        count, timeout_s, master, backend, as_json=as_json
+    )
 
 
 def bw(
@@ -85,7 +94,7 @@ def bw(
     backend: BackendOption = None,
 ) -> None:
     """Print the bandwidth of topics and the sizes of their messages, once a second until Ctrl+C."""
-    heads = (
+    headings = (
         lazy("bandwidth"),
         lazy("mean"),
         lazy("smallest"),
@@ -93,7 +102,9 @@ def bw(
         lazy("messages"),
         lazy("lost"),
     )
-    _Report(topics, window_s, heads, _traffic_cells).run(count, timeout_s, master, backend, as_json=as_json)
+    _Report(topics, window_s, headings, _traffic_cells).run(
+        count, timeout_s, master, backend, as_json=as_json
+    )
 
 
 def delay(
@@ -121,12 +132,12 @@ class _Report:
         self,
         topics: Sequence[str],
         window_s: float,
-        heads: Sequence[str],
-        figures: Callable[[RateWindow, float], tuple[Frequency | Bandwidth | Delay | None, Sequence[str]]],
+        headings: Sequence[str],
+        measure: Callable[[RateWindow, float], tuple[Frequency | Bandwidth | Delay | None, Sequence[str]]],
     ) -> None:
         self._windows: Mapping[str, RateWindow] = {topic: RateWindow(window_s) for topic in topics}
-        self._heads = heads
-        self._figures = figures
+        self._heads = headings
+        self._figures = measure
         self._subscribers: dict[str, Subscriber] = {}
         self._totals: dict[str, int] = {}
         self._never = threading.Event()
@@ -151,11 +162,11 @@ class _Report:
                 self._subscribers[topic] = opened.enter_context(subscription)
             if not as_json:
                 print_status(_("measuring; press Ctrl+C to stop"))
-                write(f"{self._format_line(_('topic'), [_(head) for head in self._heads])}\n")
+                write(f"{self._format_line(_('topic'), [_(heading) for heading in self._heads])}\n")
             started = time.monotonic()
             for number in itertools.count(1):
-                while (left := started + number * _REPORT_PERIOD_S - time.monotonic()) > 0:
-                    self._wait(node, min(left, _WAIT_SLICE_S))
+                while (remaining_s := started + number * _REPORT_PERIOD_S - time.monotonic()) > 0:
+                    self._wait(node, min(remaining_s, _WAIT_SLICE_S))
                 for topic in self._windows:
                     (self._show_json if as_json else self._show)(topic)
                 if number == count:
@@ -193,22 +204,22 @@ class _Report:
         return node.new_sub(topic, msg_type, sink=on_messages)
 
     def _show(self, topic: str) -> None:
-        found, figures = self._figures(self._windows[topic], time.monotonic())
+        measured, cells = self._figures(self._windows[topic], time.monotonic())
         lost = self._subscribers[topic].lost
-        known = str(found.messages) if found else "0"
-        write(f"{self._format_line(topic, (*figures, known, UNKNOWN if lost is None else str(lost)))}\n")
-
-    def _show_json(self, topic: str) -> None:
-        found, _ = self._figures(self._windows[topic], time.monotonic())
-        window = self._windows[topic]
-        figures: Stats = asdict(found) if found else {"messages": 0}
-        lost = self._subscribers[topic].lost
-        show_json(
-            {"topic": topic, "stamp_ns": time.time_ns(), **figures, "total": window.total, "lost": lost}
+        message_count = str(measured.messages) if measured else "0"
+        write(
+            f"{self._format_line(topic, (*cells, message_count, UNKNOWN if lost is None else str(lost)))}\n"
         )
 
-    def _format_line(self, topic: str, figures: Sequence[str]) -> str:
-        return padded(topic, self._width) + "".join(figure.rjust(12) for figure in figures)
+    def _show_json(self, topic: str) -> None:
+        measured, _ = self._figures(self._windows[topic], time.monotonic())
+        window = self._windows[topic]
+        stats: Stats = asdict(measured) if measured else {"messages": 0}
+        lost = self._subscribers[topic].lost
+        show_json({"topic": topic, "stamp_ns": time.time_ns(), **stats, "total": window.total, "lost": lost})
+
+    def _format_line(self, topic: str, cells: Sequence[str]) -> str:
+        return padded(topic, self._width) + "".join(cell.rjust(12) for cell in cells)
 
 
 class _DelayReport(_Report):
@@ -218,7 +229,7 @@ class _DelayReport(_Report):
     """
 
     def __init__(self, topics: Sequence[str], window_s: float) -> None:
-        heads = (
+        headings = (
             lazy("mean"),
             lazy("min"),
             lazy("max"),
@@ -226,7 +237,7 @@ class _DelayReport(_Report):
             lazy("messages"),
             lazy("lost"),
         )
-        super().__init__(topics, window_s, heads, self._delay_cells)
+        super().__init__(topics, window_s, headings, self._delay_cells)
         self._ages = {topic: LatencyWindow(window_s) for topic in topics}
         self._windows = self._ages
         self._unstamped: set[str] = set()
@@ -253,54 +264,56 @@ class _DelayReport(_Report):
         node.spin(seconds)
 
     def _delay_cells(self, window: RateWindow, now: float) -> tuple[Delay | None, Sequence[str]]:
-        found = window.delay(now) if isinstance(window, LatencyWindow) else None
-        if found is None:
+        latency = window.delay(now) if isinstance(window, LatencyWindow) else None
+        if latency is None:
             return None, (UNKNOWN,) * 4
-        uncertainty_s = found.uncertainty_s
-        ages = [format_latency(each, uncertainty_s) for each in (found.mean_s, found.min_s, found.max_s)]
-        if uncertainty_s and found.mean_s >= 0:
-            ages[0] += f" ± {format_duration(uncertainty_s)}"
-        return found, (*ages, format_duration(found.std_s))
-
-    def _format_line(self, topic: str, figures: Sequence[str]) -> str:
-        wide = [
-            figures[0].rjust(_MEAN_COLUMN_WIDTH),
-            *(each.rjust(_LATENCY_COLUMN_WIDTH) for each in figures[1:3]),
+        uncertainty_s = latency.uncertainty_s
+        ages = [
+            format_latency(each, uncertainty_s) for each in (latency.mean_s, latency.min_s, latency.max_s)
         ]
-        return super()._format_line(topic, (*wide, *figures[3:]))
+        if uncertainty_s and latency.mean_s >= 0:
+            ages[0] += f" ± {format_duration(uncertainty_s)}"
+        return latency, (*ages, format_duration(latency.std_s))
+
+    def _format_line(self, topic: str, cells: Sequence[str]) -> str:
+        padded_cells = [
+            cells[0].rjust(_MEAN_COLUMN_WIDTH),
+            *(each.rjust(_LATENCY_COLUMN_WIDTH) for each in cells[1:3]),
+        ]
+        return super()._format_line(topic, (*padded_cells, *cells[3:]))
 
     def _show(self, topic: str) -> None:
         super()._show(topic)
-        found = self._ages[topic].delay(time.monotonic())
-        is_compared = found is None or found.uncertainty_s is not None
+        latency = self._ages[topic].delay(time.monotonic())
+        is_compared = latency is None or latency.uncertainty_s is not None
         if is_compared:
             self._uncompared.pop(topic, None)
             return
         self._uncompared[topic] = self._uncompared.get(topic, 0) + 1
         if self._uncompared[topic] == _CLOCK_WARNING_REPORTS:
-            words = _(
+            message = _(
                 "'{topic}': the clock difference between the two computers is unknown and is included in "
                 "the latency"
             )
-            print_status(words.format(topic=topic))
+            print_status(message.format(topic=topic))
 
 
 def _frequency_cells(window: RateWindow, now: float) -> tuple[Frequency | None, Sequence[str]]:
-    found = window.frequency(now)
-    if found is None:
+    frequency = window.frequency(now)
+    if frequency is None:
         return None, (UNKNOWN,) * 4
-    return found, (
-        format_rate(found.rate_hz),
-        *(format_duration(each) for each in (found.min_s, found.max_s, found.std_s)),
+    return frequency, (
+        format_rate(frequency.rate_hz),
+        *(format_duration(each) for each in (frequency.min_s, frequency.max_s, frequency.std_s)),
     )
 
 
 def _traffic_cells(window: RateWindow, now: float) -> tuple[Bandwidth | None, Sequence[str]]:
-    found = window.bandwidth(now)
-    if found is None:
+    bandwidth = window.bandwidth(now)
+    if bandwidth is None:
         return None, (UNKNOWN,) * 4
-    sizes = (size(each) for each in (found.mean_bytes, found.min_bytes, found.max_bytes))
-    return found, (size(found.bandwidth_Bps, "/s"), *sizes)
+    sizes = (size(each) for each in (bandwidth.mean_bytes, bandwidth.min_bytes, bandwidth.max_bytes))
+    return bandwidth, (size(bandwidth.bandwidth_Bps, "/s"), *sizes)
 
 
 def format_latency(seconds: float, uncertainty_s: float | None) -> str:

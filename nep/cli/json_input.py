@@ -59,14 +59,14 @@ def decode_text(data: bytes, file: str) -> str:
         raise NepError(message.format(start=error.start + 1, text=escaped(file))) from error
 
 
-def _invalid_json_message(fault: JsonFault, shown: str, first_line: int, *, other_types: bool) -> str:
+def _invalid_json_message(fault: JsonFault, shown_text: str, first_line: int, *, other_types: bool) -> str:
     message = _("'{text}' isn't valid JSON: line {line}, column {column}: {reason}")
     if fault.is_nan and other_types:
         message = _(
             "'{text}' isn't valid JSON: line {line}, column {column}: {reason}, or use --type msgpack"
         )
     line = fault.line + first_line - 1
-    return message.format(text=shown, line=line, column=fault.column, reason=fault.reason)
+    return message.format(text=shown_text, line=line, column=fault.column, reason=fault.reason)
 
 
 def _not_json_message(text: str, *, other_types: bool) -> str:
@@ -84,5 +84,5 @@ def _excerpt(text: str) -> str:
     return escaped(text if len(text) <= _MAX_SHOWN_CHARACTERS else f"{text[:_MAX_SHOWN_CHARACTERS]} …")
 
 
-def _quote_for_shell(word: str) -> str:
-    return subprocess.list2cmdline([word]) if os.name == "nt" else shlex.quote(word)
+def _quote_for_shell(argument: str) -> str:
+    return subprocess.list2cmdline([argument]) if os.name == "nt" else shlex.quote(argument)

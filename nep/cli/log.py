@@ -82,23 +82,23 @@ def log(
             param_hint="--level",
         )
     min_level = LEVELS.index(parse_level(level))
-    with open_command_node("log", master) as own, own.new_sub(LOG_TOPIC, LOG_TYPE) as subscriber:
+    with open_command_node("log", master) as own_node, own_node.new_sub(LOG_TOPIC, LOG_TYPE) as subscriber:
         if not as_json:
             print_status(_("waiting for log records; press Ctrl+C to stop"))
-        wanted = (
+        matching = (
             record
-            for record in _receive_records(own, subscriber)
+            for record in _receive_records(own_node, subscriber)
             if LEVELS.index(record.level) >= min_level and node in {None, record.node}
         )
-        for record in itertools.islice(wanted, count or None):
+        for record in itertools.islice(matching, count or None):
             show_json(record.to_plain()) if as_json else _show_record(record)
 
 
-def _receive_records(own: Node, subscriber: Subscriber) -> Iterator[LogRecord]:
-    shown = NewErrorFilter()
-    with own.new_sub(LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE) as latched:
+def _receive_records(own_node: Node, subscriber: Subscriber) -> Iterator[LogRecord]:
+    error_filter = NewErrorFilter()
+    with own_node.new_sub(LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE) as latched:
         lists = iter(partial(latched.receive, 0.0), None)  # latched messages arrived while connecting
-        last = [record for each in lists for record in _new_errors(each, shown)]
+        last = [record for each in lists for record in _new_errors(each, error_filter)]
     yield from sorted(last, key=lambda record: record.stamp_ns)
     while True:
         message = subscriber.receive()
@@ -108,13 +108,13 @@ def _receive_records(own: Node, subscriber: Subscriber) -> Iterator[LogRecord]:
             record = LogRecord.from_plain(message.payload, message.stamp_ns)
         except DecodeError as error:
             record = LogRecord("warning", str(error), "nep", LOG_TOPIC, message.stamp_ns or 0)
-        if shown.is_new(record):
+        if error_filter.is_new(record):
             yield record
 
 
-def _new_errors(message: Message, shown: NewErrorFilter) -> list[LogRecord]:
+def _new_errors(message: Message, error_filter: NewErrorFilter) -> list[LogRecord]:
     try:
-        return shown.new_records(message.payload)
+        return error_filter.new_records(message.payload)
     except DecodeError:
         return []
 

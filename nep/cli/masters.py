@@ -145,8 +145,8 @@ def _show_address(address: str, terminal: Terminal, *, joins_originals: bool) ->
 def _show_remote_addresses(address: str, hosts: Sequence[str], terminal: Terminal) -> None:
     out = console(out=terminal)
     port = address.rpartition(":")[2]
-    chosen = [own.host for own in own_addresses()] if ANY_HOST in hosts else hosts
-    for host in chosen:
+    reachable_hosts = [own_address.host for own_address in own_addresses()] if ANY_HOST in hosts else hosts
+    for host in reachable_hosts:
         out.print(
             _("[bold yellow]●[/] other computers connect with [bold]NEP_MASTER={host}:{port}[/]").format(
                 host=host, port=port

@@ -75,10 +75,10 @@ def _parse_condition(node: ast.expr) -> _Term:
             return lambda payload: not _is_true(negated(payload))
         case ast.Compare(left=left, ops=ops, comparators=right):
             tests = [_OPERATORS.get(type(op)) for op in ops]
-            known = [test for test in tests if test is not None]
-            if len(known) < len(tests):
+            operators = [test for test in tests if test is not None]
+            if len(operators) < len(tests):
                 raise _UnsupportedError(node)
-            return _create_comparison([_parse_term(each) for each in (left, *right)], known)
+            return _create_comparison([_parse_term(each) for each in (left, *right)], operators)
         case _:
             return _parse_term(node)
 

@@ -16,9 +16,9 @@ from nep.system.addresses import MASTER_VARIABLE
 from nep.system.arguments import check_type_name
 
 
-def _check_backend(given: str | None) -> str | None:
+def _check_backend(value: str | None) -> str | None:
     try:
-        return None if given is None else check_type_name("--backend", given)
+        return None if value is None else check_type_name("--backend", value)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
 

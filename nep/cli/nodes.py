@@ -95,18 +95,20 @@ def info(
 ) -> None:
     """Print information about a node: its program, and its topics and services with their types."""
     graph = query_graph(master, backend)
-    found = [each for each in graph.nodes.values() if node in {each.name, each.id}]
-    if not found:
+    matching_nodes = [
+        node_info for node_info in graph.nodes.values() if node in {node_info.name, node_info.id}
+    ]
+    if not matching_nodes:
         message = _("no node '{node}'; {meant}'nep node list' shows all nodes")
-        near = suggestion(node, [each.name for each in graph.nodes.values()])
-        raise NepError(message.format(node=quotable(node), meant=near))
-    found.sort(key=lambda each: each.id)
+        hint = suggestion(node, [node_info.name for node_info in graph.nodes.values()])
+        raise NepError(message.format(node=quotable(node), meant=hint))
+    matching_nodes.sort(key=lambda each: each.id)
     if as_json:
-        show_json([_record(graph, each) for each in found])
+        show_json([_record(graph, node_info) for node_info in matching_nodes])
         return
-    for number, each in enumerate(found):
-        write(("\n" if number else "") + _description(graph, each))
-    show_alerts(each for each in graph.alerts if each.id.partition(":")[2] == node)
+    for number, node_info in enumerate(matching_nodes):
+        write(("\n" if number else "") + _description(graph, node_info))
+    show_alerts(node_info for node_info in graph.alerts if node_info.id.partition(":")[2] == node)
 
 
 def _record(graph: GraphView, node: NodeInfo) -> dict[str, object]:
@@ -123,7 +125,7 @@ def _record(graph: GraphView, node: NodeInfo) -> dict[str, object]:
 
 def _description(graph: GraphView, node: NodeInfo) -> str:
     language, wire, pid, since, cpu = _row(graph, node)[1:6]
-    heads = (
+    properties = (
         (_("node"), escaped(node.name)),
         (_("id"), node.id),
         (_("computer"), escaped(node.host) or UNKNOWN),
@@ -140,16 +142,16 @@ def _description(graph: GraphView, node: NodeInfo) -> str:
         (_("serves"), [(name, service_type_text(graph.services[name])) for name in services["serves"]]),
         (_("calls"), [(name, service_type_text(graph.services[name])) for name in services["calls"]]),
     )
-    lines = [f"{head}: {value}" for head, value in heads]
-    for head, entries in sections:
-        lines.append(f"{head}:" if entries else f"{head}: {UNKNOWN}")
+    lines = [f"{heading}: {value}" for heading, value in properties]
+    for heading, entries in sections:
+        lines.append(f"{heading}:" if entries else f"{heading}: {UNKNOWN}")
         lines += [f"  {escaped(name)}: {kind}" for name, kind in entries]
     return "".join(f"{line}\n" for line in lines)
 
 
 def _topic_type(graph: GraphView, name: str) -> str:
-    known = graph.topics.get(name) or graph.patterns.get(name)
-    return known.msg_type if known is not None else ""
+    topic_info = graph.topics.get(name) or graph.patterns.get(name)
+    return topic_info.msg_type if topic_info is not None else ""
 
 
 def _row(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
@@ -168,11 +170,17 @@ def _row(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
 
 def _topics_of(graph: GraphView, node: NodeInfo) -> dict[str, list[str]]:
     topics = graph.topics.values()
-    subscribed = [each.name for each in topics if any(one.node_id == node.id for one in each.subscribers)]
+    subscribed = [
+        each.name for each in topics if any(endpoint.node_id == node.id for endpoint in each.subscribers)
+    ]
     patterns = graph.patterns.values()
-    subscribed += [each.name for each in patterns if any(one.node_id == node.id for one in each.subscribers)]
+    subscribed += [
+        each.name for each in patterns if any(endpoint.node_id == node.id for endpoint in each.subscribers)
+    ]
     return {
-        "publishes": [each.name for each in topics if any(one.node_id == node.id for one in each.publishers)],
+        "publishes": [
+            each.name for each in topics if any(endpoint.node_id == node.id for endpoint in each.publishers)
+        ],
         "subscribes": sorted(set(subscribed)),
     }
 
@@ -185,6 +193,10 @@ def _service_cells(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
 def _services_of(graph: GraphView, node: NodeInfo) -> dict[str, list[str]]:
     services = graph.services.values()
     return {
-        "serves": [each.name for each in services if any(one.node_id == node.id for one in each.servers)],
-        "calls": [each.name for each in services if any(one.node_id == node.id for one in each.clients)],
+        "serves": [
+            each.name for each in services if any(endpoint.node_id == node.id for endpoint in each.servers)
+        ],
+        "calls": [
+            each.name for each in services if any(endpoint.node_id == node.id for endpoint in each.clients)
+        ],
     }

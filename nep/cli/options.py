@@ -34,13 +34,15 @@ AllowMovingOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help=_("Print JSON."))]
 
 
-def check_duration(given: float | None) -> float | None:
+def check_duration(duration_s: float | None) -> float | None:
     """Validate a duration in seconds, which must not be negative; raise `typer.BadParameter` otherwise."""
-    if given is not None and not given >= 0.0:  # rejects NaN, too
+    if duration_s is not None and not duration_s >= 0.0:  # rejects NaN, too
         raise typer.BadParameter(
-            _("{given:g} isn't a valid duration; use a number of seconds, 0 or greater").format(given=given)
+            _("{given:g} isn't a valid duration; use a number of seconds, 0 or greater").format(
+                given=duration_s
+            )
         )
-    return given
+    return duration_s
 
 
 TimeoutOption = Annotated[

@@ -62,11 +62,11 @@ _NameArgument = Annotated[
 def list_parameters(node: _NodeArgument, master: MasterOption = None, as_json: JsonOption = False) -> None:
     """List the parameters of a node, with their types and limits."""
     with _open_parameters(node, master) as parameters:
-        found = parameters.list()
+        parameter_list = parameters.list()
     if as_json:
-        show_json(list(found))
-    elif found:
-        show_table(_COLUMNS, [_row(each) for each in found])
+        show_json(list(parameter_list))
+    elif parameter_list:
+        show_table(_COLUMNS, [_row(each) for each in parameter_list])
     else:
         print_status(_("the node has no parameters"))
 
@@ -81,7 +81,7 @@ def get(
     if as_json:
         show_json(value)
     else:
-        write(f"{format_payload(value, whole=True)}\n")
+        write(f"{format_payload(value, in_full=True)}\n")
 
 
 @app.command("set")
@@ -119,15 +119,15 @@ def watch(
     as_json: JsonOption = False,
 ) -> None:
     """Print the parameters of a node, and again whenever one changes, until Ctrl+C."""
-    with Node(f"nep-param-{os.getpid()}", master=master) as own:
-        found = node_with_parameters(own.graph(), node)
-        with own.new_sub(parameters_topic(found), MSG_TYPE) as subscriber:
-            changes = _changes(_receive_states(own, subscriber, found, timeout_s), name)
-            for each, value in itertools.islice(changes, count or None):
+    with Node(f"nep-param-{os.getpid()}", master=master) as own_node:
+        node_id = node_with_parameters(own_node.graph(), node)
+        with own_node.new_sub(parameters_topic(node_id), MSG_TYPE) as subscriber:
+            changes = _changes(_receive_states(own_node, subscriber, node_id, timeout_s), name)
+            for changed_name, value in itertools.islice(changes, count or None):
                 if as_json:
-                    show_json({"name": each, "value": value})
+                    show_json({"name": changed_name, "value": value})
                 else:
-                    write(f"{escaped(each)}: {format_payload(value, whole=True)}\n")
+                    write(f"{escaped(changed_name)}: {format_payload(value, in_full=True)}\n")
 
 
 @app.command("dump")
@@ -153,8 +153,8 @@ def dump(
         unfinished.write_bytes(data)
         replace_file(unfinished, file)
     except OSError as error:
-        said = _("can't write '{file}': {problem}; choose another file")
-        raise NepError(said.format(file=escaped(str(file)), problem=error.strerror or error)) from error
+        template = _("can't write '{file}': {problem}; choose another file")
+        raise NepError(template.format(file=escaped(str(file)), problem=error.strerror or error)) from error
 
 
 @app.command("load")
@@ -167,22 +167,25 @@ def load(
     master: MasterOption = None,
 ) -> None:
     """Set parameters from a file. If one is rejected, none is changed."""
-    shown = escaped(str(file))
+    shown_path = escaped(str(file))
     values = parse_json(decode_text(read_file(file, "json"), str(file)), file=str(file))
     if not isinstance(values, dict):
-        raise NepError(_("'{file}' isn't a JSON object of names and values").format(file=shown))
+        raise NepError(_("'{file}' isn't a JSON object of names and values").format(file=shown_path))
     with _open_parameters(node, master) as parameters:
         parameters.set_all(values)
 
 
 @contextmanager
 def _open_parameters(node: str, master: str | None) -> Iterator[RemoteParameters]:
-    with Node(f"nep-param-{os.getpid()}", master=master) as own, own.parameters_of(node) as parameters:
+    with (
+        Node(f"nep-param-{os.getpid()}", master=master) as own_node,
+        own_node.parameters_of(node) as parameters,
+    ):
         yield parameters
 
 
 def _receive_states(
-    own: Node, subscriber: Subscriber, node_id: str, timeout_s: float | None
+    own_node: Node, subscriber: Subscriber, node_id: str, timeout_s: float | None
 ) -> Iterator[Mapping[str, object]]:
     # Yields name → value, now and after each change. Raises `WaitTimeoutError`, or `NepError` when the node
     # leaves.
@@ -205,7 +208,7 @@ def _receive_states(
         if time.monotonic() >= check_at:
             check_at = time.monotonic() + _PRESENCE_CHECK_S
             with suppress(MasterUnreachable):  # connections survive while the master is down
-                if node_id not in own.graph().nodes:
+                if node_id not in own_node.graph().nodes:
                     raise NepError(
                         _("the node has left the network; run the command again after the node restarts")
                     )
@@ -216,10 +219,10 @@ def _parse_values(message: Message) -> Mapping[str, object] | None:
         state = message.payload
     except DecodeError:
         return None
-    listed = state.get("parameters") if isinstance(state, Mapping) else None
-    if not isinstance(listed, list):
+    entries = state.get("parameters") if isinstance(state, Mapping) else None
+    if not isinstance(entries, list):
         return None
-    maps = [each for each in listed if isinstance(each, Mapping)]
+    maps = [each for each in entries if isinstance(each, Mapping)]
     return {bounded_str(each.get("name")): each.get("value") for each in maps}
 
 
@@ -228,29 +231,29 @@ def _changes(states: Iterator[Mapping[str, object]], name: str | None) -> Iterat
     before: dict[str, object] = {}
     for values in states:
         if name is not None and not before and name not in values:
-            said = did_you_mean(name, tuple(values)) if values else _("the node has no parameters")
-            raise NepError(_("unknown parameter '{name}'; {said}").format(name=escaped(name), said=said))
-        for each, value in values.items():
-            is_same = each in before and encode_json(before[each]) == encode_json(
+            hint = did_you_mean(name, tuple(values)) if values else _("the node has no parameters")
+            raise NepError(_("unknown parameter '{name}'; {said}").format(name=escaped(name), said=hint))
+        for key, value in values.items():
+            is_same = key in before and encode_json(before[key]) == encode_json(
                 value
             )  # 1 and 1.0 and True differ
             if not is_same:
-                before[each] = value
-                if name in {None, each}:
-                    yield each, value
+                before[key] = value
+                if name in {None, key}:
+                    yield key, value
 
 
-def _parse_value(word: str) -> object:
+def _parse_value(text: str) -> object:
     try:
-        return orjson.loads(word)
+        return orjson.loads(text)
     except orjson.JSONDecodeError:
-        return word
+        return text
 
 
 def _row(parameter: Mapping[str, object]) -> tuple[str, ...]:
     return (
         escaped(str(parameter.get("name"))),
-        format_payload(parameter.get("value"), whole=False),
+        format_payload(parameter.get("value"), in_full=False),
         escaped(str(parameter.get("type"))),
         _allowed_values(parameter),
         escaped(shortened(str(parameter.get("description") or ""), 200)),
@@ -262,12 +265,12 @@ def _allowed_values(parameter: Mapping[str, object]) -> str:
         return _("read only")
     choices = parameter.get("choices")
     if choices:
-        return format_payload(choices, whole=False)
+        return format_payload(choices, in_full=False)
     minimum, maximum = parameter.get("min"), parameter.get("max")
     if minimum is None and maximum is None:
         return UNKNOWN
     return "".join((
-        "" if minimum is None else f"{format_payload(minimum, whole=True)} ≤ ",
+        "" if minimum is None else f"{format_payload(minimum, in_full=True)} ≤ ",
         "…",
-        "" if maximum is None else f" ≤ {format_payload(maximum, whole=True)}",
+        "" if maximum is None else f" ≤ {format_payload(maximum, in_full=True)}",
     ))  # fmt: skip

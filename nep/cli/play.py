@@ -83,21 +83,21 @@ def play(
     Robots that connect later are protected, too.
     """
     with reader.Recording(file) as recording:
-        named = _named_topics(recording, topics or (), publish_all=publish_all)
-        chosen = list(recording.topics) if publish_all else named
-        if not any(recording.topics[each].message_count for each in chosen):
+        named_topics = _named_topics(recording, topics or (), publish_all=publish_all)
+        selected = list(recording.topics) if publish_all else named_topics
+        if not any(recording.topics[each].message_count for each in selected):
             reason = _("nothing to play: '{file}' has no messages of these topics").format(file=file)
-            words = damage.corruption_text(recording.corruption, recording.start_ns)
-            raise NepError(f"{reason}; {words}" if words else reason)
-        if len(chosen) > _MAX_TOPICS:
+            damage_text = damage.corruption_text(recording.corruption, recording.start_ns)
+            raise NepError(f"{reason}; {damage_text}" if damage_text else reason)
+        if len(selected) > _MAX_TOPICS:
             template = _("'{file}' has {count} matching topics; choose at most {most}")
-            raise NepError(template.format(file=file, count=len(chosen), most=_MAX_TOPICS))
-        names = _remapped_names(chosen, remap or ())
-        armed = frozenset(named) if arm else frozenset[str]()
+            raise NepError(template.format(file=file, count=len(selected), most=_MAX_TOPICS))
+        names = _remapped_names(selected, remap or ())
+        armed = frozenset(named_topics) if arm else frozenset[str]()
         limits = _MotionPermissions(recording, names, frozenset(allow_moving or ()), armed)
-        chosen = limits.filter_allowed(chosen, named)
+        selected = limits.filter_allowed(selected, named_topics)
         try:
-            playback = player.Playback(recording, topics=chosen, remap=names)
+            playback = player.Playback(recording, topics=selected, remap=names)
             playback.speed = speed
             _select_part(recording, playback, parse_span_ns(recording, from_s, to_s), loop=loop)
         except ValueError as error:
@@ -105,11 +105,11 @@ def play(
         with open_command_node("play", master) as node:
             limits.guard = MotionGuard(node)
             limits.guard.wait_for_descriptions(_ROBOT_DISCOVERY_S)
-            chosen = limits.filter_allowed(chosen, named)
-            if not chosen:
+            selected = limits.filter_allowed(selected, named_topics)
+            if not selected:
                 raise NepError(_("nothing to publish: all chosen topics are blocked"))
-            playback.select_topics(chosen)
-            with _Sender(node, recording, chosen, limits) as sender:
+            playback.select_topics(selected)
+            with _Sender(node, recording, selected, limits) as sender:
                 _play(recording, playback, sender)
                 template = ngettext("published {count} message", "published {count} messages", sender.count)
                 print_status(template.format(count=sender.count))
@@ -118,13 +118,15 @@ def play(
             raise typer.Exit(1)
 
 
-def _named_topics(recording: reader.Recording, words: Sequence[str], *, publish_all: bool) -> list[str]:
-    if not words and not publish_all:
-        known = format_list([f"'{quotable(each)}'" for each in list(recording.topics)[:20]], "and")
+def _named_topics(recording: reader.Recording, patterns: Sequence[str], *, publish_all: bool) -> list[str]:
+    if not patterns and not publish_all:
+        topic_names = format_list([f"'{quotable(each)}'" for each in list(recording.topics)[:20]], "and")
         raise typer.BadParameter(
-            _("specify the topics to publish, or use --all; the recording has {topics}").format(topics=known)
+            _("specify the topics to publish, or use --all; the recording has {topics}").format(
+                topics=topic_names
+            )
         )
-    return selected_topics(recording, words)
+    return selected_topics(recording, patterns)
 
 
 class _MotionPermissions:
@@ -147,11 +149,11 @@ class _MotionPermissions:
         self._checked_moving: MovingTopics | None = None
         self._blocked: dict[str, str] = {}
 
-    def filter_allowed(self, chosen: Sequence[str], named: Sequence[str]) -> list[str]:
+    def filter_allowed(self, selected: Sequence[str], named_topics: Sequence[str]) -> list[str]:
         # Returns the topics that may be published. Raises `typer.BadParameter` if a named one is blocked.
-        self._named_topics = frozenset(named)
+        self._named_topics = frozenset(named_topics)
         allowed_topics = []
-        for topic in chosen:
+        for topic in selected:
             reason = self._block_reason(topic)
             if not reason:
                 allowed_topics.append(topic)
@@ -185,22 +187,22 @@ class _MotionPermissions:
         if recorded in self._armed or recorded in self._allowed:
             return ""
         live = () if self.guard is None else self.guard.moving_topics.robots_moved_by(name)
-        known = self._recorded.robots_moved_by(recorded, self._topics[recorded].msg_type)
-        known = known or self._recorded.robots_moved_by(name)
+        recorded_robots = self._recorded.robots_moved_by(recorded, self._topics[recorded].msg_type)
+        recorded_robots = recorded_robots or self._recorded.robots_moved_by(name)
         # names of connected robots win, unless the guard only knows the topic
-        robots = known or live if live in ((), (name,)) else live
+        robots = recorded_robots or live if live in ((), (name,)) else live
         return denial_text(name, robots, self._allowed)
 
 
-def _remapped_names(chosen: Sequence[str], remap: Sequence[str]) -> dict[str, str]:
+def _remapped_names(selected: Sequence[str], remap: Sequence[str]) -> dict[str, str]:
     # Returns new names by old ones. Raises `typer.BadParameter`, `BadTopicError`.
     names: dict[str, str] = {}
-    for each in remap:
-        old, separator, new = each.partition("=")
-        if not separator or not new or old not in chosen:
+    for remapping in remap:
+        old, separator, new = remapping.partition("=")
+        if not separator or not new or old not in selected:
             raise typer.BadParameter(
                 _("'{word}' isn't a valid remapping; use --remap OLD=NEW with a topic that is played").format(
-                    word=each
+                    word=remapping
                 )
             )
         names[old] = check_topic(new)
@@ -229,7 +231,7 @@ class _Sender:
     """Sender of replayed messages that opens one publisher per topic and type."""
 
     def __init__(
-        self, node: Node, recording: reader.Recording, chosen: Sequence[str], limits: _MotionPermissions
+        self, node: Node, recording: reader.Recording, selected: Sequence[str], limits: _MotionPermissions
     ) -> None:
         self.limits, names = limits, limits.names
         self._opened = ExitStack()
@@ -237,9 +239,9 @@ class _Sender:
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._node = node
         self.count = 0
-        latched = player.latched_topics(recording, chosen)
+        latched = player.latched_topics(recording, selected)
         self._latched = {names.get(each, each) for each in latched}
-        for topic in chosen:  # before the first message, so that subscribers connect in time
+        for topic in selected:  # before the first message, so that subscribers connect in time
             self._open_publisher(names.get(topic, topic), recording.topics[topic].msg_type)
 
     def _open_publisher(self, topic: str, msg_type: str) -> Publisher:
@@ -250,15 +252,15 @@ class _Sender:
         return self._publishers[key]
 
     def send(self, messages: Sequence[Message]) -> None:
-        for each in messages:
-            publisher = self._open_publisher(each.topic, player.published_type(each))
+        for message in messages:
+            publisher = self._open_publisher(message.topic, player.published_type(message))
             subscriber_count = publisher.subscribers
             if subscriber_count != self._subscriber_counts.get(publisher):  # a robot may have connected
                 self._subscriber_counts[publisher] = subscriber_count
                 self.poll_guard()
-            if not self.limits.allows(each.topic):
+            if not self.limits.allows(message.topic):
                 continue
-            publisher.publish_bytes(bytes(each.data), dict(each.extension) or None)
+            publisher.publish_bytes(bytes(message.data), dict(message.extension) or None)
             self.count += 1
 
     def poll_guard(self) -> None:
@@ -284,9 +286,9 @@ def _play(recording: reader.Recording, playback: player.Playback, sender: _Sende
     with player.Player(playback, sender.send, on_jump=_ignore_jump, on_end=ended.set) as playing:
         playing.apply(lambda each: each.play())
         if out.is_terminal:
-            with out.status("") as shown:
+            with out.status("") as status_display:
                 while not wait():
-                    shown.update(_status_line(recording, playing.status))
+                    status_display.update(_status_line(recording, playing.status))
         else:
             while not wait():
                 pass
@@ -300,8 +302,8 @@ def _ignore_jump(_messages: Sequence[Message]) -> None:
 
 
 def _status_line(recording: reader.Recording, status: player.PlayerStatus) -> str:
-    at = clock_text((status.position_ns - recording.start_ns) / 1e9)
-    line = _("{time} of {whole}").format(time=at, whole=clock_text(recording.duration_s))
+    position = clock_text((status.position_ns - recording.start_ns) / 1e9)
+    line = _("{time} of {whole}").format(time=position, whole=clock_text(recording.duration_s))
     true_speed = status.measured_speed
     if true_speed is not None and true_speed < 0.9 * status.speed:
         line += "  " + _("{is_now}x instead of {asked}x").format(

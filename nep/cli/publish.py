@@ -51,9 +51,9 @@ _PayloadArgument = Annotated[
 ]
 
 
-def _check_type(given: str | None) -> str | None:
+def _check_type(value: str | None) -> str | None:
     try:
-        return check_type_name("it", given) if given else None
+        return check_type_name("it", value) if value else None
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
 
@@ -132,9 +132,9 @@ def publish(
             _("the rate must be greater than 0 and at most 10000 Hz"), param_hint="--rate"
         )
     with open_command_node("pub", master, backend) as node:
-        known = node.graph().topics.get(topic)
-        kind = msg_type or (known.msg_type if known else "json")
-        _warn_about_type(topic, kind, known)
+        topic_info = node.graph().topics.get(topic)
+        kind = msg_type or (topic_info.msg_type if topic_info else "json")
+        _warn_about_type(topic, kind, topic_info)
         value = None if payload == "-" else encode_payload(payload, kind)
         with node.new_pub(topic, kind, latched=latched) as publisher:
             wait_for_subscribers(publisher, wait)
@@ -150,18 +150,20 @@ def publish(
                 _wait_forever()
 
 
-def _warn_about_type(topic: str, kind: str, known: TopicInfo | None) -> None:
-    if known is not None and known.publishers and known.msg_type != kind:
+def _warn_about_type(topic: str, kind: str, topic_info: TopicInfo | None) -> None:
+    if topic_info is not None and topic_info.publishers and topic_info.msg_type != kind:
         print_status(
             _("'{topic}' is published with the type '{msg_type}', not '{kind}'").format(
-                topic=topic, msg_type=known.msg_type, kind=kind
+                topic=topic, msg_type=topic_info.msg_type, kind=kind
             )
         )
     elif (
-        codec_for(kind).name == "json" and (near := get_close_matches(kind, CODECS, n=1)) and near[0] != kind
+        codec_for(kind).name == "json"
+        and (matches := get_close_matches(kind, CODECS, n=1))
+        and matches[0] != kind
     ):
         print_status(
-            _("the type '{kind}' is sent as JSON; did you mean '{near}'?").format(kind=kind, near=near[0])
+            _("the type '{kind}' is sent as JSON; did you mean '{near}'?").format(kind=kind, near=matches[0])
         )
 
 
@@ -216,24 +218,26 @@ def _encode_argument(text: str) -> bytes:
 
 def read_file(file: Path, msg_type: str) -> bytes:
     """Read a file of at most `_MAX_FILE_BYTES`. Raises `EncodeError` if the file is larger or unreadable."""
-    shown = escaped(str(file))
+    shown_path = escaped(str(file))
     try:
         with file.open("rb") as opened:  # bounded: it may be a pipe or an endless device
             data = opened.read(_MAX_FILE_BYTES + 1)
     except OSError as error:
         raise EncodeError(
-            msg_type, "file", _("can't read '{file}': {reason}").format(file=shown, reason=error.strerror)
+            msg_type,
+            "file",
+            _("can't read '{file}': {reason}").format(file=shown_path, reason=error.strerror),
         ) from error
     except ValueError as error:  # characters that this system doesn't allow in file names
         raise EncodeError(
-            msg_type, "file", _("'{file}' isn't a valid file name").format(file=shown)
+            msg_type, "file", _("'{file}' isn't a valid file name").format(file=shown_path)
         ) from error
     if len(data) > _MAX_FILE_BYTES:
         raise EncodeError(
             msg_type,
             "file",
             _("'{file}' is larger than {most}, the maximum message size").format(
-                file=shown, most=size(_MAX_FILE_BYTES)
+                file=shown_path, most=size(_MAX_FILE_BYTES)
             ),
         )
     return data
@@ -262,8 +266,8 @@ def _stdin_lines() -> Iterator[bytes]:
         else:
             yield from sys.stdin.buffer
     except OSError as error:
-        why = _("it is closed") if error.errno == errno.EBADF else (error.strerror or str(error)).lower()
-        raise NepError(_("can't read standard input: {why}").format(why=why)) from error
+        reason = _("it is closed") if error.errno == errno.EBADF else (error.strerror or str(error)).lower()
+        raise NepError(_("can't read standard input: {why}").format(why=reason)) from error
 
 
 def repeat(

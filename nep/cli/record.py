@@ -147,8 +147,8 @@ def _parse_max_bytes(text: str | None, *, split: bool) -> int | None:
         if split:
             raise typer.BadParameter(_("--split needs a size: --max-size 500MB"), param_hint="--split")
         return None
-    found = _SIZE_PATTERN.fullmatch(text.strip())
-    size_bytes = round(float(found[1].replace(",", ".")) * _UNIT_BYTES[found[2].lower()]) if found else 0
+    match = _SIZE_PATTERN.fullmatch(text.strip())
+    size_bytes = round(float(match[1].replace(",", ".")) * _UNIT_BYTES[match[2].lower()]) if match else 0
     if not splits.MIN_PART_BYTES <= size_bytes < 2**63:
         raise typer.BadParameter(
             _("'{given}' isn't a valid size; use 100kB or more, such as 500MB or 2GB").format(
@@ -171,16 +171,16 @@ def _wait(
     def has_ended() -> bool:
         if max_bytes is not None and file.status.size_bytes >= max_bytes:
             return True
-        left = _STATUS_PERIOD_S if until is None else min(_STATUS_PERIOD_S, until - time.monotonic())
-        return left <= 0.0 or ended.wait(left)
+        remaining_s = _STATUS_PERIOD_S if until is None else min(_STATUS_PERIOD_S, until - time.monotonic())
+        return remaining_s <= 0.0 or ended.wait(remaining_s)
 
     if not out.is_terminal:
         while not has_ended():
             pass
         return
-    with out.status("") as shown:
+    with out.status("") as status_display:
         while not has_ended():
-            shown.update(_status_line(file.status))
+            status_display.update(_status_line(file.status))
 
 
 def _status_line(status: writer.RecordingStatus) -> str:
@@ -210,12 +210,16 @@ def _show_summary(path: Path, status: writer.RecordingStatus) -> None:
             path=path,
         )
     )
-    for topic, each in sorted(status.topics.items()):
-        missing = (each.lost or 0) + each.unkept
+    for topic, topic_status in sorted(status.topics.items()):
+        missing = (topic_status.lost or 0) + topic_status.unkept
         if missing:
             template = ngettext(
                 "'{topic}': {count} message is missing ({lost} lost, {unkept} write errors)",
                 "'{topic}': {count} messages are missing ({lost} lost, {unkept} write errors)",
                 missing,
             )
-            print_status(template.format(count=missing, topic=topic, lost=each.lost or 0, unkept=each.unkept))
+            print_status(
+                template.format(
+                    count=missing, topic=topic, lost=topic_status.lost or 0, unkept=topic_status.unkept
+                )
+            )

@@ -85,39 +85,39 @@ RecordedTopicsArgument = Annotated[
 ]
 
 
-def selected_topics(recording: reader.Recording, words: Sequence[str]) -> list[str]:
+def selected_topics(recording: reader.Recording, patterns: Sequence[str]) -> list[str]:
     """Return the topics of a recording that match names and patterns.
 
     Args:
         recording: Recording with the topics.
-        words: Topic names and patterns; they determine the order of the result.
+        patterns: Topic names and patterns; they determine the order of the result.
 
     Raises:
         typer.BadParameter: A word matches no topic.
     """
-    chosen: dict[str, None] = {}
-    for word in words:
-        found = [name for name in recording.topics if glob_matches(word, name)]
-        if not found:
-            known = [quotable(name) for name in islice(recording.topics, _MAX_COMPARED)]
-            if is_glob(word):
-                raise typer.BadParameter(_("no topic of the recording matches '{word}'").format(word=word))
-            if nearest(word, known) is None:
-                del known[_MAX_NAMED:]
+    selected: dict[str, None] = {}
+    for pattern in patterns:
+        matches = [name for name in recording.topics if glob_matches(pattern, name)]
+        if not matches:
+            topic_names = [quotable(name) for name in islice(recording.topics, _MAX_COMPARED)]
+            if is_glob(pattern):
+                raise typer.BadParameter(_("no topic of the recording matches '{word}'").format(word=pattern))
+            if nearest(pattern, topic_names) is None:
+                del topic_names[_MAX_NAMED:]
             raise typer.BadParameter(
                 _("the recording has no topic '{word}'; {did_you_mean}").format(
-                    word=word, did_you_mean=did_you_mean(word, known)
+                    word=pattern, did_you_mean=did_you_mean(pattern, topic_names)
                 )
             )
-        chosen.update(dict.fromkeys(found))
-    return list(chosen)
+        selected.update(dict.fromkeys(matches))
+    return list(selected)
 
 
 def exit_if_damaged(recording: reader.Recording) -> None:
     """Print the damage of a recording and exit with code 1; return normally if the recording is intact."""
-    words = damage.corruption_text(recording.corruption, recording.start_ns)
-    if words:
-        print_status(words)
+    damage_text = damage.corruption_text(recording.corruption, recording.start_ns)
+    if damage_text:
+        print_status(damage_text)
         raise typer.Exit(1)
 
 
@@ -151,11 +151,11 @@ def parse_time_ns(text: str, start_ns: int, end_ns: int) -> int:
     Raises:
         typer.BadParameter: The time is invalid.
     """
-    words = text.strip()
+    stripped = text.strip()
     try:
-        seconds = float(words)
+        seconds = float(stripped)
     except ValueError:
-        return _parse_clock_time_ns(words, start_ns, end_ns)
+        return _parse_clock_time_ns(stripped, start_ns, end_ns)
     if not 0.0 <= seconds < 1e9:
         raise typer.BadParameter(
             _("{given:g} isn't a valid duration; use a number of seconds, 0 or greater").format(given=seconds)
@@ -163,44 +163,44 @@ def parse_time_ns(text: str, start_ns: int, end_ns: int) -> int:
     return start_ns + int(seconds * 1e9)
 
 
-def _parse_clock_time_ns(words: str, start_ns: int, end_ns: int) -> int:
-    iso = f"{words[:-1]}+00:00" if words.endswith(("Z", "z")) else words
+def _parse_clock_time_ns(text: str, start_ns: int, end_ns: int) -> int:
+    iso = f"{text[:-1]}+00:00" if text.endswith(("Z", "z")) else text
     try:
         try:
-            given = time.fromisoformat(iso)
+            clock_time = time.fromisoformat(iso)
         except ValueError:
             return _to_unix_ns(datetime.fromisoformat(iso))
-        began = datetime.fromtimestamp(start_ns / 1e9, given.tzinfo)  # local time without a time zone
-        found = _to_unix_ns(datetime.combine(began.date(), given))
-        later = _to_unix_ns(datetime.combine(began.date() + timedelta(days=1), given))
+        start = datetime.fromtimestamp(start_ns / 1e9, clock_time.tzinfo)  # local time without a time zone
+        time_ns = _to_unix_ns(datetime.combine(start.date(), clock_time))
+        later = _to_unix_ns(datetime.combine(start.date() + timedelta(days=1), clock_time))
     except (ValueError, OverflowError, OSError) as error:
         raise typer.BadParameter(
             _("'{given}' isn't a valid time; use seconds after the start, or a time such as 15:04:05").format(
-                given=quotable(words)
+                given=quotable(text)
             )
         ) from error
-    return later if found < start_ns and later <= end_ns else found
+    return later if time_ns < start_ns and later <= end_ns else time_ns
 
 
-def _to_unix_ns(at: datetime) -> int:
+def _to_unix_ns(moment: datetime) -> int:
     # In ns; local time without a time zone. Raises as `datetime.timestamp` does.
-    return int(at.replace(microsecond=0).timestamp()) * 1_000_000_000 + at.microsecond * 1000
+    return int(moment.replace(microsecond=0).timestamp()) * 1_000_000_000 + moment.microsecond * 1000
 
 
 def clock_text(seconds: float) -> str:
     """Format a duration as "12:41" or "1:02:03"."""
-    whole = int(seconds)
-    hours, rest = divmod(whole, 3600)
+    total_s = int(seconds)
+    hours, rest = divmod(total_s, 3600)
     minutes, secs = divmod(rest, 60)
     return f"{hours}:{minutes:02d}:{secs:02d}" if hours else f"{minutes}:{secs:02d}"
 
 
 @contextmanager
-def progress_bar(said: str) -> Iterator[Callable[[int, int], object]]:
+def progress_bar(description: str) -> Iterator[Callable[[int, int], object]]:
     """Show a progress bar on stderr if stderr is a terminal; yield a callback (done, total).
 
     Args:
-        said: Description of the operation, shown before the bar.
+        description: Description of the operation, shown before the bar.
     """
     out = console(stderr=True)
     if not out.is_terminal:
@@ -209,7 +209,7 @@ def progress_bar(said: str) -> Iterator[Callable[[int, int], object]]:
     from rich.progress import Progress  # noqa: PLC0415 - see `nep.cli.screen.console`
 
     with Progress(console=out, transient=True) as progress:
-        task = progress.add_task(said, total=None)
+        task = progress.add_task(description, total=None)
 
         def on_progress(done: int, total: int) -> None:
             progress.update(task, completed=done, total=total)

@@ -67,8 +67,8 @@ def info(
         else:
             _show(recording, topic_figures)
             if not is_checked:
-                words = _("only the first gigabyte was checked for damage; --check reads all of it")
-                print_status(words)
+                message = _("only the first gigabyte was checked for damage; --check reads all of it")
+                print_status(message)
         if not recording.is_complete:
             template = _(
                 "the file is incomplete: it was truncated or not closed. Readable messages are "
@@ -79,13 +79,13 @@ def info(
 
 
 def _show(recording: reader.Recording, topic_figures: Mapping[str, figures.TopicStats]) -> None:
-    head = _("{messages} messages in {time}, {size}, from {started}").format(
+    summary = _("{messages} messages in {time}, {size}, from {started}").format(
         messages=recording.message_count,
         time=clock_text(recording.duration_s),
         size=size(recording.size_bytes),
         started=_timestamp_text(recording.start_ns),
     )
-    write(f"{head}\n")
+    write(f"{summary}\n")
     if recording.recorder_metadata.get("note"):
         write(f"{escaped(recording.recorder_metadata['note'])}\n")
     if recording.recorder_metadata.get("part"):
@@ -112,30 +112,30 @@ def _show(recording: reader.Recording, topic_figures: Mapping[str, figures.Topic
         write(f"{line}\n")
 
 
-def _writer_text(facts: file_reader.FileInfo) -> str:
+def _writer_text(file_info: file_reader.FileInfo) -> str:
     kinds = []
-    for name, count in sorted(facts.compressions.items()):
+    for name, count in sorted(file_info.compressions.items()):
         if name == "-":
             kinds.append(_("messages outside of chunks"))
         else:
             template = ngettext("{count} chunk {compression}", "{count} chunks {compression}", count)
             kinds.append(template.format(count=count, compression=name or _("uncompressed")))
-    parts = [quotable(facts.library) or UNKNOWN]
-    if facts.profile:
-        parts.append(_("profile {profile}").format(profile=quotable(facts.profile)))
+    parts = [quotable(file_info.library) or UNKNOWN]
+    if file_info.profile:
+        parts.append(_("profile {profile}").format(profile=quotable(file_info.profile)))
     return _("written by {program}; {chunks}").format(
         program=", ".join(parts), chunks=format_list(kinds, "and") if kinds else _("no messages")
     )
 
 
-def _metadata_lines(facts: file_reader.FileInfo) -> Iterator[str]:
-    shown = [each for each in facts.metadata if each[0] not in _OWN_METADATA]
-    for name, values in shown[:_MAX_VALUES]:
+def _metadata_lines(file_info: file_reader.FileInfo) -> Iterator[str]:
+    records = [each for each in file_info.metadata if each[0] not in _OWN_METADATA]
+    for name, values in records[:_MAX_VALUES]:
         pairs = [f"{quotable(key)}: {quotable(value)}" for key, value in islice(values.items(), _MAX_VALUES)]
         more = "; …" if len(values) > _MAX_VALUES else ""
         yield _("metadata {name}: {values}").format(name=quotable(name), values="; ".join(pairs) + more)
-    if len(shown) > _MAX_VALUES:
-        count = len(shown) - _MAX_VALUES
+    if len(records) > _MAX_VALUES:
+        count = len(records) - _MAX_VALUES
         template = ngettext(
             "and {count} more metadata record, which --json lists",
             "and {count} more metadata records, which --json lists",
@@ -173,7 +173,7 @@ def _row(
 def _to_plain(
     recording: reader.Recording, topic_figures: Mapping[str, figures.TopicStats]
 ) -> dict[str, object]:
-    facts = recording.info
+    file_info = recording.info
     return {
         "path": str(recording.path),
         "start_ns": recording.start_ns,
@@ -181,16 +181,16 @@ def _to_plain(
         "size_bytes": recording.size_bytes,
         "is_complete": recording.is_complete,
         "words": dict(recording.recorder_metadata),
-        "library": facts.library,
-        "profile": facts.profile,
-        "compressions": dict(facts.compressions),
+        "library": file_info.library,
+        "profile": file_info.profile,
+        "compressions": dict(file_info.compressions),
         "attachments": [
             {"name": each.name, "media_type": each.media_type, "size_bytes": each.size_bytes}
-            for each in facts.attachments
+            for each in file_info.attachments
         ],
         "metadata": [
             {"name": name, "values": dict(values)}
-            for name, values in facts.metadata
+            for name, values in file_info.metadata
             if name not in _OWN_METADATA
         ],
         "damage": [

@@ -91,9 +91,9 @@ def repair(
     )
     if not report.is_complete:
         lost_count = UNKNOWN if report.discarded is None else str(report.discarded)
-        words = _("lost: {messages} messages, {size}, the last {seconds} s")
+        loss_template = _("lost: {messages} messages, {size}, the last {seconds} s")
         print_status(
-            words.format(
+            loss_template.format(
                 messages=lost_count, size=size(report.discarded_bytes), seconds=number(report.lost_s, ".1f")
             )
         )
@@ -140,12 +140,12 @@ def export(
     if not 0.1 <= fps <= 240:
         raise typer.BadParameter(_("the frame rate of a video must be 0.1 to 240"), param_hint="--fps")
     with reader.Recording(file) as recording:
-        chosen = selected_topics(recording, topics) if topics else None
-        part = exports.Part(*parse_span_ns(recording, from_s, to_s), chosen)
+        selected = selected_topics(recording, topics) if topics else None
+        part = exports.Part(*parse_span_ns(recording, from_s, to_s), selected)
         folder = output or file.with_name(file.stem)
         with progress_bar(_("exporting")) as progress:
             exported = exports.export(recording, kind, folder, part, fps=fps, progress=progress)
-        words = damage.corruption_text(recording.corruption, recording.start_ns)
+        damage_text = damage.corruption_text(recording.corruption, recording.start_ns)
     if as_json:
         show_json(
             [
@@ -160,19 +160,19 @@ def export(
         )
     else:
         _show_exported(exported)
-    if words:
-        print_status(words)
+    if damage_text:
+        print_status(damage_text)
         raise typer.Exit(1)
 
 
 def _show_exported(exported: Sequence[exports.ExportedFile]) -> None:
-    for each in exported:
-        template = ngettext("{count} message: '{path}'", "{count} messages: '{path}'", each.count)
-        print_status(template.format(count=each.count, path=each.path))
-        if each.undecodable_count:
-            words = ngettext(
+    for exported_file in exported:
+        template = ngettext("{count} message: '{path}'", "{count} messages: '{path}'", exported_file.count)
+        print_status(template.format(count=exported_file.count, path=exported_file.path))
+        if exported_file.undecodable_count:
+            skipped_template = ngettext(
                 "skipped {count} undecodable message",
                 "skipped {count} undecodable messages",
-                each.undecodable_count,
+                exported_file.undecodable_count,
             )
-            print_status(words.format(count=each.undecodable_count))
+            print_status(skipped_template.format(count=exported_file.undecodable_count))

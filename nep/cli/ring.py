@@ -63,34 +63,34 @@ class _Saver:
         return self.save(float(seconds), note)
 
     def save(self, seconds: float | None = None, note: str = "") -> dict[str, object]:
-        wanted = self._seconds if seconds is None else seconds
-        if not 0.0 < wanted < 1e9:
+        duration_s = self._seconds if seconds is None else seconds
+        if not 0.0 < duration_s < 1e9:
             raise NepError(
                 _("{given:g} isn't a valid duration; use a number of seconds greater than 0").format(
-                    given=wanted
+                    given=duration_s
                 )
             )
         with self._lock:
-            kept = self._ring.save(self._free_path(), min(wanted, self._seconds), note)
-        result: dict[str, object] = {**asdict(kept), "path": str(kept.path.resolve())}
+            saved = self._ring.save(self._free_path(), min(duration_s, self._seconds), note)
+        result: dict[str, object] = {**asdict(saved), "path": str(saved.path.resolve())}
         if self._as_json:
             show_json(result)
         else:
-            words = ngettext(
+            template = ngettext(
                 "saved {count} message of the last {time}: '{path}'",
                 "saved {count} messages of the last {time}: '{path}'",
-                kept.message_count,
+                saved.message_count,
             )
-            time = clock_text(kept.duration_s)
-            print_status(words.format(count=kept.message_count, time=time, path=kept.path))
+            time = clock_text(saved.duration_s)
+            print_status(template.format(count=saved.message_count, time=time, path=saved.path))
         return result
 
     def _free_path(self) -> Path:
         stem = datetime.now().astimezone().strftime("kept-%Y-%m-%d-%H-%M-%S")
-        made, number = self._folder / f"{stem}.mcap", 2
-        while made.exists():
-            made, number = self._folder / f"{stem}-{number}.mcap", number + 1
-        return made
+        path, number = self._folder / f"{stem}.mcap", 2
+        while path.exists():
+            path, number = self._folder / f"{stem}-{number}.mcap", number + 1
+        return path
 
 
 def ring(
@@ -124,24 +124,29 @@ def ring(
     'nep recording keep', a call to the service flight_recorder/keep (for example by an alarm) or the signal
     SIGUSR1 saves them as a recording, while buffering continues.
     """
-    for given, least, most, hint in ((seconds, 0.1, 1e6, "--seconds"), (size_gb, 0.001, 1e6, "--size")):
-        if not least <= given <= most:
+    for value, min_value, max_value, hint in (
+        (seconds, 0.1, 1e6, "--seconds"),
+        (size_gb, 0.001, 1e6, "--size"),
+    ):
+        if not min_value <= value <= max_value:
             template = _("{given:g} is out of range; use {least:g} to {most:g}")
-            raise typer.BadParameter(template.format(given=given, least=least, most=most), param_hint=hint)
+            raise typer.BadParameter(
+                template.format(given=value, least=min_value, most=max_value), param_hint=hint
+            )
     selection = recorder.TopicSelection(tuple(topics or ()), tuple(excluded or ()))
     commands: queue.SimpleQueue[str] = queue.SimpleQueue()
     with open_command_node("ring", master) as node:
         node.graph()  # fail before writing anything if there is no master
-        place = folder / _BUFFER_FOLDER
+        buffer_folder = folder / _BUFFER_FOLDER
         with rings.FlightRecorder(
-            place,
+            buffer_folder,
             seconds=seconds,
             size_bytes=round(size_gb * 1e9),
             on_problem=lambda _why: commands.put(_STOP),
-        ) as kept:
-            keeper = _Saver(kept, folder, seconds, as_json=as_json)
+        ) as flight_recorder:
+            keeper = _Saver(flight_recorder, folder, seconds, as_json=as_json)
             with (
-                recorder.Recorder(node, kept, selection),
+                recorder.Recorder(node, flight_recorder, selection),
                 node.new_server(f"{name}/keep", keeper.handle_request, threads=1),
             ):
                 interrupts.call_on_signal(lambda: commands.put(_STOP))
@@ -152,10 +157,10 @@ def ring(
                         "press Ctrl+C to stop"
                     )
                     print_status(template.format(seconds=seconds))
-                _run_commands(commands, keeper, kept)
-            problem = kept.status.problem
+                _run_commands(commands, keeper, flight_recorder)
+            problem = flight_recorder.status.problem
         with suppress(OSError):  # another flight recorder uses the same folder
-            place.rmdir()
+            buffer_folder.rmdir()
     if problem:
         raise RecordingError(str(folder), problem)
 
@@ -169,7 +174,9 @@ def _save_on_signal(commands: queue.SimpleQueue[str]) -> None:
             signal.signal(signal.SIGUSR1, handle)
 
 
-def _run_commands(commands: queue.SimpleQueue[str], keeper: _Saver, kept: rings.FlightRecorder) -> None:
+def _run_commands(
+    commands: queue.SimpleQueue[str], keeper: _Saver, flight_recorder: rings.FlightRecorder
+) -> None:
     out = console(stderr=True)
 
     def next_command() -> str:
@@ -177,17 +184,19 @@ def _run_commands(commands: queue.SimpleQueue[str], keeper: _Saver, kept: rings.
             return commands.get(timeout=_STATUS_PERIOD_S)
         return ""
 
-    with out.status("") if out.is_terminal else nullcontext() as shown:
+    with out.status("") if out.is_terminal else nullcontext() as status_display:
         while (order := next_command()) != _STOP:
             if order == _KEEP:
                 try:
                     keeper.save()
                 except NepError as error:
                     print_status(str(error))
-            if shown is not None:
-                status = kept.status
-                words = _("{time} buffered, {size}")
-                shown.update(words.format(time=clock_text(status.seconds), size=size(status.size_bytes)))
+            if status_display is not None:
+                status = flight_recorder.status
+                template = _("{time} buffered, {size}")
+                status_display.update(
+                    template.format(time=clock_text(status.seconds), size=size(status.size_bytes))
+                )
 
 
 def has_flight_recorder(graph: GraphView, service: str = KEEP_SERVICE) -> bool:
@@ -196,8 +205,8 @@ def has_flight_recorder(graph: GraphView, service: str = KEEP_SERVICE) -> bool:
     Check this before calling the service, because a call without a server waits for the whole time
     limit.
     """
-    known = graph.services.get(service)
-    return known is not None and bool(known.servers)
+    service_info = graph.services.get(service)
+    return service_info is not None and bool(service_info.servers)
 
 
 def keep(
@@ -228,8 +237,8 @@ def keep(
     with open_command_node("keep", master) as node:
         if not has_flight_recorder(node.graph(), f"{name}/keep"):
             raise NepError(_("nothing to save: 'nep recording ring' isn't running"))
-        answer = node.new_client(f"{name}/keep", timeout_s=SAVE_TIMEOUT_S).call(request_body)
-    result = answer if isinstance(answer, dict) else {}
+        reply = node.new_client(f"{name}/keep", timeout_s=SAVE_TIMEOUT_S).call(request_body)
+    result = reply if isinstance(reply, dict) else {}
     if as_json:
         show_json(result)
     else:

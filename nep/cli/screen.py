@@ -74,10 +74,10 @@ def json_highlighter() -> Callable[[str, str], Text]:
 
     highlight = JSONHighlighter()
 
-    def paint(head: str, body: str) -> Text:
+    def paint(header: str, body: str) -> Text:
         painted = Text(body)
         highlight.highlight(painted)
-        return Text.assemble((head, "dim"), "  ", painted)
+        return Text.assemble((header, "dim"), "  ", painted)
 
     return paint
 
@@ -167,15 +167,17 @@ def _column_widths(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]],
     widths = [
         max(
             display_width(line)
-            for cell in (column.heading, *(row[at] for row in rows))
+            for cell in (column.heading, *(row[index] for row in rows))
             for line in cell.split("\n")
         )
-        for at, column in enumerate(columns)
+        for index, column in enumerate(columns)
     ]
     is_fixed = [column.is_folded_last or column.justify == "right" for column in columns]
     while _total_width(widths) > room:
-        giving = [at for at, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH and not is_fixed[at]]
-        giving = giving or [at for at, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH]
+        giving = [
+            index for index, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH and not is_fixed[index]
+        ]
+        giving = giving or [index for index, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH]
         if not giving:
             break
         widths[max(giving, key=lambda at: widths[at])] -= 1
@@ -194,15 +196,15 @@ def show_alerts(alerts: Iterable[Alert], out: Terminal | None = None) -> None:
             console(stderr=True, out=out).print(text)
 
 
-def print_status(sentence: str, out: Terminal | None = None) -> None:
+def print_status(message: str, out: Terminal | None = None) -> None:
     """Print a status message to stderr or `out`, ignoring write errors."""
     with suppress(OSError):  # a closed stream is not an error
-        console(stderr=True, out=out).print(escaped(sentence), style="dim", markup=False)
+        console(stderr=True, out=out).print(escaped(message), style="dim", markup=False)
 
 
-def print_error_message(sentence: str) -> None:
+def print_error_message(message: str) -> None:
     """Print an error message to stderr."""
-    print_error(f"nep: {escaped(sentence, lines=True)}")  # plain text: unbuffered and readable for programs
+    print_error(f"nep: {escaped(message, lines=True)}")  # plain text: unbuffered and readable for programs
 
 
 def write(text: str) -> None:

@@ -81,19 +81,19 @@ def info(
 ) -> None:
     """Print information about a service: its type, servers and clients."""
     graph = query_graph(master, backend)
-    found = _find_service(service, graph)
+    service_info = _find_service(service, graph)
     if as_json:
-        show_json(convert_ids_to_text(_record(graph, found)))
+        show_json(convert_ids_to_text(_record(graph, service_info)))
         return
-    for head, value in (
-        (_("service"), escaped(found.name)),
-        (_("type"), service_type_text(found)),
-        (_("answered"), str(found.calls)),
-        (_("errors"), str(found.errors)),
+    for heading, value in (
+        (_("service"), escaped(service_info.name)),
+        (_("type"), service_type_text(service_info)),
+        (_("answered"), str(service_info.calls)),
+        (_("errors"), str(service_info.errors)),
     ):
-        write(f"{head}: {value}\n")
+        write(f"{heading}: {value}\n")
     write("\n")
-    show_table(_INFO_COLUMNS, _rows(graph, found))
+    show_table(_INFO_COLUMNS, _rows(graph, service_info))
     show_alerts(each for each in graph.alerts if each.id == f"service:{service}")
 
 
@@ -105,11 +105,11 @@ def show_type(
     as_json: JsonOption = False,
 ) -> None:
     """Print the type of a service."""
-    found = _find_service(service, query_graph(master, backend))
+    service_info = _find_service(service, query_graph(master, backend))
     if as_json:
-        show_json({"service": found.name, "msg_type": found.msg_type})
+        show_json({"service": service_info.name, "msg_type": service_info.msg_type})
     else:
-        write(f"{service_type_text(found)}\n")
+        write(f"{service_type_text(service_info)}\n")
 
 
 @app.command("find")
@@ -170,14 +170,14 @@ def call(
     as_json: JsonOption = False,
 ) -> None:
     """Call a service and print its reply."""
-    asked = _parse_request(request)
+    payload = _parse_request(request)
     with open_node("nep-service-call", master, backend) as node:
         client = node.new_client(service, timeout_s=_TIMEOUT_S if timeout_s is None else timeout_s)
-        answer = client.call(asked)
+        reply = client.call(payload)
     if as_json:
-        show_json(answer)
+        show_json(reply)
     else:
-        write(f"{format_payload(answer, whole=True)}\n")
+        write(f"{format_payload(reply, in_full=True)}\n")
 
 
 def _parse_request(text: str) -> object:
@@ -188,12 +188,12 @@ def _parse_request(text: str) -> object:
 
 
 def _find_service(service: str, graph: GraphView) -> ServiceInfo:
-    found = graph.services.get(service)
-    if found is None:
+    service_info = graph.services.get(service)
+    if service_info is None:
         check_service(service)
         template = _("no service '{service}'; {meant}'nep service list' shows all services")
         raise NepError(template.format(service=service, meant=suggestion(service, list(graph.services))))
-    return found
+    return service_info
 
 
 def _row(graph: GraphView, service: ServiceInfo) -> tuple[str, ...]:

@@ -113,15 +113,15 @@ def top(
     Files and pipes get one table after another. If the master goes down, the command waits for it.
     """
     graph = view(master)  # fail at once: the address may be wrong
-    shown = _GraphPrinter(pattern, order)
+    printer = _GraphPrinter(pattern, order)
     show: Callable[[GraphView, str], None]
     with _open_screen(as_json=as_json) as live:
         if as_json:
-            show = shown.show_json
+            show = printer.show_json
         elif live is None:
-            show = shown.show_plain
+            show = printer.show_plain
         else:
-            show = _LiveTables(shown, live).show
+            show = _LiveTables(printer, live).show
         _run(graph, show, every_s, count, master)
 
 
@@ -136,8 +136,10 @@ def _run(
         due = started + number * every_s
         if due < time.monotonic() - every_s:  # suspended computer or slow master
             started, due = time.monotonic() - number * every_s, time.monotonic()
-        while (left := due - time.monotonic()) > 0:
-            never.wait(min(left, _WAIT_SLICE_S))  # in slices: Ctrl+C does not interrupt a wait on Windows
+        while (remaining_s := due - time.monotonic()) > 0:
+            never.wait(
+                min(remaining_s, _WAIT_SLICE_S)
+            )  # in slices: Ctrl+C does not interrupt a wait on Windows
         try:
             graph, problem = view(master), ""
         except NepError as error:  # keep showing the last figures, below the reason
@@ -168,18 +170,18 @@ def _matches(name: str, pattern: str) -> bool:
 
 def topic_rows(graph: GraphView, pattern: str = "", order: TopicOrder = TopicOrder.RATE) -> list[TopicInfo]:
     """Return the topics whose names match `pattern`, sorted by `order` and then by name."""
-    found = sorted(
+    matching = sorted(
         (topic for topic in graph.topics.values() if _matches(topic.name, pattern)),
         key=lambda each: each.name,
     )
-    figures: Mapping[TopicOrder, Callable[[TopicInfo], float | None]] = {
+    sort_values: Mapping[TopicOrder, Callable[[TopicInfo], float | None]] = {
         TopicOrder.RATE: lambda each: each.rate_hz,
         TopicOrder.BANDWIDTH: lambda each: each.bandwidth_Bps,
         TopicOrder.LOST: lambda each: each.lost,
     }
-    if order in figures:
-        found.sort(key=lambda each: _sort_key(figures[order](each)), reverse=True)
-    return found
+    if order in sort_values:
+        matching.sort(key=lambda each: _sort_key(sort_values[order](each)), reverse=True)
+    return matching
 
 
 def node_rows(graph: GraphView) -> list[tuple[NodeInfo, float | None]]:
@@ -204,14 +206,14 @@ class _GraphPrinter:
         if problem:
             print_status(problem)
             return
-        plain = graph.to_plain()
+        plain_graph = graph.to_plain()
         names = {topic.name for topic in topic_rows(graph, self.pattern)}
-        topics = [each for each in plain["topics"] if each["name"] in names]  # type: ignore[attr-defined]  # a list
+        topics = [each for each in plain_graph["topics"] if each["name"] in names]  # type: ignore[attr-defined]  # a list
         record = {
             "stamp_ns": time.time_ns(),
             "topics": topics,
-            "nodes": plain["nodes"],
-            "alerts": plain["alerts"],
+            "nodes": plain_graph["nodes"],
+            "alerts": plain_graph["alerts"],
         }
         show_json(convert_ids_to_text(record))
 
@@ -266,8 +268,8 @@ class _GraphPrinter:
 class _LiveTables:
     """Full-screen tables, truncated to the terminal's height. Loss counts that have increased are yellow."""
 
-    def __init__(self, shown: _GraphPrinter, live: Live) -> None:
-        self._shown, self._live = shown, live
+    def __init__(self, printer: _GraphPrinter, live: Live) -> None:
+        self._shown, self._live = printer, live
         self._lost: dict[str, int] = {}
 
     def show(self, graph: GraphView, problem: str) -> None:
@@ -284,8 +286,8 @@ class _LiveTables:
         parts += notes[:_NODE_ROWS_DIVISOR]
         rows = [self._shown.topic_cells(graph, each) for each in above]
         grown = {
-            at
-            for at, each in enumerate(above)
+            index
+            for index, each in enumerate(above)
             if (each.lost or 0) > self._lost.get(each.name, each.lost or 0)
         }
         parts.append(_create_table(_TOPIC_COLUMNS, rows, len(topics) - len(above), grown))
@@ -296,7 +298,7 @@ class _LiveTables:
 
 
 def _create_table(
-    columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], left: int, grown: set[int]
+    columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], hidden_count: int, grown: set[int]
 ) -> RenderableType:
     from rich import box  # noqa: PLC0415 - only a terminal needs it
     from rich.table import Table  # noqa: PLC0415
@@ -304,15 +306,17 @@ def _create_table(
 
     table = Table(box=box.SIMPLE_HEAD, header_style="dim", pad_edge=False, show_edge=False)
     for number, column in enumerate(columns):
-        head = _(column.heading) if number or left <= 0 else f"{_(column.heading)} (+{left})"
+        heading = (
+            _(column.heading) if number or hidden_count <= 0 else f"{_(column.heading)} (+{hidden_count})"
+        )
         is_number = column.justify == "right"
         table.add_column(
-            head, justify=column.justify, style=column.style, no_wrap=True,
-            overflow="ellipsis", min_width=len(head) if is_number else None,
+            heading, justify=column.justify, style=column.style, no_wrap=True,
+            overflow="ellipsis", min_width=len(heading) if is_number else None,
         )  # fmt: skip
-    for at, row in enumerate(rows):
+    for index, row in enumerate(rows):
         texts = [Text(cell, style="dim" if cell == UNKNOWN else "") for cell in row]
-        if at in grown:
+        if index in grown:
             texts[-1].stylize("yellow bold")
         table.add_row(*texts)
     return table

@@ -63,23 +63,23 @@ def info(
 ) -> None:
     """Print information about a topic: its type, publishers and subscribers."""
     graph = query_graph(master, backend)
-    found = _find_topic(topic, graph)
+    topic_info = _find_topic(topic, graph)
     if as_json:
-        show_json(convert_ids_to_text(_record(graph, found)))
+        show_json(convert_ids_to_text(_record(graph, topic_info)))
         return
-    latched = any(each.latched for each in found.publishers)
-    for head, value in (
-        (_("topic"), escaped(found.name)),
-        (_("type"), escaped(found.msg_type)),
-        (_("codec"), escaped(found.codec)),
+    latched = any(each.latched for each in topic_info.publishers)
+    for heading, value in (
+        (_("topic"), escaped(topic_info.name)),
+        (_("type"), escaped(topic_info.msg_type)),
+        (_("codec"), escaped(topic_info.codec)),
         (_("latched"), _("yes") if latched else _("no")),
-        (_("rate"), format_rate(found.rate_hz)),
-        (_("bandwidth"), format_bandwidth(found)),
-        (_("lost"), _count_text(found.lost)),
+        (_("rate"), format_rate(topic_info.rate_hz)),
+        (_("bandwidth"), format_bandwidth(topic_info)),
+        (_("lost"), _count_text(topic_info.lost)),
     ):
-        write(f"{head}: {value}\n")
+        write(f"{heading}: {value}\n")
     write("\n")
-    show_table(_COLUMNS, _rows(graph, found))
+    show_table(_COLUMNS, _rows(graph, topic_info))
     show_alerts(each for each in graph.alerts if each.id.partition(":")[2] == topic)
 
 
@@ -90,11 +90,11 @@ def show_type(
     as_json: JsonOption = False,
 ) -> None:
     """Print the type of a topic."""
-    found = _find_topic(topic, query_graph(master, backend))
+    topic_info = _find_topic(topic, query_graph(master, backend))
     if as_json:
-        show_json({"topic": found.name, "msg_type": found.msg_type, "codec": found.codec})
+        show_json({"topic": topic_info.name, "msg_type": topic_info.msg_type, "codec": topic_info.codec})
     else:
-        write(f"{escaped(found.msg_type)}\n")
+        write(f"{escaped(topic_info.msg_type)}\n")
 
 
 def find(
@@ -117,16 +117,16 @@ def find(
 
 
 def _find_topic(topic: str, graph: GraphView) -> TopicInfo:
-    found = graph.topics.get(check_topic(topic))
-    if found is None and topic in graph.patterns:
+    topic_info = graph.topics.get(check_topic(topic))
+    if topic_info is None and topic in graph.patterns:
         template = _(
             "'{topic}' is a pattern, not a topic; 'nep node list' shows the nodes that subscribe to it"
         )
         raise NepError(template.format(topic=topic))
-    if found is None:
+    if topic_info is None:
         template = _("no topic '{topic}'; {meant}'nep topic list' shows all topics")
         raise NepError(template.format(topic=topic, meant=suggestion(topic, list(graph.topics))))
-    return found
+    return topic_info
 
 
 def _record(graph: GraphView, topic: TopicInfo) -> dict[str, object]:

@@ -22,19 +22,19 @@ _GRAPH_TIMEOUT_S = 0.3
 """Time limit of a graph query in seconds; short, because waiting for a missing master delays messages."""
 
 
-def is_pattern(word: str) -> bool:
+def is_pattern(argument: str) -> bool:
     """Return True if a word is a topic pattern; words with brackets or quotes are field paths."""
-    return is_glob(word) and not any(letter in word for letter in "[\"'")
+    return is_glob(argument) and not any(letter in argument for letter in "[\"'")
 
 
 class TopicPatterns:
     """Tracker of published topics that match patterns. Queries the graph once a second."""
 
-    def __init__(self, node: Node, patterns: Sequence[str], known: Collection[str]) -> None:
+    def __init__(self, node: Node, patterns: Sequence[str], subscribed: Collection[str]) -> None:
         # `known`: topics that are already subscribed. Raises `BadTopicError` for an invalid pattern.
         self.patterns = tuple(map(check_topic, patterns))
         self._node = node
-        self._known = set(known)
+        self._known = set(subscribed)
         self._reported: set[str] = set()
         self._poll_at = 0.0
 
@@ -51,13 +51,13 @@ class TopicPatterns:
                 if not any(matches(pattern, name) for name in published):
                     template = _("no topic matches '{pattern}' yet; waiting (Ctrl+C to stop)")
                     print_status(template.format(pattern=pattern))
-        found = [
+        matching = [
             (name, published[name].msg_type)
             for name in sorted(published.keys() - self._known)
             if any(matches(pattern, name) for pattern in self.patterns)
         ]
-        self._known.update(name for name, _type in found)
-        return found
+        self._known.update(name for name, _type in matching)
+        return matching
 
     def poll(self) -> list[tuple[str, str]]:
         """Return (name, type) of new matching topics; query the graph at most once a second.

@@ -45,9 +45,9 @@ class TopicMonitor:
     def update(self, graph: GraphView) -> None:
         """Report topics that have no publisher, or have lost their last one, and suggest similar names."""
         for topic in self._types:
-            known = graph.topics.get(topic)
-            if known is not None and known.publishers:
-                self._types[topic] = known.msg_type
+            topic_info = graph.topics.get(topic)
+            if topic_info is not None and topic_info.publishers:
+                self._types[topic] = topic_info.msg_type
                 self._published_before.add(topic)
                 self._silent.discard(topic)
             elif topic not in self._silent:
@@ -82,5 +82,5 @@ class TopicMonitor:
 
 def suggestion(topic: str, names: Sequence[str]) -> str:
     """Return "did you mean ...?" with a trailing space, or "" if no name is similar to `topic`."""
-    near = nearest(topic, names)
-    return "" if near is None else _("did you mean '{near}'?").format(near=near) + " "
+    nearest_name = nearest(topic, names)
+    return "" if nearest_name is None else _("did you mean '{near}'?").format(near=nearest_name) + " "

@@ -50,18 +50,18 @@ _UsageError: Any = typer.BadParameter.__mro__[1]
 
 def translated(english: str) -> str:
     """Translate a usage error of typer; an unknown message is returned unchanged."""
-    for words, pattern in _usage_error_patterns():
-        found = pattern.fullmatch(english)
-        if found is not None:
-            return _(words).format(**{name: translated(value) for name, value in found.groupdict().items()})
+    for message, pattern in _usage_error_patterns():
+        match = pattern.fullmatch(english)
+        if match is not None:
+            return _(message).format(**{name: translated(value) for name, value in match.groupdict().items()})
     return english
 
 
 @cache
 def _usage_error_patterns() -> Sequence[tuple[str, re.Pattern[str]]]:
     return [
-        (words, re.compile(re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>.+)", re.escape(words)), re.DOTALL))
-        for words in _USAGE_ERRORS
+        (message, re.compile(re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>.+)", re.escape(message)), re.DOTALL))
+        for message in _USAGE_ERRORS
     ]
 
 
@@ -71,16 +71,16 @@ def _translate_usage_errors() -> Iterator[None]:
         yield
     except _UsageError as error:
         english = error.format_message()
-        words = escaped(translated(english), lines=True)  # may contain untrusted names
-        if words == english:
+        message = escaped(translated(english), lines=True)  # may contain untrusted names
+        if message == english:
             raise
-        raise _UsageError(words, ctx=error.ctx) from error
+        raise _UsageError(message, ctx=error.ctx) from error
 
 
 def _translate_help_texts(parameters: Sequence[Any]) -> Sequence[Any]:
-    for each in parameters:
-        if getattr(each, "help", None) in _BUILTIN_HELP_TEXTS:
-            each.help = _(each.help)
+    for parameter in parameters:
+        if getattr(parameter, "help", None) in _BUILTIN_HELP_TEXTS:
+            parameter.help = _(parameter.help)
     return parameters
 
 
@@ -125,10 +125,10 @@ class TranslatedGroup(TyperGroup):
         """Write the translated usage line."""
         _write_usage(self, ctx, formatter)
 
-    def make_context(self, *given: Any, **named: Any) -> Any:  # noqa: ANN401
+    def make_context(self, *args: Any, **kwargs: Any) -> Any:  # noqa: ANN401
         """Parse the command line, translating usage errors."""
         with _translate_usage_errors():
-            return super().make_context(*given, **named)
+            return super().make_context(*args, **kwargs)
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401
         """Run the command, translating usage errors."""

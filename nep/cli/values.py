@@ -75,17 +75,17 @@ def convert_ids_to_text(value: object) -> object:
     return [convert_ids_to_text(each) for each in value] if isinstance(value, (list, tuple)) else value
 
 
-def format_payload(value: object, *, whole: bool, indent: bool = False) -> str:
+def format_payload(value: object, *, in_full: bool, indent: bool = False) -> str:
     """Format a payload for people as JSON that may contain NaN.
 
     Args:
         value: Decoded payload.
-        whole: True to print long values in full; otherwise they are shortened.
+        in_full: True to print long values in full; otherwise they are shortened.
         indent: True for one line per item.
     """
     limits = (
         (math.inf, math.inf, math.inf, _MAX_JSON_DEPTH)
-        if whole
+        if in_full
         else (MAX_ITEMS, MAX_FIELDS, MAX_CHARACTERS, MAX_DEPTH)
     )
     return encode_json(_shorten_value(value, *limits), indent=indent).decode()
@@ -110,23 +110,23 @@ def _shorten_value(value: object, items: float, fields: float, letters: float, d
 def _shorten_map(
     value: Mapping[object, object], items: float, fields: float, letters: float, depth: float
 ) -> object:
-    shown: dict[str, object] = {}
-    for number, (key, each) in enumerate(value.items()):
+    result: dict[str, object] = {}
+    for number, (key, item) in enumerate(value.items()):
         if number >= fields:
-            shown["…"] = _("{count} more").format(count=len(value) - number)
+            result["…"] = _("{count} more").format(count=len(value) - number)
             break
-        shown[_key_text(key)] = _shorten_value(each, items, fields, letters, depth - 1)
-    return shown
+        result[_key_text(key)] = _shorten_value(item, items, fields, letters, depth - 1)
+    return result
 
 
 def _shorten_list(
     value: Sequence[object], items: float, fields: float, letters: float, depth: float
 ) -> object:
     count = len(value) if len(value) <= items else int(items)
-    shown = [_shorten_value(each, items, fields, letters, depth - 1) for each in value[:count]]
+    result = [_shorten_value(each, items, fields, letters, depth - 1) for each in value[:count]]
     if count < len(value):
-        shown.append(orjson.Fragment(_("… {count} more").format(count=len(value) - count).encode()))
-    return shown
+        result.append(orjson.Fragment(_("… {count} more").format(count=len(value) - count).encode()))
+    return result
 
 
 def service_type_text(service: ServiceInfo) -> str:

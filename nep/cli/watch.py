@@ -105,27 +105,27 @@ class _EventPrinter:
         self._console = console()
 
     def event(self, event: AlarmEvent) -> None:
-        what = escaped(event_text(event.rule.condition, event.value))
+        text = escaped(event_text(event.rule.condition, event.value))
         if event.kind == "off":
             template = _("resolved after {seconds:.1f} s: {what}")
-            what = template.format(seconds=event.duration_s, what=what)
+            text = template.format(seconds=event.duration_s, what=text)
             if event.count > 1:
-                what += " " + _("(occurred {count} times)").format(count=event.count)
+                text += " " + _("(occurred {count} times)").format(count=event.count)
         elif event.is_snoozed:
-            what = _("{what} (snoozed)").format(what=what)
-        self._show(event.kind, event.at_s, what)
+            text = _("{what} (snoozed)").format(what=text)
+        self._show(event.kind, event.at_s, text)
 
-    def action(self, _rule: AlarmRule, words: str, at_s: float) -> None:
-        self._show("", at_s, f"  {escape_for_terminal(words)}")
+    def action(self, _rule: AlarmRule, text: str, at_s: float) -> None:
+        self._show("", at_s, f"  {escape_for_terminal(text)}")
 
-    def _show(self, kind: str, at_s: float, words: str) -> None:
+    def _show(self, kind: str, at_s: float, text: str) -> None:
         stamp = datetime.fromtimestamp(at_s, tz=timezone.utc).astimezone().strftime("%H:%M:%S.%f")[:-3]
         if not self._console.is_terminal:
-            write(f"{stamp}  {words}\n")
+            write(f"{stamp}  {text}\n")
             return
         from rich.text import Text  # noqa: PLC0415 - see `nep.cli.screen.console`
 
-        self._console.print(Text.assemble((stamp, "dim"), "  ", (words, _STYLES.get(kind, ""))))
+        self._console.print(Text.assemble((stamp, "dim"), "  ", (text, _STYLES.get(kind, ""))))
 
 
 class _JsonEventPrinter:
@@ -145,8 +145,8 @@ class _JsonEventPrinter:
             }
         )
 
-    def action(self, rule: AlarmRule, words: str, at_s: float) -> None:
-        show_json({"alarm": rule.id, "event": "did", "at_s": at_s, "what": words})
+    def action(self, rule: AlarmRule, text: str, at_s: float) -> None:
+        show_json({"alarm": rule.id, "event": "did", "at_s": at_s, "what": text})
 
 
 # ---- evaluation
@@ -193,9 +193,9 @@ class _AlarmRunner:
         if sends:
             self._guard.wait_for_descriptions(_ROBOT_DISCOVERY_S)
         for action in sends:
-            refusal = self._guard.denial_reason(action.name, action.msg_type)
-            if refusal:
-                raise typer.BadParameter(refusal)
+            reason = self._guard.denial_reason(action.name, action.msg_type)
+            if reason:
+                raise typer.BadParameter(reason)
 
     def show_rules(self) -> None:
         rules = [rule for rule in self.alarms.rules if rule.is_enabled]
@@ -256,11 +256,11 @@ class _AlarmRunner:
             info = view.topics.get(topic)
             if info is None or not info.publishers:
                 continue  # its type is unknown until it is published
-            held = self._subscribers.get(topic)
-            if held is not None and held[0] != info.msg_type:
-                held[1].close()
-                held = None
-            if held is None:
+            existing = self._subscribers.get(topic)
+            if existing is not None and existing[0] != info.msg_type:
+                existing[1].close()
+                existing = None
+            if existing is None:
                 subscriber = self._node.new_sub(
                     topic, info.msg_type, sink=self._create_sink(topic), wildcards=False
                 )
@@ -276,13 +276,13 @@ class _AlarmRunner:
         topics = [name for name, info in view.topics.items() if info.publishers]
         nodes = [info.name for info in view.nodes.values()]
         for condition in (rule.condition for rule in self.alarms.rules if rule.is_enabled):
-            known = nodes if condition.is_about_node else topics
-            if condition.name in known or condition.kind in {"appears", "comes"}:
+            names = nodes if condition.is_about_node else topics
+            if condition.name in names or condition.kind in {"appears", "comes"}:
                 continue
-            near = nearest(condition.name, known)
-            meant = "" if near is None else " " + _("did you mean '{near}'?").format(near=near)
+            nearest_name = nearest(condition.name, names)
+            hint = "" if nearest_name is None else " " + _("did you mean '{near}'?").format(near=nearest_name)
             print_status(
-                _("'{name}' doesn't exist yet; waiting.{meant}").format(name=condition.name, meant=meant)
+                _("'{name}' doesn't exist yet; waiting.{meant}").format(name=condition.name, meant=hint)
             )
 
     # ---- actions
@@ -291,46 +291,48 @@ class _AlarmRunner:
         self._guard.poll()  # alarms are rare, and a robot may just have connected
         return self._guard.denial_reason(topic, msg_type)
 
-    def _run_command(self, _event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
-        self._commands.start_action(self._node, action, done)
+    def _run_command(self, _event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
+        self._commands.start_action(self._node, action, on_done)
 
-    def _save_flight_recorder(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
+    def _save_flight_recorder(self, event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
         if self._view is None or not has_flight_recorder(self._view):
-            done(False, _("nothing saved: 'nep recording ring' isn't running"))
+            on_done(False, _("nothing saved: 'nep recording ring' isn't running"))
             return
-        asked = {"seconds": action.recording_s, "note": event_text(event.rule.condition, event.value)}
+        request = {"seconds": action.recording_s, "note": event_text(event.rule.condition, event.value)}
         try:
             if self._save_client is None:
                 self._save_client = self._node.new_client(KEEP_SERVICE, timeout_s=SAVE_TIMEOUT_S)
-            self._save_client.call_async(asked).add_done_callback(lambda ended: _report_saved(ended, done))
+            self._save_client.call_async(request).add_done_callback(
+                lambda ended: _report_saved(ended, on_done)
+            )
         except NepError as error:
-            done(False, _("nothing saved: {reason}").format(reason=error))
+            on_done(False, _("nothing saved: {reason}").format(reason=error))
 
-    def _ring_bell(self, _event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
+    def _ring_bell(self, _event: AlarmEvent, _action: AlarmAction, on_done: DoneCallback) -> None:
         if sys.stderr.isatty():
             sys.stderr.write("\a")
             sys.stderr.flush()
-        done(True, "")
+        on_done(True, "")
 
-    def _skip_studio_action(self, _event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
+    def _skip_studio_action(self, _event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
         template = _("this action needs Studio: {action}")
-        done(False, template.format(action=action_text(action)))
+        on_done(False, template.format(action=action_text(action)))
 
     def _show_actions(self) -> None:
-        for rule, words, at_s in self.alarms.take_action_results():
-            if words:
-                self._out.action(rule, words, at_s)
+        for rule, text, at_s in self.alarms.take_action_results():
+            if text:
+                self._out.action(rule, text, at_s)
 
 
-def _report_saved(ended: Future[object], done: DoneCallback) -> None:
+def _report_saved(ended: Future[object], on_done: DoneCallback) -> None:
     error = None if ended.cancelled() else ended.exception()
     if error is not None or ended.cancelled():
-        done(False, _("nothing saved: {reason}").format(reason=error or ""))
+        on_done(False, _("nothing saved: {reason}").format(reason=error or ""))
     else:
         result = ended.result()
         path = result.get("path") if isinstance(result, dict) else ""
-        done(True, _("saved {file}").format(file=path))
+        on_done(True, _("saved {file}").format(file=path))
 
 
-def _do_nothing(_event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
-    done(True, "")
+def _do_nothing(_event: AlarmEvent, _action: AlarmAction, on_done: DoneCallback) -> None:
+    on_done(True, "")

@@ -142,19 +142,19 @@ def _read_or_create_token(file: Path | None, *, is_needed: bool) -> str:
         if not file.exists():
             return _create_token_file(file)
         with file.open("rb") as opened:
-            found = opened.read(_MAX_TOKEN_BYTES).decode("utf-8", "replace").strip()
+            token = opened.read(_MAX_TOKEN_BYTES).decode("utf-8", "replace").strip()
     except OSError as error:
         raise NepError(
             _("can't use the token file '{file}': {reason}").format(file=file, reason=error.strerror)
         ) from error
-    if len(found) < _MIN_TOKEN_LENGTH or not found.isascii() or not found.isprintable():
+    if len(token) < _MIN_TOKEN_LENGTH or not token.isascii() or not token.isprintable():
         raise NepError(
             _(
                 "the token in '{file}' is shorter than {least} characters or not printable ASCII; delete the "
                 "file to create a new one"
             ).format(file=file, least=_MIN_TOKEN_LENGTH)
         )
-    return found
+    return token
 
 
 def _create_token_file(file: Path) -> str:
@@ -179,8 +179,8 @@ def _print_start_message(server: WebServer, terminal: Terminal, *, token_file: P
     page_url = f"http://{hosts[0]}:{server.port}{query or '/'}"
     out.print(_("  test page: {url}").format(url=page_url), style="dim")
     if token_file is not None:
-        words = _("  append /?token=TOKEN to the URL, with the token in {file}")
-        out.print(words.format(file=token_file), style="dim")
+        message = _("  append /?token=TOKEN to the URL, with the token in {file}")
+        out.print(message.format(file=token_file), style="dim")
     if not server.settings.access.origins:
         out.print(
             _("  pages from web servers on other computers require --origin"),
@@ -188,22 +188,22 @@ def _print_start_message(server: WebServer, terminal: Terminal, *, token_file: P
         )
     address = master_address(server.settings.master)
     if not is_running(address, _MASTER_TIMEOUT_S):
-        words = _("no master at '{address}'; start one with 'nep master'")
-        print_status(words.format(address=address), terminal)
+        message = _("no master at '{address}'; start one with 'nep master'")
+        print_status(message.format(address=address), terminal)
     out.print(_("  press Ctrl+C to stop"), style="dim")
 
 
 def _network_hosts(listen: Collection[str]) -> list[str]:
-    return [own.host for own in own_addresses()] if ANY_HOST in listen else list(listen)
+    return [own_address.host for own_address in own_addresses()] if ANY_HOST in listen else list(listen)
 
 
 def _print_summary(server: WebServer, terminal: Terminal) -> None:
     counts = server.counts
     if not (counts.opened or counts.turned_away):
         return
-    words = ngettext("{count} connection", "{count} connections", counts.opened).format(count=counts.opened)
-    words += _(
+    summary = ngettext("{count} connection", "{count} connections", counts.opened).format(count=counts.opened)
+    summary += _(
         ", {turned_away} rejected; {operations} operations, {rejected} rejected; {sent} messages "
         "sent, {dropped} dropped"
     ).format(**counts.as_map())
-    print_status(words, terminal)
+    print_status(summary, terminal)

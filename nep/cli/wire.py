@@ -88,23 +88,23 @@ def check(
 def _show_rules(rules: list[conformance.Rule], *, as_json: bool) -> None:
     if as_json:
         show_json(
-            [{"id": each.id, "requirement": _(each.requirement), "features": each.features} for each in rules]
+            [{"id": rule.id, "requirement": _(rule.requirement), "features": rule.features} for rule in rules]
         )
         return
-    width = max(len(each.id) for each in rules)
-    for each in rules:
-        write(f"{each.id:{width}}  {_(each.requirement)}\n")
+    width = max(len(rule.id) for rule in rules)
+    for rule in rules:
+        write(f"{rule.id:{width}}  {_(rule.requirement)}\n")
 
 
 def _show_outcome(outcome: conformance.Outcome) -> None:
     from rich.text import Text  # noqa: PLC0415 - see `nep.cli.screen.console`
 
-    words = {"passed": _("passed"), "failed": _("failed"), "skipped": _("skipped")}
+    labels = {"passed": _("passed"), "failed": _("failed"), "skipped": _("skipped")}
     out = console()
-    out.print(Text.assemble((words[outcome.status], _STYLES[outcome.status]), f"  {outcome.rule.id}"))
+    out.print(Text.assemble((labels[outcome.status], _STYLES[outcome.status]), f"  {outcome.rule.id}"))
     if outcome.status == "failed":
-        plain = outcome.to_plain()
-        for line in (plain["requirement"], outcome.observed, plain["section"]):
+        fields = outcome.to_plain()
+        for line in (fields["requirement"], outcome.observed, fields["section"]):
             out.print(Text(f"    {escaped(str(line))}"))
     elif outcome.status == "skipped":
         out.print(Text(f"    {escaped(outcome.observed)}", "dim"))

@@ -62,19 +62,19 @@ class BadRequestCounter:
             reason: Reason why the request is malformed.
             now: Current time.
         """
-        known = self._senders.pop(sender, None) or _Sender(name)
-        self._senders[sender] = known
-        known.name, known.reason, known.last_request_at = (
+        entry = self._senders.pop(sender, None) or _Sender(name)
+        self._senders[sender] = entry
+        entry.name, entry.reason, entry.last_request_at = (
             name,
             escaped(shortened(reason, _MAX_REASON_LENGTH)),
             now,
         )
-        known.count += 1
+        entry.count += 1
         self._log_tokens = min(_LOG_BURST, self._log_tokens + (now - self._refilled_at) * _LOG_RATE_HZ)
         self._refilled_at = now
-        if is_logged(known.count) and self._log_tokens >= 1.0:
+        if is_logged(entry.count) and self._log_tokens >= 1.0:
             self._log_tokens -= 1.0
-            _logger.warning("%s", _alert_text(known))
+            _logger.warning("%s", _alert_text(entry))
         while len(self._senders) > _MAX_SENDERS:
             self._senders.popitem(last=False)
 
@@ -89,21 +89,21 @@ class BadRequestCounter:
         return self._alerts
 
     def _current_alerts(self, now: float) -> tuple[Alert, ...]:
-        shown = [
-            (sender, known)
-            for sender, known in reversed(self._senders.items())
-            if now - known.last_request_at < _ALERT_DURATION_S
+        recent = [
+            (sender, entry)
+            for sender, entry in reversed(self._senders.items())
+            if now - entry.last_request_at < _ALERT_DURATION_S
         ]
         alerts = [
-            Alert(f"request:{sender}", _alert_text(known), _(_HINT)) for sender, known in shown[:_MAX_ALERTS]
+            Alert(f"request:{sender}", _alert_text(entry), _(_HINT)) for sender, entry in recent[:_MAX_ALERTS]
         ]
-        if len(shown) > _MAX_ALERTS:
-            sentence = ngettext(
+        if len(recent) > _MAX_ALERTS:
+            text = ngettext(
                 "{count} more program sends requests that the master can't read",
                 "{count} more programs send requests that the master can't read",
-                len(shown) - _MAX_ALERTS,
-            ).format(count=len(shown) - _MAX_ALERTS)
-            alerts.append(Alert("request:", sentence, _(_HINT)))
+                len(recent) - _MAX_ALERTS,
+            ).format(count=len(recent) - _MAX_ALERTS)
+            alerts.append(Alert("request:", text, _(_HINT)))
         return tuple(sorted(alerts, key=lambda each: each.id))
 
 
@@ -126,9 +126,9 @@ def describe_sender(node_id: str, node_name: str, peer: str) -> tuple[str, str]:
 
 
 def _alert_text(sender: _Sender) -> str:
-    words = ngettext(
+    template = ngettext(
         "{program} sent a request that the master can't read: {reason}",
         "{program} sent {count} requests that the master can't read: {reason}",
         sender.count,
     )
-    return words.format(program=sender.name, count=sender.count, reason=sender.reason)
+    return template.format(program=sender.name, count=sender.count, reason=sender.reason)

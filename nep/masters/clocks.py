@@ -52,14 +52,14 @@ class Clocks:
 
     def differences(self, member: RegisteredNode, now: float) -> ClockDifferences:
         """Return the known clock differences to remote nodes whose publishers the node receives."""
-        own = member.clock
-        if own is None:
+        own_clock = member.clock
+        if own_clock is None:
             return {}
         found: ClockDifferences = {}
         for other in self._registry.remote_nodes_of(member):
             if other.clock is not None:
-                uncertainty_ns = _uncertainty_ns(own, now) + _uncertainty_ns(other.clock, now)
-                found[other.node.id] = other.clock.offset_ns - own.offset_ns, uncertainty_ns
+                uncertainty_ns = _uncertainty_ns(own_clock, now) + _uncertainty_ns(other.clock, now)
+                found[other.node.id] = other.clock.offset_ns - own_clock.offset_ns, uncertainty_ns
         return found
 
     def renewal_timestamps(

@@ -39,21 +39,21 @@ class DepartedPublishers(Generic[P]):
         """Return the stored publishers of a topic or pattern by id. The result must not be modified."""
         return self._by_name.get(topic, {})
 
-    def add(self, names: Iterable[str], publisher: int, what: P) -> None:
+    def add(self, names: Iterable[str], publisher: int, value: P) -> None:
         """Add an unregistered publisher.
 
         Args:
             names: Topic of the publisher and the patterns that matched the topic.
             publisher: Id of the publisher.
-            what: Value to store for the publisher.
+            value: Value to store for the publisher.
         """
         self._remove(publisher)
         self._names[publisher] = frozenset(names)
         for name in self._names[publisher]:
-            found = self._by_name.setdefault(name, {})
-            found[publisher] = what
-            if len(found) > _MAX_PUBLISHERS_PER_TOPIC:
-                del found[next(iter(found))]
+            publishers = self._by_name.setdefault(name, {})
+            publishers[publisher] = value
+            if len(publishers) > _MAX_PUBLISHERS_PER_TOPIC:
+                del publishers[next(iter(publishers))]
         if len(self._names) > _MAX_PUBLISHERS:
             self._remove(next(iter(self._names)))
 
@@ -69,7 +69,7 @@ class DepartedPublishers(Generic[P]):
         names = self._names.pop(publisher, frozenset())
         self.changes += bool(names)
         for name in names:
-            found = self._by_name.get(name, {})
-            found.pop(publisher, None)
-            if not found:
+            publishers = self._by_name.get(name, {})
+            publishers.pop(publisher, None)
+            if not publishers:
                 self._by_name.pop(name, None)

@@ -85,30 +85,30 @@ class OutgoingMessage(NamedTuple):
     call: int | None = None
 
 
-def without_nodes(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
+def without_nodes(reply: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
     """Return a copy of an answer that doesn't contain the given nodes, which have turned out to be dead."""
-    if isinstance(answer, FoundReply) and node_ids:
+    if isinstance(reply, FoundReply) and node_ids:
         return replace(
-            answer, publishers=tuple(each for each in answer.publishers if each.node_id not in node_ids)
+            reply, publishers=tuple(each for each in reply.publishers if each.node_id not in node_ids)
         )
-    if isinstance(answer, AddedReply) and node_ids:
+    if isinstance(reply, AddedReply) and node_ids:
         return replace(
-            answer,
-            expected=tuple(each for each in answer.expected if each.node_id not in node_ids),
-            hung=tuple(each for each in answer.hung if each.node_id not in node_ids),
+            reply,
+            expected=tuple(each for each in reply.expected if each.node_id not in node_ids),
+            hung=tuple(each for each in reply.hung if each.node_id not in node_ids),
         )
-    return answer
+    return reply
 
 
-def with_hosts(answer: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
+def with_hosts(reply: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
     """Return a copy of an answer that contains the addresses at which the master serves other computers."""
     if not hosts:
-        return answer
-    if isinstance(answer, AddedReply | FoundReply | RenewedReply):
-        return replace(answer, hosts=hosts)
-    if isinstance(answer, GraphReply):
-        return replace(answer, view=replace(answer.view, listens=hosts))
-    return answer
+        return reply
+    if isinstance(reply, AddedReply | FoundReply | RenewedReply):
+        return replace(reply, hosts=hosts)
+    if isinstance(reply, GraphReply):
+        return replace(reply, view=replace(reply.view, listens=hosts))
+    return reply
 
 
 class Graph:
@@ -274,14 +274,14 @@ class Graph:
         if other is not None and other.node.id != node.id:
             reason = _("this connection already belongs to the node '{id}'").format(id=other.node.id)
             raise WireError(reason, code="connection")
-        known = self._registry.members.get(node.id)
-        if known is None or known.route == sender:
+        member = self._registry.members.get(node.id)
+        if member is None or member.route == sender:
             return
         if not node.key:
             reason = _("the id '{id}' belongs to a node of another program").format(id=node.id)
             raise WireError(reason, code="node-taken")
-        if not is_proven(known.node):
-            self._unregister_node(known, out, is_closed=False)
+        if not is_proven(member.node):
+            self._unregister_node(member, out, is_closed=False)
 
     def _authorize_record(
         self, node: NodeRecord, record: PublisherRecord | SubscriberRecord, out: list[OutgoingMessage]
@@ -298,8 +298,8 @@ class Graph:
         owner = owners.get(record.id)
         if owner is None or owner.node.id == node.id:
             return
-        theirs = (owner.publishers if is_publisher else owner.subscribers)[record.id].record
-        if not is_proven(node, record) or is_proven(owner.node, theirs):
+        existing = (owner.publishers if is_publisher else owner.subscribers)[record.id].record
+        if not is_proven(node, record) or is_proven(owner.node, existing):
             raise WireError(
                 _("the id {id} belongs to a publisher or subscriber of another program").format(id=record.id),
                 code="record-taken",
@@ -312,9 +312,9 @@ class Graph:
     def _check_limits(self, request: Join | AddPublisher | AddSubscriber, count: int) -> None:
         registry = self._registry
         member = registry.members.get(request.node.id)
-        held = 0 if member is None else len(member.publishers) + len(member.subscribers)
-        needed = count if isinstance(request, Join) else held + 1
-        if needed > max(held, MAX_RECORDS_PER_NODE):
+        registered_count = 0 if member is None else len(member.publishers) + len(member.subscribers)
+        needed = count if isinstance(request, Join) else registered_count + 1
+        if needed > max(registered_count, MAX_RECORDS_PER_NODE):
             raise WireError(
                 _("a node can have at most {RECORDS_MAX} publishers and subscribers").format(
                     RECORDS_MAX=MAX_RECORDS_PER_NODE
@@ -323,7 +323,10 @@ class Graph:
             )
         self._check_pattern_limits(request)
         total = len(registry.publisher_owners) + len(registry.subscriber_owners)
-        if needed > max(held, GUARANTEED_RECORDS) and total + needed - held > MAX_RECORDS:
+        if (
+            needed > max(registered_count, GUARANTEED_RECORDS)
+            and total + needed - registered_count > MAX_RECORDS
+        ):
             raise WireError(
                 _("the graph already has {ALL_RECORDS_MAX} publishers and subscribers, the maximum").format(
                     ALL_RECORDS_MAX=MAX_RECORDS
@@ -336,12 +339,12 @@ class Graph:
         if not new:
             return
         member = self._registry.members.get(request.node.id)
-        known = () if member is None else member.subscribers.values()
-        held = {each.record.id for each in known if each.record.pattern}
-        needed = new if isinstance(request, Join) else held | new
-        total = len(self._registry.patterns) - len(held) + len(needed)
+        subscribers = () if member is None else member.subscribers.values()
+        registered = {each.record.id for each in subscribers if each.record.pattern}
+        needed = new if isinstance(request, Join) else registered | new
+        total = len(self._registry.patterns) - len(registered) + len(needed)
         limit = max(len(self._registry.patterns), MAX_PATTERNS)
-        if len(needed) > max(len(held), MAX_PATTERNS_PER_NODE) or total > limit:
+        if len(needed) > max(len(registered), MAX_PATTERNS_PER_NODE) or total > limit:
             raise WireError(
                 _(
                     "a node can have at most {PATTERNS_MAX} subscribers with wildcards, and all nodes "
@@ -421,14 +424,14 @@ class Graph:
         check_record(request.subscriber)
         member = self._register_node(request.node, now, sender)
         self._registry.add_subscriber(member, request.subscriber)
-        found = tuple(
+        remotes = tuple(
             remote
             for topic in sorted(self._registry.topics_of(request.subscriber))
             for remote in self._registry.publishers_of(topic)
         )
         # if a probe can't be sent, the dead publisher is removed from the reply
-        out.extend(self.probes_for(sorted({remote.node_id for remote in found} - {member.node.id})))
-        return FoundReply(self.epoch, self.revision, found, pattern=request.subscriber.pattern)
+        out.extend(self.probes_for(sorted({remote.node_id for remote in remotes} - {member.node.id})))
+        return FoundReply(self.epoch, self.revision, remotes, pattern=request.subscriber.pattern)
 
     def _join(self, request: Join, now: float, sender: str, out: list[OutgoingMessage]) -> Reply:
         records: tuple[PublisherRecord | SubscriberRecord, ...] = (*request.publishers, *request.subscribers)
@@ -436,18 +439,18 @@ class Graph:
             check_record(record)
         member = self._register_node(request.node, now, sender, is_managed=request.managed)
         registered = {record.id for record in request.publishers}
-        for gone in [known for known in member.publishers if known not in registered]:
-            self._registry.remove_publisher(member.node.id, gone)
+        for removed_id in [record_id for record_id in member.publishers if record_id not in registered]:
+            self._registry.remove_publisher(member.node.id, removed_id)
         registered = {record.id for record in request.subscribers}
-        for gone in [known for known in member.subscribers if known not in registered]:
-            self._registry.remove_subscriber(member.node.id, gone)
+        for removed_id in [record_id for record_id in member.subscribers if record_id not in registered]:
+            self._registry.remove_subscriber(member.node.id, removed_id)
         for subscriber in request.subscribers:
             self._registry.add_subscriber(member, subscriber)
         for publisher in request.publishers:
             self._register_publisher(member, publisher, out, is_new=False)
         topics = self._registry.topics_received_by(member)
-        found = [remote for topic in sorted(topics) for remote in self._registry.publishers_of(topic)]
-        return FoundReply(self.epoch, self.revision, tuple(found))
+        remotes = [remote for topic in sorted(topics) for remote in self._registry.publishers_of(topic)]
+        return FoundReply(self.epoch, self.revision, tuple(remotes))
 
     def _renew_member(self, renewal: RawRenewal, now: float, sender: str) -> RegisteredNode | None:
         # None: the node must join again.
@@ -502,20 +505,20 @@ class Graph:
         last_seq = member.publishers[publisher].last_seq
         record = self._registry.remove_publisher(member.node.id, publisher)
         if record is not None:
-            gone = PublisherRemoved(self.epoch, self.revision, record.id, record.topic, False, last_seq)
-            self._notify_subscribers(record, gone, out)
+            removal = PublisherRemoved(self.epoch, self.revision, record.id, record.topic, False, last_seq)
+            self._notify_subscribers(record, removal, out)
 
     def _remove_publisher(self, request: RemovePublisher, out: list[OutgoingMessage]) -> None:
         member = self._registry.members.get(request.node_id)
-        known = member.publishers.get(request.id) if member is not None else None
-        if known is not None:
-            self._registry.update_last_message(known, request.last_seq, known.last_stamp_ns)
+        publisher = member.publishers.get(request.id) if member is not None else None
+        if publisher is not None:
+            self._registry.update_last_message(publisher, request.last_seq, publisher.last_stamp_ns)
         record = self._registry.remove_publisher(request.node_id, request.id)
         if record is not None:
-            gone = PublisherRemoved(
+            removal = PublisherRemoved(
                 self.epoch, self.revision, record.id, record.topic, is_closed=True, last_seq=request.last_seq
             )
-            self._notify_subscribers(record, gone, out)
+            self._notify_subscribers(record, removal, out)
 
     # ---- notifying subscribers
 
@@ -532,7 +535,7 @@ class Graph:
         publishers = list(member.publishers.values())
         self._registry.remove_node(member.node.id)
         for publisher in publishers:
-            gone = PublisherRemoved(
+            removal = PublisherRemoved(
                 self.epoch,
                 self.revision,
                 publisher.record.id,
@@ -540,7 +543,7 @@ class Graph:
                 is_closed=is_closed,
                 last_seq=publisher.last_seq,
             )
-            self._notify_subscribers(publisher.record, gone, out)
+            self._notify_subscribers(publisher.record, removal, out)
 
     def _notify_subscribers(self, record: PublisherRecord, push: Push, out: list[OutgoingMessage]) -> None:
         notified: set[str] = set()

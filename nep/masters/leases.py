@@ -132,16 +132,16 @@ def parse_renewal(body: bytes) -> RawRenewal | None:
         envelope: Any = (
             unpack_bounded(body, _MAX_LISTS, _MAX_LISTS) if len(body) > _SMALL_BYTES else unpack(body)
         )
-        what = envelope["what"]
+        payload = envelope["what"]
         renewal = RawRenewal(
             envelope["call"],
-            what["node_id"],
-            what["epoch"],
-            what["revision"],
-            what.get("publishers", ()),
-            what.get("subscribers", ()),
-            what.get("cpu_ratio"),
-            _parse_clock(what.get("clock")),
+            payload["node_id"],
+            payload["epoch"],
+            payload["revision"],
+            payload.get("publishers", ()),
+            payload.get("subscribers", ()),
+            payload.get("cpu_ratio"),
+            _parse_clock(payload.get("clock")),
         )
     except (ValueError, LookupError, TypeError, AttributeError):
         return None
@@ -186,15 +186,15 @@ def encode_renewed(
         times: Times of receipt and reply, as returned by `Clocks.renewal_timestamps`.
         clocks: Clock differences, as returned by `Clocks.differences`.
     """
-    what: dict[str, object] = {"epoch": epoch, "revision": revision}
+    payload: dict[str, object] = {"epoch": epoch, "revision": revision}
     if last_seqs:
-        what["last_seqs"] = last_seqs
+        payload["last_seqs"] = last_seqs
     if hosts:
-        what["hosts"] = hosts
+        payload["hosts"] = hosts
     if next_s != RENEW_INTERVAL_S:
-        what["next_s"] = next_s
+        payload["next_s"] = next_s
     if times:
-        what["times"] = times
+        payload["times"] = times
     if clocks:
-        what["clocks"] = clocks
-    return pack_saturated({"is": "renewed", "re": call, "what": what})
+        payload["clocks"] = clocks
+    return pack_saturated({"is": "renewed", "re": call, "what": payload})

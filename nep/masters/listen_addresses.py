@@ -22,7 +22,7 @@ def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[
 
     Raises `NepError` for an address that doesn't belong to this computer (`own_addresses`).
     """
-    known = {own.host for own in addresses}
+    own_hosts = {own_address.host for own_address in addresses}
     checked = tuple(dict.fromkeys(hosts))
     for host in checked:
         try:
@@ -31,8 +31,8 @@ def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[
             raise NepError(
                 _("'{host}' isn't an IPv4 address; use an address such as '192.168.1.20'").format(host=host)
             ) from None
-        if host != ANY_HOST and host not in known and not address.is_loopback:
-            others = ", ".join(sorted(known)) or _(
+        if host != ANY_HOST and host not in own_hosts and not address.is_loopback:
+            others = ", ".join(sorted(own_hosts)) or _(
                 "none that other computers can reach; connect to a network first"
             )
             raise NepError(
@@ -79,18 +79,18 @@ class ListenAddresses:
         for a port in use. If it raises, the bindings are unchanged.
         """
         addresses = self._list_addresses()
-        chosen = check_hosts(hosts, addresses)
+        checked_hosts = check_hosts(hosts, addresses)
         new: list[str] = []
         try:
-            for host in self._available_hosts(chosen, addresses) - self._bound:
+            for host in self._available_hosts(checked_hosts, addresses) - self._bound:
                 self._bind(host)
                 new.append(host)
         except NepError:
             for host in new:
                 self._unbind(host)
             raise
-        self.hosts = chosen
-        for host in self._bound - self._available_hosts(chosen, addresses):
+        self.hosts = checked_hosts
+        for host in self._bound - self._available_hosts(checked_hosts, addresses):
             self._unbind(host)
 
     def refresh(self) -> tuple[Alert, ...]:
@@ -111,13 +111,13 @@ class ListenAddresses:
         )
 
     def _available_hosts(self, hosts: tuple[str, ...], addresses: tuple[OwnAddress, ...]) -> set[str]:
-        present = {own.host for own in addresses}
+        present = {own_address.host for own_address in addresses}
         if ANY_HOST in hosts:
             return present
         return {host for host in hosts if host in present or ipaddress.IPv4Address(host).is_loopback}
 
     def _lost_alert(self, host: str, addresses: tuple[OwnAddress, ...]) -> Alert:
-        now = ", ".join(own.host for own in addresses)
+        now = ", ".join(own_address.host for own_address in addresses)
         return Alert(
             f"listen:{host}",
             _(

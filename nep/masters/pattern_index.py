@@ -66,10 +66,10 @@ class PatternIndex(Generic[T]):
         """Add a topic that got its first publisher."""
         if topic in self._patterns:
             return
-        found = {pattern for pattern in self._subscribers if matches(pattern, topic)}
-        if found:
-            self._patterns[topic] = found
-            for pattern in found:
+        patterns = {pattern for pattern in self._subscribers if matches(pattern, topic)}
+        if patterns:
+            self._patterns[topic] = patterns
+            for pattern in patterns:
                 self._topics[pattern].add(topic)
 
     def remove_topic(self, topic: str) -> None:
@@ -85,18 +85,18 @@ class PatternIndex(Generic[T]):
         """Return (owner, id) of each subscriber whose pattern matches a topic; it may be a removed topic."""
         if not self._subscribers:
             return []
-        found = self._patterns.get(topic)
-        if found is None:
-            found = {pattern for pattern in self._subscribers if matches(pattern, topic)}
+        patterns = self._patterns.get(topic)
+        if patterns is None:
+            patterns = {pattern for pattern in self._subscribers if matches(pattern, topic)}
         return [
             (owner, subscriber)
-            for pattern in sorted(found)
+            for pattern in sorted(patterns)
             for subscriber, owner in self._subscribers[pattern].items()
         ]
 
     def _discard(self, topic: str, pattern: str) -> None:
-        found = self._patterns.get(topic)
-        if found is not None:
-            found.discard(pattern)
-            if not found:
+        patterns = self._patterns.get(topic)
+        if patterns is not None:
+            patterns.discard(pattern)
+            if not patterns:
                 del self._patterns[topic]

@@ -71,9 +71,9 @@ def is_running(address: str | None = None, timeout_s: float = 0.5) -> bool:
         address: Address of the master. Default: `master_address`.
         timeout_s: Time limit in seconds.
     """
-    chosen = master_address(address)
+    resolved_address = master_address(address)
     try:
-        return isinstance(_request(Ping(), chosen, timeout_s), DoneReply)
+        return isinstance(_request(Ping(), resolved_address, timeout_s), DoneReply)
     except (MasterUnreachable, RequestRefusedError):
         return False
 
@@ -85,20 +85,20 @@ def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
         MasterUnreachable: No master replied within `timeout_s` seconds.
         RequestRefusedError: The master rejected the request.
     """
-    chosen = master_address(address)
-    reply = _request(QueryGraph(), chosen, timeout_s)
+    resolved_address = master_address(address)
+    reply = _request(QueryGraph(), resolved_address, timeout_s)
     if not isinstance(reply, GraphReply):
         raise RequestRefusedError(
-            _("the master at '{chosen}' didn't reply with its graph").format(chosen=chosen)
+            _("the master at '{chosen}' didn't reply with its graph").format(chosen=resolved_address)
         )
     return reply.view
 
 
 def view_or_none(address: str | None = None, timeout_s: float = 0.5) -> GraphView | None:
     """Return a snapshot as `view` does, or None if no compatible master replies in time."""
-    chosen = master_address(address)
+    resolved_address = master_address(address)
     try:
-        return view(chosen, timeout_s)
+        return view(resolved_address, timeout_s)
     except (MasterUnreachable, RequestRefusedError):
         return None
 
@@ -137,8 +137,8 @@ def _request(request: Request, address: str, timeout_s: float) -> Reply:
         socket.connect(endpoint)
         _send(socket, endpoint, body)
         deadline, again_at = time.monotonic() + timeout_s, time.monotonic() + _RETRY_INTERVAL_S
-        while (left := deadline - time.monotonic()) > 0:
-            if socket.poll(int(min(left, 0.1) * 1000) + 1):
+        while (remaining_s := deadline - time.monotonic()) > 0:
+            if socket.poll(int(min(remaining_s, 0.1) * 1000) + 1):
                 reply = _decode_reply(socket.recv())
                 if reply is not None:
                     return reply
@@ -163,14 +163,14 @@ def _send(socket: zmq.Socket[bytes], endpoint: str, body: bytes) -> None:
 def _decode_reply(body: bytes) -> Reply | None:
     # None for a push. Raises `RequestRefusedError`.
     try:
-        answer = decode_reply(body)[1]
+        reply = decode_reply(body)[1]
     except WireError as error:
         raise RequestRefusedError(
             _("the master's reply can't be read: {reason}").format(reason=error.reason)
         ) from error
-    if isinstance(answer, RejectedReply):
-        raise RequestRefusedError(answer.reason)
-    return answer if isinstance(answer, Reply) else None
+    if isinstance(reply, RejectedReply):
+        raise RequestRefusedError(reply.reason)
+    return reply if isinstance(reply, Reply) else None
 
 
 def start_process(
@@ -196,26 +196,26 @@ def start_process(
     Raises:
         MasterUnreachable: The master did not start in time.
     """
-    chosen = master_address(address)
-    words = [*(command or (sys.executable, "-m", "nep")), "master"]
+    resolved_address = master_address(address)
+    arguments = [*(command or (sys.executable, "-m", "nep")), "master"]
     if owner_pid is not None:
-        words += ["--owner-pid", str(owner_pid)]
+        arguments += ["--owner-pid", str(owner_pid)]
     detached = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) | NO_CONSOLE
     process = subprocess.Popen(
-        words,
+        arguments,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        env={**os.environ, "NEP_MASTER": chosen},
+        env={**os.environ, "NEP_MASTER": resolved_address},
         start_new_session=True,
         creationflags=detached,
     )
-    began, asked_s = time.monotonic(), 0.5
-    while (left := began + timeout_s - time.monotonic()) > 0 and process.poll() is None:
-        if is_running(chosen, min(asked_s, left)):
+    started_s, asked_s = time.monotonic(), 0.5
+    while (remaining_s := started_s + timeout_s - time.monotonic()) > 0 and process.poll() is None:
+        if is_running(resolved_address, min(asked_s, remaining_s)):
             return process
         asked_s = min(2 * asked_s, _MAX_REQUEST_TIMEOUT_S)  # a busy computer may need longer for every reply
     if process.poll() is None:
         process.kill()
     process.wait(5.0)
-    raise MasterUnreachable(chosen, round(time.monotonic() - began, 1))
+    raise MasterUnreachable(resolved_address, round(time.monotonic() - started_s, 1))

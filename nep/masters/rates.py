@@ -33,12 +33,12 @@ class TrafficMeter:
         if not self._samples:
             return None
         end, end_count, end_bytes = self._samples[-1]
-        found: tuple[float, float] | None = None
+        result: tuple[float, float] | None = None
         for start, count, size_bytes in reversed(self._samples):
             span = end - start
             if span < _MIN_SPAN_S:
                 continue
-            found = (end_count - count) / span, (end_bytes - size_bytes) / span
+            result = (end_count - count) / span, (end_bytes - size_bytes) / span
             if end_count - count >= _MIN_MESSAGES:
                 break
-        return found
+        return result

@@ -162,11 +162,11 @@ class Registry:
 
     def publishers_of(self, topic: str) -> tuple[RemotePublisher, ...]:
         """Return the publishers of a topic to which subscribers can connect."""
-        found = self._publishing.get(topic, {})
+        owners = self._publishing.get(topic, {})
         return tuple(
-            self.remote_publisher(member, member.publishers[known].record)
-            for known, member in found.items()
-            if member.publishers[known].record.endpoints
+            self.remote_publisher(member, member.publishers[publisher_id].record)
+            for publisher_id, member in owners.items()
+            if member.publishers[publisher_id].record.endpoints
         )
 
     @property
@@ -176,19 +176,28 @@ class Registry:
 
     def publishers_with_nodes(self, topic: str) -> list[tuple[RegisteredNode, RegisteredPublisher]]:
         """Return all publishers of a topic with their nodes, including those without endpoints."""
-        found = self._publishing.get(topic)
-        return [(member, member.publishers[known]) for known, member in found.items()] if found else []
+        owners = self._publishing.get(topic)
+        return (
+            [(member, member.publishers[publisher_id]) for publisher_id, member in owners.items()]
+            if owners
+            else []
+        )
 
     def subscribers_of(self, topic: str) -> list[tuple[RegisteredNode, RegisteredSubscriber]]:
         """Return the subscribers of a topic with their nodes."""
-        found = self._subscribing.get(topic)
-        return [(member, member.subscribers[known]) for known, member in found.items()] if found else []
+        owners = self._subscribing.get(topic)
+        return (
+            [(member, member.subscribers[subscriber_id]) for subscriber_id, member in owners.items()]
+            if owners
+            else []
+        )
 
     def receivers_of(self, topic: str) -> list[tuple[RegisteredNode, RegisteredSubscriber]]:
         """Return the subscribers that receive a topic, including those whose pattern matches it."""
-        found = [each for each in self.subscribers_of(topic) if not each[1].record.pattern]
-        return found + [
-            (member, member.subscribers[known]) for member, known in self.patterns.subscribers_of(topic)
+        receivers = [each for each in self.subscribers_of(topic) if not each[1].record.pattern]
+        return receivers + [
+            (member, member.subscribers[subscriber_id])
+            for member, subscriber_id in self.patterns.subscribers_of(topic)
         ]
 
     def topics_of(self, record: SubscriberRecord) -> set[str]:
@@ -220,13 +229,15 @@ class Registry:
             topics = self.topics_received_by(member)
             names = {subscriber.record.topic for subscriber in member.subscribers.values()}
             member.sources = {
-                known: gone for name in names for known, gone in self.departed.for_topic(name).items()
+                publisher_id: departed_publisher
+                for name in names
+                for publisher_id, departed_publisher in self.departed.for_topic(name).items()
             }
             member.sources |= {
-                known: other.publishers[known]
+                publisher_id: other.publishers[publisher_id]
                 for topic in topics
-                for known, other in self._publishing.get(topic, {}).items()
-                if other.publishers[known].record.endpoints
+                for publisher_id, other in self._publishing.get(topic, {}).items()
+                if other.publishers[publisher_id].record.endpoints
             }
             owners = {
                 owner.node.id: owner for owner in map(self.publisher_owners.get, member.sources) if owner
@@ -251,7 +262,9 @@ class Registry:
         Includes recently unregistered publishers, because the node may have been disconnected when they
         closed.
         """
-        return {known: publisher.last_seq for known, publisher in self.sources_of(member).items()}
+        return {
+            publisher_id: publisher.last_seq for publisher_id, publisher in self.sources_of(member).items()
+        }
 
     # ---- changing
 
@@ -289,10 +302,10 @@ class Registry:
 
     def add_publisher(self, member: RegisteredNode, record: PublisherRecord) -> bool:
         """Register a publisher; return False if it was already registered identically."""
-        known = member.publishers.get(record.id)
-        if known is not None and known.record == record:
+        existing = member.publishers.get(record.id)
+        if existing is not None and existing.record == record:
             return False
-        if known is not None:
+        if existing is not None:
             self.remove_publisher(member.node.id, record.id)
         member.publishers[record.id] = RegisteredPublisher(record)
         self.publisher_owners[record.id] = member
@@ -315,36 +328,39 @@ class Registry:
     def remove_publisher(self, node_id: str, publisher: int) -> PublisherRecord | None:
         """Unregister a publisher; return its record, or None if unknown."""
         member = self.members.get(node_id)
-        gone = member.publishers.pop(publisher, None) if member else None
-        if gone is None:
+        removed = member.publishers.pop(publisher, None) if member else None
+        if removed is None:
             return None
         self.publisher_owners.pop(publisher, None)
-        if gone.record.endpoints:
-            self.departed.add(self._names_of(gone.record.topic), publisher, gone)
-        _discard(self._publishing, gone.record.topic, publisher)
-        if gone.record.topic not in self._publishing:
-            self.patterns.remove_topic(gone.record.topic)
-        self._bump_revision(gone.record.topic)
-        self._discard_unused(gone.record.topic)
-        return gone.record
+        if removed.record.endpoints:
+            self.departed.add(self._names_of(removed.record.topic), publisher, removed)
+        _discard(self._publishing, removed.record.topic, publisher)
+        if removed.record.topic not in self._publishing:
+            self.patterns.remove_topic(removed.record.topic)
+        self._bump_revision(removed.record.topic)
+        self._discard_unused(removed.record.topic)
+        return removed.record
 
     def _names_of(self, topic: str) -> set[str]:
         # The topic and the patterns that match it.
-        heard = self.patterns.subscribers_of(topic)
-        return {topic, *(member.subscribers[known].record.topic for member, known in heard)}
+        subscribers = self.patterns.subscribers_of(topic)
+        return {
+            topic,
+            *(member.subscribers[subscriber_id].record.topic for member, subscriber_id in subscribers),
+        }
 
     def remove_subscriber(self, node_id: str, subscriber: int) -> None:
         """Unregister a subscriber. Idempotent."""
         member = self.members.get(node_id)
-        gone = member.subscribers.pop(subscriber, None) if member else None
-        if gone is not None:
+        removed = member.subscribers.pop(subscriber, None) if member else None
+        if removed is not None:
             self.subscriber_owners.pop(subscriber, None)
-            _discard(self._subscribing, gone.record.topic, subscriber)
-            if gone.record.pattern:
-                self.patterns.remove(gone.record.topic, subscriber)
-            self.touched.add(gone.record.topic)
+            _discard(self._subscribing, removed.record.topic, subscriber)
+            if removed.record.pattern:
+                self.patterns.remove(removed.record.topic, subscriber)
+            self.touched.add(removed.record.topic)
             self.revision += 1
-            self._discard_unused(gone.record.topic)
+            self._discard_unused(removed.record.topic)
 
     def _discard_unused(self, topic: str) -> None:
         # Discards data of unused topics; a new subscriber or publisher gets the full state anyway.
@@ -402,11 +418,11 @@ class Registry:
                 publisher.errors = clamp_count(errors)
                 if problem != publisher.problem:
                     self.update_problem(publisher, problem)
-            for seen in subscriber_counts:
-                received, lost, problem = seen["received"], seen["lost"], seen.get("problem", "")
+            for stats in subscriber_counts:
+                received, lost, problem = stats["received"], stats["lost"], stats.get("problem", "")
                 if {type(received), type(lost)} - {int, type(None)} or type(problem) is not str:
                     return False
-                self.update_subscriber(subscribers[seen["id"]], received, lost, problem)
+                self.update_subscriber(subscribers[stats["id"]], received, lost, problem)
             member.renewed_at, member.cpu_ratio = now, _parse_ratio(cpu_ratio)
             if member.unconnected_node_ids:
                 member.unconnected_node_ids.clear()
@@ -460,11 +476,11 @@ class Registry:
             subscribers: Ids of the subscribers.
         """
         reporter = self.members.get(node_id)
-        known = reporter.publishers.get(publisher) if reporter else None
-        if reporter is None or known is None:
+        registered = reporter.publishers.get(publisher) if reporter else None
+        if reporter is None or registered is None:
             return
         for subscriber in subscribers:
-            member = self._subscribing.get(known.record.topic, {}).get(subscriber)
+            member = self._subscribing.get(registered.record.topic, {}).get(subscriber)
             if member is not None and len(member.unconnected_node_ids) < _MAX_UNCONNECTED_NODES:
                 member.unconnected_node_ids.add(reporter.node.id)
 
@@ -490,9 +506,9 @@ def _parse_ratio(value: float | None) -> float | None:
     return value if value is not None and 0.0 <= value < _MAX_CORES else None
 
 
-def _discard(table: dict[str, dict[int, RegisteredNode]], topic: str, known: int) -> None:
+def _discard(table: dict[str, dict[int, RegisteredNode]], topic: str, record_id: int) -> None:
     entries = table.get(topic, {})
-    entries.pop(known, None)
+    entries.pop(record_id, None)
     if not entries:
         table.pop(topic, None)
 
@@ -502,14 +518,14 @@ def _discard(table: dict[str, dict[int, RegisteredNode]], topic: str, known: int
 
 def is_nanomsg_endpoint(endpoint: str) -> bool:
     """Return True for `nanomsg://HOST:PORT/PORT`, the endpoint of a nanomsg publisher."""
-    found = _NANOMSG_ENDPOINT_PATTERN.fullmatch(endpoint)
-    return found is not None and all(1 <= int(port) <= 65535 for port in found.groups())
+    match = _NANOMSG_ENDPOINT_PATTERN.fullmatch(endpoint)
+    return match is not None and all(1 <= int(port) <= 65535 for port in match.groups())
 
 
 def is_tcp_endpoint(endpoint: str) -> bool:
     """Return True for `tcp://HOST:PORT`, the endpoint of a ZeroMQ publisher."""
-    found = _ENDPOINT_PATTERN.fullmatch(endpoint)
-    return found is not None and 1 <= int(found.group(1)) <= 65535
+    match = _ENDPOINT_PATTERN.fullmatch(endpoint)
+    return match is not None and 1 <= int(match.group(1)) <= 65535
 
 
 def check_request(request: Request) -> None:
@@ -600,17 +616,17 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
                 )
 
 
-def _check_text(what: str, word: str, most: int) -> None:
-    control = first_control(word)
-    if len(word) > most or control:
+def _check_text(kind: str, text: str, max_length: int) -> None:
+    control = first_control(text)
+    if len(text) > max_length or control:
         hint = (
             _("the character '{control}' isn't allowed").format(control=control)
             if control
-            else _("use at most {most} characters").format(most=most)
+            else _("use at most {most} characters").format(most=max_length)
         )
         raise WireError(
             _("'{word}' isn't a valid {what}; {hint}").format(
-                word=escaped(shortened(word, 40)), what=what, hint=hint
+                word=escaped(shortened(text, 40)), what=kind, hint=hint
             ),
             code="text",
         )

@@ -109,7 +109,9 @@ class MasterRouter:
 
         A sender may have reconnected since.
         """
-        sent = [each for each, unread in self._unread.items() if all(one.done for one, _size in unread)]
+        sent = [
+            each for each, unread in self._unread.items() if all(tracker.done for tracker, _size in unread)
+        ]
         for route in sent:
             del self._unread[route]
         while self._monitor is not None:
@@ -120,7 +122,7 @@ class MasterRouter:
             sender = self._senders.pop(_MONITOR_EVENT.unpack(event)[1], None)
             if sender is not None:
                 self._ended.setdefault(sender, now)
-        ended = [sender for sender, at in self._ended.items() if now - at >= _RECONNECT_TIMEOUT_S]
+        ended = [sender for sender, ended_at in self._ended.items() if now - ended_at >= _RECONNECT_TIMEOUT_S]
         for sender in ended:
             del self._ended[sender]
         return ended

@@ -189,12 +189,12 @@ class MasterServer:
             self._tick(now)
         self._notify_listeners(now)
 
-    def _log_failure(self, error: Exception, what: str) -> None:
+    def _log_failure(self, error: Exception, operation: str) -> None:
         # Logged at increasing intervals.
         self._failures += 1
         if is_logged(self._failures):
-            sentence = "the master failed to execute %s (%d so far)"
-            _logger.error(sentence, what, self._failures, exc_info=error)
+            template = "the master failed to execute %s (%d so far)"
+            _logger.error(template, operation, self._failures, exc_info=error)
 
     def _wait_for_more_renewals(self, waker: tuple[int, int]) -> bool:
         # With hundreds of nodes a wake-up costs more than a reply, so renewals are collected for some ms.
@@ -205,10 +205,10 @@ class MasterServer:
 
     def _poll_timeout_ms(self, tick_at: float) -> int:
         due = self._graph.learning_end
-        at = tick_at if due is None else min(tick_at, due)
+        wake_at = tick_at if due is None else min(tick_at, due)
         if self._listeners and self._graph.revision != self._notified_revision:
-            at = min(at, self._notify_at)
-        return max(0, int((at - time.monotonic()) * 1000) + 1)
+            wake_at = min(wake_at, self._notify_at)
+        return max(0, int((wake_at - time.monotonic()) * 1000) + 1)
 
     def _tick(self, now: float) -> None:
         was_away, self._ticked_at = now - self._ticked_at > _MIN_SUSPENSION_S, now
@@ -260,11 +260,11 @@ class MasterServer:
     def _reply_to_renewals(self) -> None:
         # All replies are sent together, so that libzmq's thread wakes once.
         renewals, self._renewals = self._renewals, []
-        answers = [self._try_renew(*renewal) for renewal in renewals]
-        for (sender, body, _came_ns), answer in zip(renewals, answers, strict=True):
-            if answer is None:
+        replies = [self._try_renew(*renewal) for renewal in renewals]
+        for (sender, body, _came_ns), reply in zip(renewals, replies, strict=True):
+            if reply is None:
                 self._serve_request(sender, [body], "")
-            elif not self._port.send(sender, answer):
+            elif not self._port.send(sender, reply):
                 self._send(self._graph.unregister_nodes(self._node_ids_at(_route_of(sender))))
 
     def _try_renew(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
@@ -300,37 +300,37 @@ class MasterServer:
         )
 
     def _serve_request(self, sender: bytes, body: list[bytes], peer: str) -> None:
-        asked = decode_request(body[-1] if len(body) == 1 else b"")
-        if isinstance(asked.request, Listen) and self._listening.hosts and peer != "127.0.0.1":
+        received = decode_request(body[-1] if len(body) == 1 else b"")
+        if isinstance(received.request, Listen) and self._listening.hosts and peer != "127.0.0.1":
             reason = _("this setting can be changed only on the master's own computer")
-            asked = ReceivedRequest(asked.call, WireError(reason, code="listen"))
+            received = ReceivedRequest(received.call, WireError(reason, code="listen"))
         name = _route_of(sender)
-        reason = self._apply_request(asked, name)
+        reason = self._apply_request(received, name)
         if reason:
             member = self._graph.node_at(name)
             node_id, node_name = ("", "") if member is None else (member.node.id, member.node.name)
             self._bad_requests.add(*describe_sender(node_id, node_name, peer), reason, time.monotonic())
 
-    def _apply_request(self, asked: ReceivedRequest, sender: str) -> str:
+    def _apply_request(self, received: ReceivedRequest, sender: str) -> str:
         # An empty sender means this process. Returns the reason of a rejection, or "".
-        request, outgoing = asked.request, tuple[OutgoingMessage, ...]()
+        request, outgoing = received.request, tuple[OutgoingMessage, ...]()
         try:
             if isinstance(request, WireError):
-                outgoing = (OutgoingMessage(sender, self._create_rejection(request), asked.call),)
+                outgoing = (OutgoingMessage(sender, self._create_rejection(request), received.call),)
             elif isinstance(request, Listen):
-                outgoing = (OutgoingMessage(sender, self._listen(request), asked.call),)
+                outgoing = (OutgoingMessage(sender, self._listen(request), received.call),)
             else:
                 now, is_foreign = time.monotonic(), bool(sender)
                 with gc_disabled() if isinstance(request, QueryGraph) else nullcontext():
                     came_ns = time.time_ns()
-                    outgoing = self._graph.apply(request, asked.call, now, sender, is_foreign=is_foreign)
+                    outgoing = self._graph.apply(request, received.call, now, sender, is_foreign=is_foreign)
                     if isinstance(request, Renew) and request.clock is not None:
                         outgoing = self._with_times(outgoing, came_ns)
                     self._send(outgoing)
                 return _rejection_reason(outgoing)
         except Exception as error:  # noqa: BLE001 - logged; one request must not stop the master
             self._log_failure(error, "a request")
-            outgoing = (OutgoingMessage(sender, self._create_rejection(), asked.call),)
+            outgoing = (OutgoingMessage(sender, self._create_rejection(), received.call),)
         self._send(outgoing)
         return request.reason if isinstance(request, WireError) else ""
 
@@ -356,36 +356,36 @@ class MasterServer:
     def _send(self, outgoing: Sequence[OutgoingMessage]) -> None:
         # Nodes found dead on the way are dropped.
         dead: set[str] = set()
-        for each in outgoing:
-            if each.call is not None and each.call < 0:
-                self._reply_to_submission(each)
-            elif not self._deliver(each, frozenset(dead)):
-                dead.update([each.to] if each.call is None else self._node_ids_at(each.to))
+        for message in outgoing:
+            if message.call is not None and message.call < 0:
+                self._reply_to_submission(message)
+            elif not self._deliver(message, frozenset(dead)):
+                dead.update([message.to] if message.call is None else self._node_ids_at(message.to))
         if dead:
             self._send(self._graph.unregister_nodes(dead))
 
-    def _reply_to_submission(self, each: OutgoingMessage) -> None:
-        submission = self._pending.pop(each.call or 0, None)
+    def _reply_to_submission(self, message: OutgoingMessage) -> None:
+        submission = self._pending.pop(message.call or 0, None)
         if submission is not None:
-            submission.reply = with_hosts(each.body, self._listening.hosts)  # type: ignore[assignment]
+            submission.reply = with_hosts(message.body, self._listening.hosts)  # type: ignore[assignment]
             submission.done.set()
 
-    def _deliver(self, each: OutgoingMessage, dead: frozenset[str]) -> bool:
+    def _deliver(self, message: OutgoingMessage, dead: frozenset[str]) -> bool:
         # False if the connection is gone.
-        route = each.to
-        if each.call is None:
-            member = None if each.to in dead else self._graph.members.get(each.to)
+        route = message.to
+        if message.call is None:
+            member = None if message.to in dead else self._graph.members.get(message.to)
             if member is None:
                 return True
             route = member.route
-        answer = with_hosts(without_nodes(each.body, dead), self._listening.hosts)
+        reply = with_hosts(without_nodes(message.body, dead), self._listening.hosts)
         try:
-            body = self._encoder.encode(answer, each.call or 0)
+            body = self._encoder.encode(reply, message.call or 0)
         except Exception as error:  # noqa: BLE001 - logged; the caller gets an error reply
             self._log_failure(error, "an answer")
-            if each.call is None:
+            if message.call is None:
                 return True
-            body = self._encoder.encode(self._create_rejection(), each.call)
+            body = self._encoder.encode(self._create_rejection(), message.call)
         return self._port.send(route.encode("utf-8", "surrogateescape"), body)
 
     def _node_ids_at(self, route: str) -> tuple[str, ...]:

@@ -48,22 +48,22 @@ class GraphSnapshotBuilder:
             self._patterns.pop(name, None)
             self._alerts.pop(name, None)
         touched.clear()
-        known = self._topics
-        if len(known) > len(names) or not known.keys() <= set(names):
-            for gone in known.keys() - set(names):
-                del known[gone]
-                self._patterns.pop(gone, None)
-                self._alerts.pop(gone, None)
+        cached = self._topics
+        if len(cached) > len(names) or not cached.keys() <= set(names):
+            for removed_name in cached.keys() - set(names):
+                del cached[removed_name]
+                self._patterns.pop(removed_name, None)
+                self._alerts.pop(removed_name, None)
         for name in names:
-            if name not in known:
+            if name not in cached:
                 publishing, subscribing = registry.publishers_with_nodes(name), registry.subscribers_of(name)
-                known[name] = self._topic(name, publishing, subscribing)
+                cached[name] = self._topic(name, publishing, subscribing)
                 is_told = any(each.problem for _member, each in subscribing)
                 is_told = is_told or any(each.problem for _member, each in publishing)
                 if len(publishing) > 1 or is_told:
                     self._alerts[name] = tuple(_topic_alerts(name, publishing, subscribing))
         nodes = {each.node.id: _node_info(each) for each in registry.members.values()}
-        topics = {name: topic for name in names if (topic := known[name]) is not None}
+        topics = {name: topic for name in names if (topic := cached[name]) is not None}
         services = {each.name: each for each in (_service_info(name, registry) for name in served)}
         alerts = (
             *self._all_alerts(),
@@ -83,10 +83,10 @@ class GraphSnapshotBuilder:
     ) -> TopicInfo | None:
         # Separates subscribers whose pattern has this name; None if nothing else is left.
         if name in self._registry.patterns:
-            wide = [each for each in subscribing if each[1].record.pattern]
+            pattern_subscribers = [each for each in subscribing if each[1].record.pattern]
             subscribing = [each for each in subscribing if not each[1].record.pattern]
-            heard = tuple(_subscriber_info(*each) for each in wide)
-            self._patterns[name] = PatternInfo(name, wide[0][1].record.msg_type, heard)
+            infos = tuple(_subscriber_info(*each) for each in pattern_subscribers)
+            self._patterns[name] = PatternInfo(name, pattern_subscribers[0][1].record.msg_type, infos)
         return _topic_info(name, publishing, subscribing) if publishing or subscribing else None
 
     def _all_alerts(self) -> Iterator[Alert]:

@@ -63,10 +63,10 @@ class PublisherClock:
         The offset is to be added to a time of the publisher; the error is at most the uncertainty in
         either direction.
         """
-        known = self.difference
-        if known is None:
+        difference = self.difference
+        if difference is None:
             return None
-        return known.offset_ns / 1e9, known.uncertainty_at(time.monotonic_ns()) / 1e9
+        return difference.offset_ns / 1e9, difference.uncertainty_at(time.monotonic_ns()) / 1e9
 
 
 UNKNOWN_CLOCK = PublisherClock()

@@ -352,7 +352,7 @@ class JsonEncoder:
 
         Call this for payloads whose encoding contains `NULL`, which may also be the encoding of None.
         """
-        if _may_have_nan(payload) and (where := find_nan(payload)) is not None:
+        if _may_have_nan(payload) and (nan_path := find_nan(payload)) is not None:
             self.count += 1
             now = self._clock()
             if now - self._warned_at >= NAN_WARNING_INTERVAL_S:
@@ -361,7 +361,7 @@ class JsonEncoder:
                     "'%s' sends NaN or infinity as null, because JSON has neither: at %s, message %d of "
                     "this kind; %s",
                     self._topic,
-                    where or "its only value",
+                    nan_path or "its only value",
                     self.count,
                     self._hint,
                 )
@@ -388,17 +388,17 @@ def find_nan(value: object, path: str = "", depth: int = _MAX_DEPTH) -> str | No
     if value is None or isinstance(value, str | bytes | int) or depth <= 0:
         return None
     if isinstance(value, Mapping):
-        parts = ((f"{path}.{key}" if path else str(key), each) for key, each in value.items())
+        parts = ((f"{path}.{key}" if path else str(key), part) for key, part in value.items())
     elif isinstance(value, Sequence):
-        parts = ((f"{path}[{number}]", each) for number, each in enumerate(value))
+        parts = ((f"{path}[{number}]", part) for number, part in enumerate(value))
     elif is_dataclass(value) and not isinstance(value, type):
-        names = (each.name for each in fields(value))
+        names = (part.name for part in fields(value))
         parts = ((f"{path}.{name}" if path else name, getattr(value, name, None)) for name in names)
     else:
         to_list = getattr(value, "tolist", None)  # numpy
         return find_nan(to_list(), path, depth - 1) if callable(to_list) else None
-    for where, each in parts:
-        found = find_nan(each, where, depth - 1)
-        if found is not None:
-            return found
+    for part_path, part in parts:
+        nan_path = find_nan(part, part_path, depth - 1)
+        if nan_path is not None:
+            return nan_path
     return None

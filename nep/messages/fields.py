@@ -23,10 +23,10 @@ def parse_path(text: str) -> Path:
     if text == ".":
         return ()
     steps: list[str | int] = []
-    at = 0
-    while at < len(text):
-        found = _STEP_PATTERN.match(text, at)
-        if found is None or (text[at] != "." and text[at] != "[" and at > 0):
+    position = 0
+    while position < len(text):
+        match = _STEP_PATTERN.match(text, position)
+        if match is None or (text[position] != "." and text[position] != "[" and position > 0):
             raise NepError(
                 _(
                     "'{text}' isn't a valid field path; use a path such as 'pose.x' or 'joints[3]', or "
@@ -34,12 +34,12 @@ def parse_path(text: str) -> Path:
                     "the whole value"
                 ).format(text=quotable(text))
             )
-        index, quoted, plain = found.groups()
+        index, quoted, unquoted = match.groups()
         if index is not None:
             steps.append(int(index))
         else:
-            steps.append(plain if quoted is None else re.sub(r"\\(.)", r"\1", quoted))
-        at = found.end()
+            steps.append(unquoted if quoted is None else re.sub(r"\\(.)", r"\1", quoted))
+        position = match.end()
     if not steps:
         raise NepError(_("a field path needs a name, such as 'pose.x'"))
     return tuple(steps)
@@ -75,12 +75,12 @@ def _format_step(step: str | int) -> str:
     return f".{step}" if _PLAIN_NAME.fullmatch(step) else '["' + re.sub(r'(["\\])', r"\\\1", step) + '"]'
 
 
-def leaf_paths(payload: object, most: int = 200) -> Iterator[str]:
-    """Yield the paths of at most `most` scalar values.
+def leaf_paths(payload: object, max_count: int = 200) -> Iterator[str]:
+    """Yield the paths of at most `max_count` scalar values.
 
     A value below the depth limit is treated as a scalar.
     """
-    remaining = [most]
+    remaining = [max_count]
     yield from _leaf_paths(payload, "", remaining, _MAX_DEPTH)
 
 
@@ -88,11 +88,11 @@ def _leaf_paths(value: object, path: str, remaining: list[int], depth: int) -> I
     if remaining[0] <= 0:
         return
     if depth and isinstance(value, Mapping) and value:
-        for key, each in value.items():
-            yield from _leaf_paths(each, path + _format_step(str(key)), remaining, depth - 1)
+        for key, item in value.items():
+            yield from _leaf_paths(item, path + _format_step(str(key)), remaining, depth - 1)
     elif depth and isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and value:
-        for number, each in enumerate(value[:10]):
-            yield from _leaf_paths(each, f"{path}[{number}]", remaining, depth - 1)
+        for number, item in enumerate(value[:10]):
+            yield from _leaf_paths(item, f"{path}[{number}]", remaining, depth - 1)
     else:
         remaining[0] -= 1
         yield path.removeprefix(".") or "."

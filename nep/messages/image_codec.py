@@ -268,8 +268,8 @@ def _as_contiguous(payload: object) -> NDArray[Any]:
     frame = _validate(payload)
     if frame.ndim == 3 and frame.shape[2] == 1:
         frame = frame[:, :, 0]
-    whole: NDArray[Any] = np.ascontiguousarray(frame, dtype=frame.dtype.newbyteorder("="))
-    return whole
+    contiguous: NDArray[Any] = np.ascontiguousarray(frame, dtype=frame.dtype.newbyteorder("="))
+    return contiguous
 
 
 # ---- decoding
@@ -306,8 +306,8 @@ def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
     if file.kind == "png":
         flag = -1  # IMREAD_UNCHANGED: keeps number type, single channel and alpha
     else:
-        whole, colour = {1: (0, 1), 2: (16, 17), 4: (32, 33), 8: (64, 65)}[reduced]  # IMREAD_REDUCED_…
-        flag = 128 + (whole if file.channels == 1 else colour)  # IMREAD_IGNORE_ORIENTATION
+        grey, colour = {1: (0, 1), 2: (16, 17), 4: (32, 33), 8: (64, 65)}[reduced]  # IMREAD_REDUCED_…
+        flag = 128 + (grey if file.channels == 1 else colour)  # IMREAD_IGNORE_ORIENTATION
     try:
         picture = opencv.imdecode(np.frombuffer(file.data, np.uint8), flag)
     except (opencv.error, MemoryError) as error:
@@ -333,11 +333,11 @@ def raw_layout(encoding: object) -> RawLayout | None:
     """Return the pixel layout of an encoding such as "bgr8", or None if `encoding` is not a raw format."""
     if not isinstance(encoding, str):
         return None
-    named = _NAMED_LAYOUTS.get(encoding)
-    if named is not None:
-        return RawLayout(*named, is_red_first=encoding.startswith("rgb"))
-    found = _LAYOUT_PATTERN.fullmatch(encoding)
-    return None if found is None else RawLayout(_DTYPES[found[1]], int(found[2]))
+    layout = _NAMED_LAYOUTS.get(encoding)
+    if layout is not None:
+        return RawLayout(*layout, is_red_first=encoding.startswith("rgb"))
+    match = _LAYOUT_PATTERN.fullmatch(encoding)
+    return None if match is None else RawLayout(_DTYPES[match[1]], int(match[2]))
 
 
 def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any]:

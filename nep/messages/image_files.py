@@ -85,16 +85,16 @@ def parse_header(data: bytes | memoryview) -> ImageFile:
         DecodeError: The file is not a valid JPEG or PNG, or exceeds a limit.
     """
     file = data if isinstance(data, bytes) else memoryview(data).cast("B")
-    head = bytes(file[:8])
-    if head == _PNG_SIGNATURE:
+    signature = bytes(file[:8])
+    if signature == _PNG_SIGNATURE:
         return _PngReader(file).read()
-    if head.startswith(_JPEG_SIGNATURE):
+    if signature.startswith(_JPEG_SIGNATURE):
         return _JpegReader(file).read()
     size = len(file)
     if not size:
         raise DecodeError("image", 0, _("the image is empty"))
     for start, name in _UNSUPPORTED_FORMATS.items():
-        if head.startswith(start):
+        if signature.startswith(start):
             raise DecodeError(
                 "image", size, _("{name} files aren't supported; use JPEG or PNG").format(name=name)
             )
@@ -138,8 +138,8 @@ class _HeaderReader:
         self.data = data
         self.size = len(data)
 
-    def number(self, at: int, count: int) -> int:
-        return int.from_bytes(self.data[at : at + count], "big")
+    def number(self, offset: int, count: int) -> int:
+        return int.from_bytes(self.data[offset : offset + count], "big")
 
     def error(self, reason: str) -> DecodeError:
         reason = _("the {upper} image is damaged: {reason}").format(upper=self.kind.upper(), reason=reason)
@@ -156,46 +156,50 @@ class _JpegReader(_HeaderReader):
     kind = "jpeg"
 
     def read(self) -> ImageFile:
-        frame, orientation, at = None, 1, 2
+        frame, orientation, offset = None, 1, 2
         for _piece in range(MAX_SEGMENTS):
-            marker, at = self._read_marker(at)
+            marker, offset = self._read_marker(offset)
             if marker in _MARKERS_WITHOUT_LENGTH:
                 continue
-            length = self.number(at, 2)
-            if length < 2 or at + length > self.size:
+            length = self.number(offset, 2)
+            if length < 2 or offset + length > self.size:
                 raise self.error(_("the data is truncated"))
             if marker in _FRAME_MARKERS:
                 if frame is not None:
                     raise self.error(_("two header chunks"))
-                frame = self._read_frame(marker, at, length)
+                frame = self._read_frame(marker, offset, length)
             elif marker == _SCAN:
                 if frame is None:
                     raise self.error(_("pixels before the frame header"))
-                return self._check_frame(frame, orientation, at)
+                return self._check_frame(frame, orientation, offset)
             elif marker == _APP1:
-                orientation = _parse_orientation(self.data[at + 2 : at + length]) or orientation
+                orientation = _parse_orientation(self.data[offset + 2 : offset + length]) or orientation
             elif marker not in _TABLE_MARKERS:
                 raise self.error(_("unknown marker 'ff{marker}'").format(marker=number(marker, "02x")))
-            at += length
+            offset += length
         raise self.error(_("too many segments"))
 
-    def _read_marker(self, at: int) -> tuple[int, int]:
-        if self.number(at, 1) != 0xFF:
+    def _read_marker(self, offset: int) -> tuple[int, int]:
+        if self.number(offset, 1) != 0xFF:
             reason = (
                 _("the data is truncated")
-                if at >= self.size
+                if offset >= self.size
                 else _("a segment doesn't follow directly after the previous one")
             )
             raise self.error(reason)
-        found = _FILL_BYTES.match(self.data, at)
-        at = found.end() if found is not None else at
-        if at >= self.size:
+        match = _FILL_BYTES.match(self.data, offset)
+        offset = match.end() if match is not None else offset
+        if offset >= self.size:
             raise self.error(_("the data is truncated"))
-        return self.data[at], at + 1
+        return self.data[offset], offset + 1
 
-    def _read_frame(self, marker: int, at: int, length: int) -> _JpegFrame:
-        bits, height, width = self.number(at + 2, 1), self.number(at + 3, 2), self.number(at + 5, 2)
-        components = self.number(at + 7, 1)
+    def _read_frame(self, marker: int, offset: int, length: int) -> _JpegFrame:
+        bits, height, width = (
+            self.number(offset + 2, 1),
+            self.number(offset + 3, 2),
+            self.number(offset + 5, 2),
+        )
+        components = self.number(offset + 7, 1)
         if length != 8 + 3 * components or components not in (1, 3, 4):
             raise self.error(
                 _("invalid number of colour components: {components}").format(components=components)
@@ -206,22 +210,22 @@ class _JpegReader(_HeaderReader):
                 self.size,
                 _("JPEG images with {bits} bits per channel aren't supported; use PNG").format(bits=bits),
             )
-        sampling = [self.number(at + 9 + 3 * each, 1) for each in range(components)]
+        sampling = [self.number(offset + 9 + 3 * each, 1) for each in range(components)]
         factors = [(each >> 4, each & 15) for each in sampling]
-        if not all(1 <= across <= 4 and 1 <= down <= 4 for across, down in factors):
+        if not all(1 <= horizontal <= 4 and 1 <= vertical <= 4 for horizontal, vertical in factors):
             raise self.error(_("invalid sampling factors of the colour components"))
         return _JpegFrame(width, height, components, _FRAME_MARKERS[marker], factors)
 
-    def _check_frame(self, frame: _JpegFrame, orientation: int, at: int) -> ImageFile:
+    def _check_frame(self, frame: _JpegFrame, orientation: int, offset: int) -> ImageFile:
         channels = 1 if frame.components == 1 else 3
         pixel_bytes = float(_DECODER_COPIES * channels)
-        is_refined = frame.is_progressive or self.number(at + 2, 1) != frame.components
+        is_refined = frame.is_progressive or self.number(offset + 2, 1) != frame.components
         if is_refined:  # the decoder holds all coefficients until the last scan
             pixel_bytes += frame.coefficient_bytes
         check_size(frame.width, frame.height, pixel_bytes, self.size)
         if is_refined:
             # a scan of a few bytes makes the decoder process all pixels again
-            scans = bytes(self.data[at:]).count(b"\xff\xda") + 1
+            scans = bytes(self.data[offset:]).count(b"\xff\xda") + 1
             if scans > MAX_SCANS or scans * frame.width * frame.height > MAX_SCANNED_PIXELS:
                 reason = _("{width} × {height} pixels in {scans} passes take too long to decode").format(  # noqa: RUF001
                     width=frame.width, height=frame.height, scans=scans
@@ -246,11 +250,11 @@ class _JpegFrame:
     @property
     def coefficient_bytes(self) -> float:
         # Two bytes per coefficient, in whole blocks.
-        across, down = (
+        max_horizontal, max_vertical = (
             max(each[0] for each in self.sampling_factors),
             max(each[1] for each in self.sampling_factors),
         )
-        units = -(-self.width // (8 * across)) * -(-self.height // (8 * down))
+        units = -(-self.width // (8 * max_horizontal)) * -(-self.height // (8 * max_vertical))
         blocks = units * sum(each[0] * each[1] for each in self.sampling_factors)
         return 128 * blocks / max(1, self.width * self.height)
 
@@ -286,26 +290,28 @@ class _PngReader(_HeaderReader):
         # are not used.
         needed: list[tuple[int, int]] = []
         kinds: set[bytes] = set()
-        orientation, at = 1, 8
+        orientation, offset = 1, 8
         for _piece in range(MAX_SEGMENTS):
-            kind, end = bytes(self.data[at + 4 : at + 8]), at + 12 + self.number(at, 4)
+            kind, end = bytes(self.data[offset + 4 : offset + 8]), offset + 12 + self.number(offset, 4)
             if kind == b"IHDR" and kind in kinds:
                 raise self.error(_("two header chunks"))
             if kind in _REQUIRED_CHUNKS:
                 if end > self.size:  # OpenCV allocates the declared size, up to 4 GB, before it checks
                     raise self.error(_("the data is truncated"))
                 kinds.add(kind)
-                if needed and needed[-1][1] == at:
+                if needed and needed[-1][1] == offset:
                     needed[-1] = needed[-1][0], end
                 else:
-                    needed.append((at, end))
+                    needed.append((offset, end))
             elif kind == b"eXIf":
                 orientation = (
-                    _parse_orientation(b"Exif\0\0" + bytes(self.data[at + 8 : at + 8 + _MAX_EXIF_BYTES]))
+                    _parse_orientation(
+                        b"Exif\0\0" + bytes(self.data[offset + 8 : offset + 8 + _MAX_EXIF_BYTES])
+                    )
                     or orientation
                 )
-            at = end
-            if kind == b"IEND" or at + 8 > self.size:
+            offset = end
+            if kind == b"IEND" or offset + 8 > self.size:
                 return needed, kinds, orientation
         raise self.error(_("too many chunks"))
 
@@ -321,9 +327,9 @@ def _parse_orientation(exif: bytes | memoryview) -> int | None:
         return None
     order: Literal["big", "little"] = "little" if data[6:7] == b"I" else "big"
     tiff = data[6:]
-    at = int.from_bytes(tiff[4:8], order)
-    count = int.from_bytes(tiff[at : at + 2], order)
-    for start in range(at + 2, min(at + 2 + 12 * count, len(tiff) - 11), 12):
+    offset = int.from_bytes(tiff[4:8], order)
+    count = int.from_bytes(tiff[offset : offset + 2], order)
+    for start in range(offset + 2, min(offset + 2 + 12 * count, len(tiff) - 11), 12):
         if int.from_bytes(tiff[start : start + 2], order) == 0x0112:
             orientation = int.from_bytes(tiff[start + 8 : start + 10], order)
             return orientation if 1 <= orientation <= 8 else None

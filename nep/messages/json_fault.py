@@ -113,10 +113,10 @@ def _parse_finite(digits: str) -> float:
 
 
 def _constant_fault(text: str) -> JsonFault:
-    found = next(each for each in _STRING_OR_CONSTANT.finditer(text) if each["constant"] is not None)
-    fix = JsonFix(found.start(), found.end(), "null")
+    match = next(each for each in _STRING_OR_CONSTANT.finditer(text) if each["constant"] is not None)
+    fix = JsonFix(match.start(), match.end(), "null")
     return _fault_at(
-        text, found.start(), _("{word} isn't JSON; use null").format(word=found[0]), fix, is_nan=True
+        text, match.start(), _("{word} isn't JSON; use null").format(word=match[0]), fix, is_nan=True
     )
 
 
@@ -176,8 +176,8 @@ def _missing_comma_fault(text: str, position: int, end: int) -> JsonFault:
 
 def _unclosed_bracket_fault(text: str, end: int) -> JsonFault:
     opened: list[str] = []
-    for found in re.finditer(r'"(?:[^"\\\n]|\\.)*"|[{}\[\]]', text):
-        sign = found[0]
+    for match in re.finditer(r'"(?:[^"\\\n]|\\.)*"|[{}\[\]]', text):
+        sign = match[0]
         if sign in _CLOSING_BRACKETS:
             opened.append(sign)
         elif sign in {"}", "]"} and opened:
@@ -186,30 +186,35 @@ def _unclosed_bracket_fault(text: str, end: int) -> JsonFault:
         return _fault_at(text, end, _("a value is missing at the end"))
     missing = "".join(_CLOSING_BRACKETS[sign] for sign in reversed(opened))
     fix = JsonFix(end, end, missing) if text[end - 1] not in ",:" else None
-    shown = shortened(missing, _MAX_WORD_LENGTH)
-    return _fault_at(text, end, _("a closing {signs} is missing at the end").format(signs=shown), fix)
+    shown_brackets = shortened(missing, _MAX_WORD_LENGTH)
+    return _fault_at(
+        text, end, _("a closing {signs} is missing at the end").format(signs=shown_brackets), fix
+    )
 
 
 def _missing_value_fault(text: str, position: int, *, is_name: bool) -> JsonFault:
-    word = _WORD_PATTERN.match(text, position)
+    match = _WORD_PATTERN.match(text, position)
     if text[position] == "'":
         end = text.find("'", position + 1)
-        inside = text[position + 1 : end] if end > position else ""
-        is_plain = bool(inside) and not any(sign in inside for sign in '"\\\n')
-        fix = JsonFix(position, end + 1, f'"{inside}"') if is_plain else None
+        quoted = text[position + 1 : end] if end > position else ""
+        is_plain = bool(quoted) and not any(sign in quoted for sign in '"\\\n')
+        fix = JsonFix(position, end + 1, f'"{quoted}"') if is_plain else None
         return _fault_at(text, position, _("JSON needs double quotes, not single quotes"), fix)
-    if word is None:
+    if match is None:
         reason = _("a name in double quotes is expected") if is_name else _("a value is expected")
         return _fault_at(text, position, reason)
-    known = _FOREIGN_CONSTANTS.get(word[0])
-    if known is not None and not is_name:
-        fix = JsonFix(position, word.end(), known)
+    replacement = _FOREIGN_CONSTANTS.get(match[0])
+    if replacement is not None and not is_name:
+        fix = JsonFix(position, match.end(), replacement)
         return _fault_at(
-            text, position, _("use {right} instead of {word} in JSON").format(word=word[0], right=known), fix
+            text,
+            position,
+            _("use {right} instead of {word} in JSON").format(word=match[0], right=replacement),
+            fix,
         )
-    shown = shortened(word[0], _MAX_WORD_LENGTH)
-    fix = JsonFix(position, word.end(), f'"{word[0]}"')
-    return _fault_at(text, position, _("{word} needs double quotes").format(word=shown), fix)
+    shown_word = shortened(match[0], _MAX_WORD_LENGTH)
+    fix = JsonFix(position, match.end(), f'"{match[0]}"')
+    return _fault_at(text, position, _("{word} needs double quotes").format(word=shown_word), fix)
 
 
 def _invalid_string_fault(text: str, position: int) -> JsonFault:

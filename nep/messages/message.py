@@ -41,8 +41,8 @@ def message_kind(
 
     An unknown codec is accepted; an exception is raised only when a payload is decoded.
     """
-    known = CODECS.get(codec)
-    decode = partial(_raise_unknown_codec, codec) if known is None else known.decode
+    known_codec = CODECS.get(codec)
+    decode = partial(_raise_unknown_codec, codec) if known_codec is None else known_codec.decode
     return MessageKind(topic, codec, msg_type, is_latched, decode, clock)
 
 
@@ -151,8 +151,10 @@ class Message:
             seen_ns = self.seen_ns
         except AttributeError:
             seen_ns = self.seen_ns = time.time_ns()
-        known = self.kind.clock.difference
-        return (seen_ns - self.stamp_ns - (0 if known is None else known.offset_ns)) / 1e9
+        clock_difference = self.kind.clock.difference
+        return (
+            seen_ns - self.stamp_ns - (0 if clock_difference is None else clock_difference.offset_ns)
+        ) / 1e9
 
     @property
     def latency_uncertainty_s(self) -> float | None:
@@ -161,8 +163,8 @@ class Message:
         0.0 on one computer. None if the two clocks have not been compared (yet); `latency_s` is not corrected
         then, and may be wrong by any amount.
         """
-        known = self.kind.clock.seconds()
-        return None if self.stamp_ns is None or known is None else known[1]
+        difference_s = self.kind.clock.seconds()
+        return None if self.stamp_ns is None or difference_s is None else difference_s[1]
 
     @property
     def size_bytes(self) -> int:

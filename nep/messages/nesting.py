@@ -46,14 +46,14 @@ def is_json_too_deep(data: bytes | memoryview) -> bool:
 
 
 def _has_many_brackets(data: bytes) -> bool:
-    left = MAX_LEVELS
+    remaining = MAX_LEVELS
     for bracket in (b"[", b"{"):
-        at = data.find(bracket)
-        while at >= 0:
-            left -= 1
-            if left < 0:
+        position = data.find(bracket)
+        while position >= 0:
+            remaining -= 1
+            if remaining < 0:
                 return True
-            at = data.find(bracket, at + 1)
+            position = data.find(bracket, position + 1)
     return False
 
 

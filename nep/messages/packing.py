@@ -92,12 +92,12 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
         most_lists: Maximum number of lists and maps.
         longest: Maximum length of a list or map.
     """
-    left = most_lists
+    remaining = most_lists
 
     def count(value: _Value) -> _Value:
-        nonlocal left
-        left -= 1
-        if left < 0:
+        nonlocal remaining
+        remaining -= 1
+        if remaining < 0:
             raise ValueError(
                 _("the value has more than {most_lists} lists and maps").format(most_lists=most_lists)
             )

@@ -54,22 +54,22 @@ class Inbox:
         self._bytes -= message.size_bytes
         return message
 
-    def move(self, into: deque[Message], most: int, most_bytes: int) -> None:
+    def move(self, target: deque[Message], max_messages: int, most_bytes: int) -> None:
         """Move the oldest messages to another queue.
 
         Args:
-            into: Queue to append to.
-            most: Maximum number of messages.
+            target: Queue to append to.
+            max_messages: Maximum number of messages.
             most_bytes: Stop after the message with which this total size is reached.
         """
         messages = self.messages
-        while messages and most > 0 and most_bytes > 0:
+        while messages and max_messages > 0 and most_bytes > 0:
             message = messages.popleft()
-            into.append(message)
+            target.append(message)
             size = message.size_bytes
             self._bytes -= size
             most_bytes -= size
-            most -= 1
+            max_messages -= 1
 
     def pop_all(self, most_bytes: int | None = None) -> list[Message]:
         """Remove and return all messages, oldest first.

@@ -46,8 +46,8 @@ class ShapeMismatch(Exception):  # noqa: N818 - internal
     @property
     def message(self) -> str:
         """Path and reason as a sentence."""
-        place = self.path or _("the value")
-        return f"{place} {self.reason}"
+        location = self.path or _("the value")
+        return f"{location} {self.reason}"
 
 
 class ValueShape:
@@ -124,10 +124,10 @@ def _float_shape() -> ValueShape:
     def write(value: object) -> float:
         if isinstance(value, float):
             return float(value)
-        plain = value if isinstance(value, int) else _from_numpy(value)
-        if isinstance(plain, int | float) and not isinstance(plain, bool):
+        converted = value if isinstance(value, int) else _from_numpy(value)
+        if isinstance(converted, int | float) and not isinstance(converted, bool):
             try:
-                return float(plain)
+                return float(converted)
             except OverflowError:
                 raise ShapeMismatch(
                     _("is too large; expected {wanted}").format(wanted=shape.expected)
@@ -147,14 +147,14 @@ def _int_shape() -> ValueShape:
         raise wrong_type_error(value, shape.expected)
 
     def write(value: object) -> int:
-        plain = value if isinstance(value, int) else _from_numpy(value)
-        if not isinstance(plain, int) or isinstance(plain, bool):
+        converted = value if isinstance(value, int) else _from_numpy(value)
+        if not isinstance(converted, int) or isinstance(converted, bool):
             raise wrong_type_error(value, shape.expected)
-        if not _MIN_INT <= plain <= _MAX_INT:
+        if not _MIN_INT <= converted <= _MAX_INT:
             raise ShapeMismatch(
                 _("doesn't fit into 64 bits; expected {wanted}").format(wanted=shape.expected)
             )
-        return int(plain)
+        return int(converted)
 
     shape.read, shape.write = read, write
     return shape
@@ -190,9 +190,9 @@ def _bool_shape() -> ValueShape:
     shape = ValueShape("bool", bool)
 
     def convert(value: object) -> bool:
-        plain = value if isinstance(value, bool) else _from_numpy(value)
-        if isinstance(plain, bool):
-            return plain
+        converted = value if isinstance(value, bool) else _from_numpy(value)
+        if isinstance(converted, bool):
+            return converted
         raise wrong_type_error(value, shape.expected)
 
     shape.read = shape.write = convert
@@ -233,9 +233,9 @@ def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
             raise wrong_type_error(
                 value, _("a string such as {example}").format(example=_DATETIME_EXAMPLES[kind])
             )
-        whole = f"{value[:-1]}+00:00" if value.endswith("Z") else value  # Python 3.10 does not parse "Z"
+        iso_text = f"{value[:-1]}+00:00" if value.endswith("Z") else value  # Python 3.10 does not parse "Z"
         try:
-            return kind.fromisoformat(whole)
+            return kind.fromisoformat(iso_text)
         except ValueError:
             raise ShapeMismatch(
                 _("is {value}; expected a string such as {example}").format(
@@ -284,7 +284,8 @@ def _matches_literal(value: object, allowed: object) -> bool:
 def literal_shape(values: Sequence[object]) -> ValueShape | None:
     """Return the shape of a Literal, or None if JSON can't represent one of its values."""
     if not all(
-        (each is None or isinstance(each, str | int)) and not isinstance(each, Enum) for each in values
+        (literal is None or isinstance(literal, str | int)) and not isinstance(literal, Enum)
+        for literal in values
     ):
         return None
     json_types = map(type, values)
@@ -293,9 +294,9 @@ def literal_shape(values: Sequence[object]) -> ValueShape | None:
     )
 
     def convert(value: object) -> object:
-        for each in values:
-            if _matches_literal(value, each):
-                return each
+        for literal in values:
+            if _matches_literal(value, literal):
+                return literal
         raise ShapeMismatch(
             _("is {value}; expected {wanted}").format(value=short_repr(value), wanted=shape.expected)
         )
@@ -307,22 +308,26 @@ def literal_shape(values: Sequence[object]) -> ValueShape | None:
 def enum_shape(kind: type[Enum]) -> ValueShape | None:
     """Return the shape of an Enum, sent by value, or None if JSON can't represent one of its values."""
     members = list(kind)
-    if not all(isinstance(each.value, str | int | float | None) for each in members):
+    if not all(isinstance(member.value, str | int | float | None) for member in members):
         return None
-    shape = ValueShape(kind.__name__, json_types=(type(each.value) for each in members))
+    shape = ValueShape(kind.__name__, json_types=(type(member.value) for member in members))
     is_flag = issubclass(kind, Flag)
 
     def read(value: object) -> object:
-        for each in members:
-            if _matches_literal(value, each.value):
-                return each
+        for member in members:
+            if _matches_literal(value, member.value):
+                return member
         if is_flag and isinstance(value, int) and not isinstance(value, bool):
             try:
                 return kind(value)
             except ValueError:
                 pass
-        wanted = shape.expected if is_flag else format_list([repr(each.value) for each in members], "or")
-        raise ShapeMismatch(_("is {value}; expected {wanted}").format(value=short_repr(value), wanted=wanted))
+        expected = (
+            shape.expected if is_flag else format_list([repr(member.value) for member in members], "or")
+        )
+        raise ShapeMismatch(
+            _("is {value}; expected {wanted}").format(value=short_repr(value), wanted=expected)
+        )
 
     def write(value: object) -> object:
         if not isinstance(value, kind):
@@ -353,13 +358,13 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
         describe=lambda: format_list([each.expected for each in (*others, *nones)], "or"),
     )
 
-    def first(value: object, ways: Sequence[Callable[[Any], Any]]) -> object:
+    def first(value: object, converters: Sequence[Callable[[Any], Any]]) -> object:
         mismatch = None
-        for way in ways:
+        for converter in converters:
             try:
-                return way(value)
-            except ShapeMismatch as found:
-                mismatch = found
+                return converter(value)
+            except ShapeMismatch as error:
+                mismatch = error
         if mismatch is not None and mismatch.steps and len(others) == 1:
             raise mismatch  # has the path inside the member
         raise wrong_type_error(value, shape.expected)
@@ -373,11 +378,11 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
 # ---- containers
 
 
-def _convert_items(way: Callable[[Any], Any], values: Iterable[Any], first: int = 0) -> list[Any]:
+def _convert_items(converter: Callable[[Any], Any], values: Iterable[Any], first: int = 0) -> list[Any]:
     converted: list[Any] = []
     try:
-        for each in values:
-            converted.append(way(each))  # noqa: PERF401 - the length gives the index for the error
+        for item in values:
+            converted.append(converter(item))  # noqa: PERF401 - the length gives the index for the error
     except ShapeMismatch as mismatch:
         mismatch.steps.append(f"[{first + len(converted)}]")
         raise
@@ -385,10 +390,10 @@ def _convert_items(way: Callable[[Any], Any], values: Iterable[Any], first: int 
 
 
 def _as_items(value: object, expected: str) -> list[Any] | tuple[Any, ...]:
-    plain = value if isinstance(value, list | tuple) else _from_numpy(value)
-    if not isinstance(plain, list | tuple):
+    items = value if isinstance(value, list | tuple) else _from_numpy(value)
+    if not isinstance(items, list | tuple):
         raise wrong_type_error(value, expected)
-    return plain
+    return items
 
 
 def list_shape(item: ValueShape, kind: type) -> ValueShape:
@@ -418,15 +423,15 @@ def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
         "tuple", json_types={list}, describe=lambda: _("{count} values").format(count=len(items))
     )
 
-    def convert(value: object, ways: Sequence[Callable[[Any], Any]]) -> list[Any]:
+    def convert(value: object, converters: Sequence[Callable[[Any], Any]]) -> list[Any]:
         values = _as_items(value, shape.expected)
-        if len(values) != len(ways):
+        if len(values) != len(converters):
             raise ShapeMismatch(
                 _("has {count} values; expected {wanted}").format(count=len(values), wanted=shape.expected)
             )
         converted: list[Any] = []
-        for way, part in zip(ways, values, strict=True):
-            converted += _convert_items(way, (part,), len(converted))
+        for converter, part in zip(converters, values, strict=True):
+            converted += _convert_items(converter, (part,), len(converted))
         return converted
 
     shape.read = lambda value: tuple(convert(value, [item.read for item in items]))
@@ -437,15 +442,15 @@ def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
 def map_shape(item: ValueShape) -> ValueShape:
     """Return the shape of a map with text keys."""
     shape = ValueShape("dict", json_types={dict})
-    word = SCALAR_SHAPES[str]
+    key_shape = SCALAR_SHAPES[str]
 
-    def convert(value: object, way: Callable[[Any], Any]) -> dict[str, Any]:
+    def convert(value: object, converter: Callable[[Any], Any]) -> dict[str, Any]:
         if not isinstance(value, Mapping):
             raise wrong_type_error(value, shape.expected)
         converted: dict[str, Any] = {}
         for key, part in value.items():
             try:
-                converted[word.write(key)] = way(part)
+                converted[key_shape.write(key)] = converter(part)
             except ShapeMismatch as mismatch:
                 raise mismatch.prepend_field(key) from mismatch.__cause__
         return converted

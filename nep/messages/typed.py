@@ -141,10 +141,10 @@ def typed_codec(declared: MessageType, base: Codec) -> Codec:
         try:
             return base.encode(write(payload))
         except ShapeMismatch as mismatch:
-            place, reason = mismatch.path, mismatch.message
+            path, reason = mismatch.path, mismatch.message
         except RecursionError:
-            place, reason = "", _("the value contains itself, or has too many levels")
-        raise EncodeError(declared.name, type(payload).__name__, reason, place)
+            path, reason = "", _("the value contains itself, or has too many levels")
+        raise EncodeError(declared.name, type(payload).__name__, reason, path)
 
     return replace(base, encode=encode, check=check)
 
@@ -182,9 +182,9 @@ class TypedReader:
         name, shape = self._declared.name, self._declared.shape
 
         def decode_typed(data: bytes | memoryview, extension: Mapping[str, object]) -> object:
-            plain = decode(data, extension)
+            decoded = decode(data, extension)
             try:
-                return shape.read(plain)
+                return shape.read(decoded)
             except ShapeMismatch as mismatch:
                 reason = mismatch.message
             except RecursionError:
@@ -197,47 +197,49 @@ class TypedReader:
 # ---- shapes of annotations
 
 
-def _shape(hint: Any, where: str, known: dict[object, ValueShape]) -> ValueShape:  # noqa: ANN401 - any annotation
+def _shape(hint: Any, location: str, known_shapes: dict[object, ValueShape]) -> ValueShape:  # noqa: ANN401 - any annotation
     # `where` names the field for errors. Raises `ValueError`.
     hint = _unwrap(hint)
     try:
         hash(hint)
     except TypeError:
-        raise _unsupported_error(hint, where) from None
+        raise _unsupported_error(hint, location) from None
     if hint in SCALAR_SHAPES:
         return SCALAR_SHAPES[hint]
     if isinstance(hint, type) and typing.get_origin(hint) is None:
-        return _shape_of_class(hint, where, known)
+        return _shape_of_class(hint, location, known_shapes)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is typing.Literal:
-        return _require_shape(literal_shape(arguments), hint, where)
+        return _require_shape(literal_shape(arguments), hint, location)
     if origin in {typing.Union, types.UnionType}:
-        return _require_distinct(union_shape([_shape(each, where, known) for each in arguments]), hint, where)
+        return _require_distinct(
+            union_shape([_shape(each, location, known_shapes) for each in arguments]), hint, location
+        )
     if origin in {list, Sequence, Iterable}:
-        return list_shape(_shape(arguments[0], where, known), list)
+        return list_shape(_shape(arguments[0], location, known_shapes), list)
     if origin is tuple:
         if arguments[1:] == (...,):
-            return list_shape(_shape(arguments[0], where, known), tuple)
-        return tuple_shape([_shape(each, where, known) for each in arguments])
+            return list_shape(_shape(arguments[0], location, known_shapes), tuple)
+        return tuple_shape([_shape(each, location, known_shapes) for each in arguments])
     if origin in {dict, Mapping} and arguments[0] is str:
-        return map_shape(_shape(arguments[1], where, known))
-    raise _unsupported_error(hint, where)
+        return map_shape(_shape(arguments[1], location, known_shapes))
+    raise _unsupported_error(hint, location)
 
 
-def _shape_of_class(hint: type, where: str, known: dict[object, ValueShape]) -> ValueShape:
-    if hint in known:
-        return known[hint]
+def _shape_of_class(hint: type, location: str, known_shapes: dict[object, ValueShape]) -> ValueShape:
+    if hint in known_shapes:
+        return known_shapes[hint]
     if is_dataclass(hint) or _is_typed_dict(hint):
-        shape = known[hint] = ValueShape(hint.__name__, json_types={dict})
-        (_fill_map if _is_typed_dict(hint) else _fill_dataclass)(shape, hint, known)
+        shape = known_shapes[hint] = ValueShape(hint.__name__, json_types={dict})
+        (_fill_map if _is_typed_dict(hint) else _fill_dataclass)(shape, hint, known_shapes)
         return shape
     if issubclass(hint, Enum):
-        return _require_shape(enum_shape(hint), hint, where)
+        return _require_shape(enum_shape(hint), hint, location)
     if hint in {list, tuple}:
         return list_shape(ANY_SHAPE, hint)
     if hint is dict:
         return map_shape(ANY_SHAPE)
-    raise _unsupported_error(hint, where)
+    raise _unsupported_error(hint, location)
 
 
 def _unwrap(hint: Any) -> Any:  # noqa: ANN401 - any annotation
@@ -268,28 +270,28 @@ def _is_typed_dict(hint: object) -> bool:
     return issubclass(hint, dict) and hasattr(hint, "__required_keys__")
 
 
-def _require_shape(shape: ValueShape | None, hint: object, where: str) -> ValueShape:
+def _require_shape(shape: ValueShape | None, hint: object, location: str) -> ValueShape:
     if shape is None:
-        raise _unsupported_error(hint, where)
+        raise _unsupported_error(hint, location)
     return shape
 
 
-def _require_distinct(shape: ValueShape | None, hint: object, where: str) -> ValueShape:
+def _require_distinct(shape: ValueShape | None, hint: object, location: str) -> ValueShape:
     if shape is None:
         raise ValueError(
             _(
                 "{where} is a '{type}', whose types can't be distinguished in JSON; use one of them, or "
                 "two fields"
-            ).format(where=where, type=_name_of(hint))
+            ).format(where=location, type=_name_of(hint))
         )
     return shape
 
 
-def _unsupported_error(hint: object, where: str) -> ValueError:
+def _unsupported_error(hint: object, location: str) -> ValueError:
     return ValueError(
         _(
             "{where} is a '{type}', which typed messages don't support; see docs/types.md for supported types"
-        ).format(where=where, type=_name_of(hint))
+        ).format(where=location, type=_name_of(hint))
     )
 
 
@@ -321,10 +323,10 @@ class _FieldEntry(NamedTuple):
     is_required: bool
 
 
-def _read_fields(value: object, entries: Sequence[_FieldEntry], whole: ValueShape) -> dict[str, Any]:
+def _read_fields(value: object, entries: Sequence[_FieldEntry], record_shape: ValueShape) -> dict[str, Any]:
     # Raises `ShapeMismatch` for a missing required field.
     if not isinstance(value, Mapping):
-        raise wrong_type_error(value, _("a map of the fields of '{name}'").format(name=whole.name))
+        raise wrong_type_error(value, _("a map of the fields of '{name}'").format(name=record_shape.name))
     values: dict[str, Any] = {}
     name = ""
     try:
@@ -340,22 +342,24 @@ def _read_fields(value: object, entries: Sequence[_FieldEntry], whole: ValueShap
     return values
 
 
-def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, ValueShape]) -> None:
+def _fill_dataclass(shape: ValueShape, declared: type, known_shapes: dict[object, ValueShape]) -> None:
     hints = _type_hints(declared)
     entries: list[_FieldEntry] = []
     written: list[tuple[str, ValueShape]] = []
-    for each in fields(declared):
-        where = f"{declared.__name__}.{each.name}"
-        is_required = each.init and each.default is MISSING and each.default_factory is MISSING
-        if not each.name.startswith("_"):
-            field_shape = _shape(hints[each.name], where, known)
-            written.append((each.name, field_shape))
-            if each.init:
-                other_name = each.metadata.get(OTHER_NAME_KEY, each.name)
-                entries.append(_FieldEntry(each.name, other_name, field_shape, is_required))
+    for data_field in fields(declared):
+        location = f"{declared.__name__}.{data_field.name}"
+        is_required = (
+            data_field.init and data_field.default is MISSING and data_field.default_factory is MISSING
+        )
+        if not data_field.name.startswith("_"):
+            field_shape = _shape(hints[data_field.name], location, known_shapes)
+            written.append((data_field.name, field_shape))
+            if data_field.init:
+                other_name = data_field.metadata.get(OTHER_NAME_KEY, data_field.name)
+                entries.append(_FieldEntry(data_field.name, other_name, field_shape, is_required))
         elif is_required:
-            raise ValueError(_("{where} isn't sent; add a default value").format(where=where))
-    _check_constructor(declared, {each.name for each in entries})
+            raise ValueError(_("{where} isn't sent; add a default value").format(where=location))
+    _check_constructor(declared, {data_field.name for data_field in entries})
 
     def read(value: object) -> object:
         return _create_instance(declared, _read_fields(value, entries, shape))
@@ -376,14 +380,17 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
 
 def _check_constructor(declared: type, names: Collection[str]) -> None:
     # Raises `ValueError` if the constructor needs more than the fields.
-    for each in inspect.signature(declared).parameters.values():
-        is_open = each.kind in {each.VAR_POSITIONAL, each.VAR_KEYWORD} or each.default is not each.empty
-        if not is_open and (each.name not in names or each.kind is each.POSITIONAL_ONLY):
+    for parameter in inspect.signature(declared).parameters.values():
+        is_open = (
+            parameter.kind in {parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD}
+            or parameter.default is not parameter.empty
+        )
+        if not is_open and (parameter.name not in names or parameter.kind is parameter.POSITIONAL_ONLY):
             raise ValueError(
                 _(
                     "{where} is required by the constructor but isn't a field of the message; add a "
                     "default value"
-                ).format(where=f"{declared.__name__}.{each.name}")
+                ).format(where=f"{declared.__name__}.{parameter.name}")
             )
 
 
@@ -398,14 +405,14 @@ def _create_instance(declared: type, arguments: Mapping[str, object]) -> object:
         ) from error
 
 
-def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]) -> None:
+def _fill_map(shape: ValueShape, declared: type, known_shapes: dict[object, ValueShape]) -> None:
     hints = _type_hints(declared)
     required: frozenset[str] = getattr(declared, "__required_keys__", frozenset())
     entries: list[_FieldEntry] = []
     for name, hint in hints.items():
         mark = _qualifier_of(hint)  # __required_keys__ is wrong with string annotations
         is_required = mark == "Required" or (name in required and mark != "NotRequired")
-        shape_of_it = _shape(hint, f"{declared.__name__}.{name}", known)
+        shape_of_it = _shape(hint, f"{declared.__name__}.{name}", known_shapes)
         entries.append(_FieldEntry(name, name, shape_of_it, is_required))
     shapes = {each.name: (each.shape, each.is_required) for each in entries}
 

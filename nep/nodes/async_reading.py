@@ -62,13 +62,13 @@ class AsyncReader:
             if not ready.done():
                 ready.set_result(None)
 
-        waits = loop_wait()
+        watcher = loop_wait()
         timeout = None if deadline is None else loop.call_at(deadline, set_ready)
-        waits.watch(self._transport, set_ready)
+        watcher.watch(self._transport, set_ready)
         try:
             await ready
         finally:
-            waits.unwatch(self._transport, set_ready)
+            watcher.unwatch(self._transport, set_ready)
             if timeout is not None:
                 timeout.cancel()
 

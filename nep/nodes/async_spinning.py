@@ -30,12 +30,12 @@ async def spin(work: Work, timeout_s: float | None) -> None:
     deadline = math.inf if timeout_s is None else work.clock() + timeout_s
     waiter = _LoopWaiter(work, loop, loop_wait())
     work.watch(waiter)
-    turns = 0
+    busy_turns = 0
     try:
         while work.is_running and work.clock() < deadline:
             if await _run_once(work):
-                turns = (turns + 1) % _MAX_BUSY_TURNS
-                if not turns:
+                busy_turns = (busy_turns + 1) % _MAX_BUSY_TURNS
+                if not busy_turns:
                     await yield_to_loop()
                 continue
             await waiter.wait(min(work.next_timer_delay_s, deadline - work.clock()))
@@ -73,10 +73,10 @@ async def _await_result(returned: object) -> None:
 class _LoopWaiter:
     """Waiter of a node that spins in an event loop. Messages, calls and `wake` end the wait."""
 
-    def __init__(self, work: Work, loop: asyncio.AbstractEventLoop, waits: LoopWait) -> None:
+    def __init__(self, work: Work, loop: asyncio.AbstractEventLoop, watcher: LoopWait) -> None:
         self._work = work
         self._loop = loop
-        self._waits = waits
+        self._waits = watcher
         self._ready = asyncio.Event()
         self._watched: dict[SubscriberTransport, Callable[[], None]] = {}
         self._queues: list[CallQueue] = []

@@ -49,9 +49,9 @@ def check_history(backend: Backend, history: int, configuration: Configuration) 
     check_range("history", history, 0, MAX_HISTORY)
     is_original = isinstance(configuration, Direct) and configuration.wire == "original"
     if history and (is_original or not backend.has_history):
-        where = _("the original wire") if is_original else _("the back end '{name}'")
+        subject = _("the original wire") if is_original else _("the back end '{name}'")
         raise ValueError(
-            _("{where} doesn't support history; omit history").format(where=where.format(name=backend.name))
+            _("{where} doesn't support history; omit history").format(where=subject.format(name=backend.name))
         )
     return history
 

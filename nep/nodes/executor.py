@@ -33,50 +33,50 @@ def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
         return
     clock = works[0].clock
     deadline = None if timeout_s is None else clock() + timeout_s
-    waits = SharedWait()
-    for each in works:
-        each.watch(waits)
+    shared_wait = SharedWait()
+    for work in works:
+        work.watch(shared_wait)
     try:
         running = list(works)
         while running := _running_works(running):
-            left = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - clock())
-            if left <= 0.0:
+            remaining_s = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - clock())
+            if remaining_s <= 0.0:
                 return
             # a generator would stop at the first
-            if any([each.run() for each in running if each.is_running]):  # noqa: C419
+            if any([work.run() for work in running if work.is_running]):  # noqa: C419
                 continue
-            left = min(left, *(each.next_timer_delay_s for each in running))
-            if left > 0.0:
-                _wait(waits, running, left)
-        for each in works:
-            each.check_not_forked()
+            remaining_s = min(remaining_s, *(work.next_timer_delay_s for work in running))
+            if remaining_s > 0.0:
+                _wait(shared_wait, running, remaining_s)
+        for work in works:
+            work.check_not_forked()
     finally:
-        for each in works:
-            each.unwatch(waits)
-            each.reset_stop()
-        waits.close()
+        for work in works:
+            work.unwatch(shared_wait)
+            work.reset_stop()
+        shared_wait.close()
 
 
 def _running_works(works: Sequence[Work]) -> list[Work]:
     # Another thread may now spin the stopped node.
-    running = [each for each in works if each.is_running]
-    for each in works:
-        if each not in running:
-            each.reset_stop()
+    running = [work for work in works if work.is_running]
+    for work in works:
+        if work not in running:
+            work.reset_stop()
     return running
 
 
-def _wait(waits: SharedWait, works: Sequence[Work], timeout_s: float) -> None:
+def _wait(shared_wait: SharedWait, works: Sequence[Work], timeout_s: float) -> None:
     # Disarms everything at the end: a subscriber that stays armed but is not read would block its publisher.
     entered: list[CallQueue] = []
     try:
-        for each in (queue for work in works for queue in work.services.queues):
-            if not each.enter_wait(waits.wake):
+        for call_queue in (queue for work in works for queue in work.services.queues):
+            if not call_queue.enter_wait(shared_wait.wake):
                 return
-            entered.append(each)
-        if all(waits.arm(each) for work in works for each in work.waiting_subscribers):
-            waits.wait(timeout_s)
+            entered.append(call_queue)
+        if all(shared_wait.arm(call_queue) for work in works for call_queue in work.waiting_subscribers):
+            shared_wait.wait(timeout_s)
     finally:
-        waits.disarm_all()
-        for each in entered:
-            each.leave_wait(waits.wake)
+        shared_wait.disarm_all()
+        for call_queue in entered:
+            call_queue.leave_wait(shared_wait.wake)

@@ -78,7 +78,7 @@ class LogRecord:
 
     def to_plain(self) -> dict[str, object]:
         """Return the record as the payload of a message. Fields that are None are omitted."""
-        plain: dict[str, object] = {
+        payload: dict[str, object] = {
             "level": self.level,
             "text": self.text,
             "name": self.name,
@@ -86,7 +86,7 @@ class LogRecord:
             "stamp_ns": self.stamp_ns,
         }
         optional = {"file": self.file, "line": self.line, "pid": self.pid}
-        return plain | {key: value for key, value in optional.items() if value is not None}
+        return payload | {key: value for key, value in optional.items() if value is not None}
 
     @classmethod
     def from_plain(cls, payload: object, stamp_ns: int | None = None) -> LogRecord:
@@ -110,11 +110,11 @@ class LogRecord:
         )
 
 
-def parse_level(given: object) -> str:
+def parse_level(value: object) -> str:
     """Return the level for a name or an alias such as "WARN"; "info" for an unknown name."""
-    word = given.strip().lower() if isinstance(given, str) else ""
-    word = _LEVEL_ALIASES.get(word, word)
-    return word if word in LEVELS else "info"
+    level = value.strip().lower() if isinstance(value, str) else ""
+    level = _LEVEL_ALIASES.get(level, level)
+    return level if level in LEVELS else "info"
 
 
 class NewErrorFilter:
@@ -140,8 +140,8 @@ class NewErrorFilter:
 
     def new_records(self, payload: object) -> list[LogRecord]:
         """Return the errors of a latched list that were not shown yet, oldest first."""
-        given = payload[-MAX_LAST_ERRORS:] if isinstance(payload, list) else []
-        records = sorted(map(LogRecord.from_plain, given), key=lambda record: record.stamp_ns)
+        entries = payload[-MAX_LAST_ERRORS:] if isinstance(payload, list) else []
+        records = sorted(map(LogRecord.from_plain, entries), key=lambda record: record.stamp_ns)
         return [record for record in records if record.stamp_ns and self.is_new(record)]
 
 
@@ -225,7 +225,7 @@ class LogHandler(logging.Handler):
                 self._dropped += 1
                 return
         try:
-            plain = self._to_plain(record)
+            payload = self._to_plain(record)
         except Exception:  # noqa: BLE001 - a logging error must not end the program
             self.handleError(record)
             return
@@ -239,7 +239,7 @@ class LogHandler(logging.Handler):
             except RuntimeError:
                 self._dropped += 1
                 return
-            self._queue.append(plain)
+            self._queue.append(payload)
             self._has_work.notify()
 
     def close(self, timeout_s: float = _FLUSH_TIMEOUT_S) -> None:
@@ -376,9 +376,9 @@ def _level_name(level: int) -> str:
     return LEVELS[0] if level < logging.INFO else LEVELS[min(4, level // 10 - 1)]
 
 
-def _short_text(given: object) -> str:
-    return given[:200] if isinstance(given, str) else ""
+def _short_text(value: object) -> str:
+    return value[:200] if isinstance(value, str) else ""
 
 
-def _int_or_none(given: object) -> int | None:
-    return given if isinstance(given, int) and not isinstance(given, bool) else None
+def _int_or_none(value: object) -> int | None:
+    return value if isinstance(value, int) and not isinstance(value, bool) else None

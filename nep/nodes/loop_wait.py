@@ -55,12 +55,12 @@ def loop_wait() -> LoopWait:
     """Return the `LoopWait` of the running loop; create it if needed. Raises `TooManyFilesError`."""
     loop = asyncio.get_running_loop()
     with _lock:
-        known = _waits.get(id(loop))
-        if known is None or not known.serves(loop):
-            known = LoopWait(loop)
-            known.start()
-            _waits[id(loop)] = known
-        return known
+        watcher = _waits.get(id(loop))
+        if watcher is None or not watcher.serves(loop):
+            watcher = LoopWait(loop)
+            watcher.start()
+            _waits[id(loop)] = watcher
+        return watcher
 
 
 @coroutine

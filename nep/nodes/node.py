@@ -437,8 +437,8 @@ class Node(ServiceNode):
         Raises:
             NepError: No node or several nodes match, or the node has no parameters.
         """
-        found = node_with_parameters(self.graph(), node)
-        return RemoteParameters(self.new_client(parameters_topic(found), timeout_s=timeout_s))
+        node_id = node_with_parameters(self.graph(), node)
+        return RemoteParameters(self.new_client(parameters_topic(node_id), timeout_s=timeout_s))
 
     def open_parameters(self, place: str, answer: Callable[[object], object]) -> Publisher:
         """Open the latched topic `place` for this node's parameters, and the service `place` if supported.
@@ -678,12 +678,12 @@ def spin(*nodes: Node, timeout_s: float | None = None) -> None:
 def _close(nodes: Sequence[Node], timeout_s: float) -> None:
     # Closes all nodes within `timeout_s`. All begin to close first, so that none waits for another.
     started = time.monotonic()
-    for each in nodes:
-        each._close_log(0.0)  # noqa: SLF001 - private to this module
-    for each in nodes:  # the logs must be flushed before the publishers close
-        each._close_log(max(0.0, started + timeout_s / 4 - time.monotonic()))  # noqa: SLF001
-    for each in [each for each in nodes if each._begin_close()]:  # noqa: SLF001
-        each._finish_close(max(0.0, started + timeout_s - time.monotonic()))  # noqa: SLF001
+    for node in nodes:
+        node._close_log(0.0)  # noqa: SLF001 - private to this module
+    for node in nodes:  # the logs must be flushed before the publishers close
+        node._close_log(max(0.0, started + timeout_s / 4 - time.monotonic()))  # noqa: SLF001
+    for node in [node for node in nodes if node._begin_close()]:  # noqa: SLF001
+        node._finish_close(max(0.0, started + timeout_s - time.monotonic()))  # noqa: SLF001
 
 
 def _close_all() -> None:

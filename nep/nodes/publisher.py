@@ -392,25 +392,25 @@ class RejectedPayloads:
         now = self._clock()
         if self._located[0] != reason and (now >= self._locate_at or not self._located[0]):
             self._locate_at = now + _VALIDATE_INTERVAL_S  # finding the path may take long
-            place = "" if getattr(error, "place", "") else _escaped_unencodable_path(payload, self._encode)
-            self._located = (reason, f"{reason}; it is at '{place}'" if place else reason)
-        sentence = self._located[1] if self._located[0] == reason else reason
+            path = "" if getattr(error, "place", "") else _escaped_unencodable_path(payload, self._encode)
+            self._located = (reason, f"{reason}; it is at '{path}'" if path else reason)
+        message = self._located[1] if self._located[0] == reason else reason
         if is_logged(self.count):
             _logger.warning(
-                "a message on '%s' can't be sent (%d so far): %s", self._topic, self.count, sentence
+                "a message on '%s' can't be sent (%d so far): %s", self._topic, self.count, message
             )
-        if sentence != self.problem:
-            self.problem = sentence
-            self._report(sentence)
+        if message != self.problem:
+            self.problem = message
+            self._report(message)
 
     def error(self, payload: object, error: Exception, codec: str) -> EncodeError:
         """Return the exception to raise for a payload, with the path of the value that can't be encoded."""
         if not isinstance(error, EncodeError):
             error = EncodeError(codec, type(payload).__name__, _error_text(error))
-        place = error.place or _escaped_unencodable_path(payload, self._encode)
-        if not place or error.place:
+        path = error.place or _escaped_unencodable_path(payload, self._encode)
+        if not path or error.place:
             return error
-        return EncodeError(error.codec, error.kind, f"{error.reason}; it is at '{place}'", place)
+        return EncodeError(error.codec, error.kind, f"{error.reason}; it is at '{path}'", path)
 
     def resolve(self) -> None:
         """Clear the reported problem after a payload was encoded successfully."""

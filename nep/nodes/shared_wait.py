@@ -19,8 +19,8 @@ _POLL_INTERVAL_S = 0.01
 class _ReadyCallback:
     """Object that a transport wakes when its subscriber may have a message. Implements `Wakeable`."""
 
-    def __init__(self, waits: SharedWait, subscriber: SubscriberTransport) -> None:
-        self._waits = waits
+    def __init__(self, shared_wait: SharedWait, subscriber: SubscriberTransport) -> None:
+        self._waits = shared_wait
         self._subscriber = subscriber
 
     def wake(self) -> None:

@@ -231,10 +231,10 @@ class Subscriber:
         while True:
             if self._transport.is_closed:
                 raise self._closed_error()
-            left = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - time.monotonic())
-            if left <= 0.0:
+            remaining_s = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - time.monotonic())
+            if remaining_s <= 0.0:
                 return None
-            message = self._transport.receive(left)
+            message = self._transport.receive(remaining_s)
             if message is not None:
                 return message
 

@@ -122,8 +122,8 @@ class Work:
     def wake(self) -> None:
         """Wake the spinning thread so that it re-evaluates its work."""
         self.transport.wake()
-        for each in self._watchers:
-            each.wake()
+        for watcher in self._watchers:
+            watcher.wake()
 
     def watch(self, watcher: Wakeable) -> None:
         """Register an object that `wake` also wakes."""
@@ -144,8 +144,8 @@ class Work:
         self._is_stopped.set()
         for timer in timers:
             timer.node_closes()
-        for each in self._watchers:
-            each.wake()
+        for watcher in self._watchers:
+            watcher.wake()
 
     def forked(self) -> None:
         """Discard everything in a forked child process. See `nep.system.forks`."""
@@ -210,10 +210,10 @@ class Work:
                 elif ready:
                     payload = decoded_unshared(ready.popleft())
                 else:
-                    found = None if transport.is_closed else transport.poll()
-                    if found is None:
+                    polled = None if transport.is_closed else transport.poll()
+                    if polled is None:
                         return is_burst
-                    payload = decoded_unshared(found)
+                    payload = decoded_unshared(polled)
             except (DecodeError, IndexError):
                 continue  # already logged and reported; or another thread took the last one
             call(payload)
@@ -247,10 +247,10 @@ class Work:
             try:  # inlined from `next_item`, which takes a third longer per message
                 message = transport.ready.popleft()
             except IndexError:
-                found = None if transport.is_closed else transport.poll()
-                if found is None:
+                polled = None if transport.is_closed else transport.poll()
+                if polled is None:
                     continue
-                message = found
+                message = polled
             if transport.ready or subscriber.payloads:
                 has_more = True
             if subscriber.is_typed:
@@ -270,10 +270,10 @@ class Work:
         try:
             message = transport.ready.popleft()
         except IndexError:
-            found = None if transport.is_closed else transport.poll()
-            if found is None:
+            polled = None if transport.is_closed else transport.poll()
+            if polled is None:
                 return NO_MESSAGE
-            message = found
+            message = polled
         if subscriber.is_typed:
             message = subscriber.typed(message)
         try:
@@ -310,15 +310,15 @@ class Work:
         is_stopped = self._is_stopped.is_set
         try:
             while not is_stopped() and not self.is_closed:
-                left = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - self.clock())
-                if left <= 0.0:
+                remaining_s = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - self.clock())
+                if remaining_s <= 0.0:
                     return
-                if self._run_until(self.clock() + left):
+                if self._run_until(self.clock() + remaining_s):
                     continue
                 if self.timers:
-                    left = min(left, self.next_timer_delay_s)
-                if left > 0.0:
-                    self._wait(left)
+                    remaining_s = min(remaining_s, self.next_timer_delay_s)
+                if remaining_s > 0.0:
+                    self._wait(remaining_s)
             self.check_not_forked()
         finally:
             self.reset_stop()

@@ -103,11 +103,11 @@ def parse_entries(body: bytes) -> list[BatchEntry]:
     if table.size + sum(sizes) != len(body):
         reason = _("the sizes in a batch don't match its messages")
         raise WireError(reason, len(body), code="batch-sizes")
-    found, at = [], table.size
+    entries, offset = [], table.size
     for number, (size, stamp_ns) in enumerate(zip(sizes, stamps, strict=True)):
-        found.append(BatchEntry(number, stamp_ns, at, at + size))
-        at += size
-    return found
+        entries.append(BatchEntry(number, stamp_ns, offset, offset + size))
+        offset += size
+    return entries
 
 
 def check_batch(header: Header, body: bytes) -> None:
@@ -130,21 +130,21 @@ def read_parts(parts: Sequence[bytes | memoryview]) -> list[Parts]:
     Raises:
         WireError: The parts violate the specification. The rules are checked in the order of docs/wire.md.
     """
-    one = split(parts)
-    found = [one] if not one.header.flags & BATCH else _split_batch(one)
-    if codec_by_number(one.header.codec) is None:
-        raise unknown_codec_error(one.header.codec)
-    return found
+    message = split(parts)
+    messages = [message] if not message.header.flags & BATCH else _split_batch(message)
+    if codec_by_number(message.header.codec) is None:
+        raise unknown_codec_error(message.header.codec)
+    return messages
 
 
-def _split_batch(one: Parts) -> list[Parts]:
-    body = bytes(one.payload)
-    check_batch(one.header, body)
+def _split_batch(message: Parts) -> list[Parts]:
+    body = bytes(message.payload)
+    check_batch(message.header, body)
     return [
-        one._replace(
-            header=one.header._replace(
+        message._replace(
+            header=message.header._replace(
                 flags=0,
-                seq=one.header.seq + each.number,
+                seq=message.header.seq + each.number,
                 stamp_ns=each.stamp_ns,
                 size=each.end - each.begin,
             ),

@@ -125,11 +125,11 @@ class ClockSamples:
     def _best_sample(self, steady_ns: int) -> _Sample | None:
         return min(self._samples, key=lambda each: each.uncertainty_at(steady_ns), default=None)
 
-    def _is_consistent(self, then: Moment, now: Moment) -> bool:
+    def _is_consistent(self, previous: Moment, now: Moment) -> bool:
         # True if both clocks have advanced equally.
-        by_steady = now.steady_ns - then.steady_ns
-        allowed = _MIN_STEP_NS + then.uncertainty_ns + now.uncertainty_ns + 2 * self._resolution_ns
-        return abs(now.wall_ns - then.wall_ns - by_steady) <= allowed + max(0, by_steady) // _SLEW_DIVISOR
+        by_steady = now.steady_ns - previous.steady_ns
+        allowed = _MIN_STEP_NS + previous.uncertainty_ns + now.uncertainty_ns + 2 * self._resolution_ns
+        return abs(now.wall_ns - previous.wall_ns - by_steady) <= allowed + max(0, by_steady) // _SLEW_DIVISOR
 
     def _on_step(self) -> None:
         self.steps += 1

@@ -139,8 +139,8 @@ class ReplyEncoder:
             return self._encode_view(answer, call)
         return pack_saturated({"is": _REPLY_NAMES[type(answer)], "re": call, "what": write(answer)})
 
-    def _encode_view(self, answer: GraphReply, call: int) -> bytes:
-        view = answer.view
+    def _encode_view(self, reply: GraphReply, call: int) -> bytes:
+        view = reply.view
         header = msgpack.Packer().pack_map_header
         other_fields: dict[str, object] = {
             "epoch": view.epoch,
@@ -161,7 +161,7 @@ class ReplyEncoder:
                 header(3),
                 *map(pack_saturated, ("is", "seen", "re", call, "what")),
                 header(3),
-                *map(pack_saturated, ("epoch", answer.epoch, "revision", answer.revision, "view")),
+                *map(pack_saturated, ("epoch", reply.epoch, "revision", reply.revision, "view")),
                 header(len(other_fields) + 2),
                 *(pack_saturated(key) + pack_saturated(item) for key, item in other_fields.items()),
                 pack_saturated("nodes"),
@@ -191,9 +191,9 @@ def _packable_value(value: object) -> object:
     return clamp_int(value) if isinstance(value, int) else vars(value)
 
 
-def encode_reply(answer: Reply | Push, call: int = 0) -> bytes:
+def encode_reply(reply: Reply | Push, call: int = 0) -> bytes:
     """Encode a reply to `call`, or a push."""
-    return ReplyEncoder().encode(answer, call)
+    return ReplyEncoder().encode(reply, call)
 
 
 def call_of_graph_reply(body: bytes) -> int | None:
@@ -294,9 +294,9 @@ def read(kind: type[T], value: object) -> T:
     try:
         return cast("T", _reader(hint)(value))
     except _MismatchError as mismatch:
-        where = ".".join((kind.__name__, *reversed(mismatch.path)))
+        field_path = ".".join((kind.__name__, *reversed(mismatch.path)))
         code = "field-missing" if mismatch.words == _MISSING_FIELD_MESSAGE else "field-type"
-        raise WireError(_(mismatch.words).format(field=where, **mismatch.values), code=code) from None
+        raise WireError(_(mismatch.words).format(field=field_path, **mismatch.values), code=code) from None
 
 
 class _MismatchError(Exception):
@@ -308,9 +308,9 @@ class _MismatchError(Exception):
         path: Field path, innermost first.
     """
 
-    def __init__(self, words: str, **values: str) -> None:
-        super().__init__(words)
-        self.words, self.values = words, values
+    def __init__(self, template: str, **values: str) -> None:
+        super().__init__(template)
+        self.words, self.values = template, values
         self.path: list[str] = []
 
 
@@ -391,20 +391,20 @@ def _dataclass_reader(kind: type) -> Reader:
             return fast_value
         if not isinstance(value, Mapping):
             raise _MismatchError(_NOT_A_MAP_MESSAGE, given=type(value).__name__)
-        found: dict[str, object] = {}
+        values: dict[str, object] = {}
         for name, usual, reader, field in readers:
             item = value.get(name, MISSING)
             if item is MISSING:
-                found[name] = _default_value(field)
+                values[name] = _default_value(field)
             elif type(item) is usual:
-                found[name] = item
+                values[name] = item
             else:
                 try:
-                    found[name] = reader(item)
+                    values[name] = reader(item)
                 except _MismatchError as mismatch:
                     mismatch.path.append(name)
                     raise
-        return create_frozen(kind, found)
+        return create_frozen(kind, values)
 
     return parse
 
@@ -412,29 +412,29 @@ def _dataclass_reader(kind: type) -> Reader:
 def _fast_reader(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, object]], object | None]:
     # Returns a function for the common case in graphs: a map of exactly the fields, each of its type. It
     # returns None for any other map, which the general parser then handles or rejects.
-    plain = {name: _plain_types(hint) for name, hint in hints.items()}
-    names = [name for name, types in plain.items() if types]
-    others = [(name, _reader(hints[name])) for name, types in plain.items() if not types]
+    types_by_field = {name: _plain_types(hint) for name, hint in hints.items()}
+    names = [name for name, types in types_by_field.items() if types]
+    others = [(name, _reader(hints[name])) for name, types in types_by_field.items() if not types]
     of_plain = itemgetter(*names) if len(names) > 1 else lambda value: tuple(value[name] for name in names)
-    known: set[tuple[type, ...]] = set()
+    valid_types: set[tuple[type, ...]] = set()
     """Combinations of field types that were found valid. An optional field has two possible types."""
 
     def read_fast(value: dict[str, object]) -> object | None:
-        if len(value) != len(plain):
+        if len(value) != len(types_by_field):
             return None
         try:
             types = tuple(map(type, of_plain(value)))
-            if types not in known:
-                if not all(each in plain[name] for name, each in zip(names, types, strict=True)):
+            if types not in valid_types:
+                if not all(each in types_by_field[name] for name, each in zip(names, types, strict=True)):
                     return None
-                known.add(types)
+                valid_types.add(types)
             fields_of_it = dict(value)
             for name, reader in others:
                 fields_of_it[name] = reader(value[name])
         except (LookupError, _MismatchError):
             return None
-        fresh: object = create_frozen(kind, fields_of_it)
-        return fresh
+        instance: object = create_frozen(kind, fields_of_it)
+        return instance
 
     return read_fast
 

@@ -220,8 +220,8 @@ def error_reply(kind: CallKind, name: str, reason: str) -> Reply:
     return Reply(kind, orjson.dumps(content))
 
 
-def _bounded_text(text: str, most: int) -> str:
-    return shortened(text, most).encode("utf-8", "replace").decode()
+def _bounded_text(text: str, max_length: int) -> str:
+    return shortened(text, max_length).encode("utf-8", "replace").decode()
 
 
 def read_error_reply(data: bytes | memoryview) -> tuple[str, str]:

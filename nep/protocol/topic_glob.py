@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 
-def is_glob(word: str) -> bool:
+def is_glob(text: str) -> bool:
     """Return True if a word contains a wildcard."""
-    return any(letter in word for letter in "*?")
+    return any(letter in text for letter in "*?")
 
 
 def widened_pattern(pattern: str) -> str:
@@ -29,36 +29,38 @@ def widened_pattern(pattern: str) -> str:
 def glob_matches(pattern: str, topic: str) -> bool:
     """Return True if a topic matches a glob pattern."""
     parts = pattern.split("/")
-    at = _skip_empty_matches(parts, {0})
+    positions = _skip_empty_matches(parts, {0})
     for part in topic.split("/"):
-        after = {each for each in at if each < len(parts) and parts[each] == "**"}
-        after |= {each + 1 for each in at - after if each < len(parts) and _level_matches(parts[each], part)}
-        at = _skip_empty_matches(parts, after)
-    return len(parts) in at
+        after = {each for each in positions if each < len(parts) and parts[each] == "**"}
+        after |= {
+            each + 1 for each in positions - after if each < len(parts) and _level_matches(parts[each], part)
+        }
+        positions = _skip_empty_matches(parts, after)
+    return len(parts) in positions
 
 
-def _skip_empty_matches(parts: Sequence[str], at: set[int]) -> set[int]:
+def _skip_empty_matches(parts: Sequence[str], positions: set[int]) -> set[int]:
     # Adds the positions after each reachable `**`, which may match nothing.
-    found = set(at)
-    for each in range(len(parts)):
-        if each in found and parts[each] == "**":
-            found.add(each + 1)
-    return found
+    reachable = set(positions)
+    for index in range(len(parts)):
+        if index in reachable and parts[index] == "**":
+            reachable.add(index + 1)
+    return reachable
 
 
 def _level_matches(pattern: str, part: str) -> bool:
     # Linear backtracking to the last `*` only: a regular expression takes minutes for `*a*a*a*a*a*b`.
-    at = begin = after = 0
+    pattern_index = begin = after = 0
     star = -1
     while begin < len(part):
-        letter = pattern[at : at + 1]
+        letter = pattern[pattern_index : pattern_index + 1]
         if letter == "*":
-            star, at, after = at, at + 1, begin
+            star, pattern_index, after = pattern_index, pattern_index + 1, begin
         elif letter and letter in {"?", part[begin]}:
-            at, begin = at + 1, begin + 1
+            pattern_index, begin = pattern_index + 1, begin + 1
         elif star >= 0:
             after += 1  # let the star match one more character
-            at, begin = star + 1, after
+            pattern_index, begin = star + 1, after
         else:
             return False
-    return not pattern[at:].strip("*")
+    return not pattern[pattern_index:].strip("*")

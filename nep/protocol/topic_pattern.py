@@ -25,24 +25,24 @@ def levels_match(parts: Sequence[str], levels: Sequence[str]) -> bool:
     """Return True if the levels of a topic match the levels of a pattern. See `matches`."""
     if _ANY not in parts and len(parts) != len(levels):
         return False
-    at = _skip_empty_matches(parts, {0})
+    positions = _skip_empty_matches(parts, {0})
     for level in levels:
-        after = {each for each in at if each < len(parts) and parts[each] == _ANY}
+        after = {each for each in positions if each < len(parts) and parts[each] == _ANY}
         after |= {
             each + 1
-            for each in at - after
+            for each in positions - after
             if each < len(parts) and (parts[each] == level or (parts[each] == _ONE and level))
         }
-        at = _skip_empty_matches(parts, after)
-        if not at:
+        positions = _skip_empty_matches(parts, after)
+        if not positions:
             return False
-    return len(parts) in at
+    return len(parts) in positions
 
 
-def _skip_empty_matches(parts: Sequence[str], at: set[int]) -> set[int]:
+def _skip_empty_matches(parts: Sequence[str], positions: set[int]) -> set[int]:
     # Adds the positions after each reachable `**`, which may match nothing.
-    found = set(at)
-    for each, part in enumerate(parts):
-        if part == _ANY and each in found:
-            found.add(each + 1)
-    return found
+    reachable = set(positions)
+    for index, part in enumerate(parts):
+        if part == _ANY and index in reachable:
+            reachable.add(index + 1)
+    return reachable

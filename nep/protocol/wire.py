@@ -271,10 +271,10 @@ def parse_acceptance(part: bytes) -> OfferAcceptance | None:
 
 
 def _numbers_after(begin: bytes, part: bytes, count: int) -> list[int] | None:
-    words = part[len(begin) :].split(b"/")
-    if not part.startswith(begin) or len(words) != count or not all(map(_ID_PATTERN.fullmatch, words)):
+    fields = part[len(begin) :].split(b"/")
+    if not part.startswith(begin) or len(fields) != count or not all(map(_ID_PATTERN.fullmatch, fields)):
         return None
-    return [int(each, 16) for each in words]
+    return [int(each, 16) for each in fields]
 
 
 def read_header(part: bytes) -> Header:

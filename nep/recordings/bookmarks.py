@@ -75,13 +75,13 @@ class Bookmarks:
 
     def before(self, at_ns: int) -> Bookmark | None:
         """Return the last bookmark before a time in ns since 1970, or None."""
-        place = bisect_left(self._all, at_ns, key=_at_ns)
-        return self._all[place - 1] if place else None
+        index = bisect_left(self._all, at_ns, key=_at_ns)
+        return self._all[index - 1] if index else None
 
     def after(self, at_ns: int) -> Bookmark | None:
         """Return the first bookmark after a time in ns since 1970, or None."""
-        place = bisect_right(self._all, at_ns, key=_at_ns)
-        return self._all[place] if place < len(self._all) else None
+        index = bisect_right(self._all, at_ns, key=_at_ns)
+        return self._all[index] if index < len(self._all) else None
 
     # ---- changes
 
@@ -146,10 +146,10 @@ class Bookmarks:
             return []
 
     def _save(self, bookmarks: list[Bookmark]) -> None:
-        plain = {"bookmarks": [{"at_ns": each.at_ns, "name": each.name} for each in bookmarks]}
+        document = {"bookmarks": [{"at_ns": each.at_ns, "name": each.name} for each in bookmarks]}
         unfinished = self.path.with_name(f"{self.path.name}.part")
         try:
-            text = orjson.dumps(plain, option=orjson.OPT_INDENT_2)
+            text = orjson.dumps(document, option=orjson.OPT_INDENT_2)
         except TypeError as error:  # a lone surrogate
             raise RecordingError(
                 str(self.path), _("the name of a bookmark contains invalid characters")
@@ -171,10 +171,10 @@ class Bookmarks:
         self._sort()
 
 
-def _parse_bookmark(plain: object) -> Bookmark:
+def _parse_bookmark(value: object) -> Bookmark:
     # Raises `ValueError`.
-    at_ns = plain.get("at_ns") if isinstance(plain, dict) else None
-    name = plain.get("name") if isinstance(plain, dict) else None
+    at_ns = value.get("at_ns") if isinstance(value, dict) else None
+    name = value.get("name") if isinstance(value, dict) else None
     if type(at_ns) is not int or not 0 <= at_ns < 2**64 or not isinstance(name, str):
         raise ValueError("no bookmark")
     return Bookmark(at_ns, name[:_MAX_NAME_LENGTH])

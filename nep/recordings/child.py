@@ -91,7 +91,7 @@ class RecorderService:
 
     Args:
         node: Node that subscribes to the topics; stays open.
-        tell: Called with events, one at a time, in any thread.
+        report: Called with events, one at a time, in any thread.
         stats_interval_s: Interval between "figures" events in seconds.
         clock: Monotonic clock in seconds.
     """
@@ -99,14 +99,14 @@ class RecorderService:
     def __init__(
         self,
         node: Node,
-        tell: EventCallback,
+        report: EventCallback,
         *,
         stats_interval_s: float = STATS_INTERVAL_S,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Start the thread that reports the state of recordings. The node stays open after `close`."""
         self._clock = clock
-        self._node, self._report = node, tell
+        self._node, self._report = node, report
         self._tell_lock = threading.Lock()
         self._lock = threading.RLock()
         """Lock that is held while a recording or the ring starts or stops."""
@@ -143,14 +143,14 @@ class RecorderService:
         with self._lock:
             self._report_errors(str(op), path if isinstance(path, str) else "", lambda: carry_out(order))
 
-    def _report_errors(self, op: str, path: str, work: Callable[[], object]) -> None:
+    def _report_errors(self, op: str, path: str, function: Callable[[], object]) -> None:
         try:
-            work()
+            function()
         except (NepError, OSError) as error:
             self._report_problem(op, str(error), path)
         except (TypeError, ValueError, KeyError, OverflowError) as error:
-            words = _("the command is invalid: {error}").format(error=error)
-            self._report_problem(op, words, path)
+            message = _("the command is invalid: {error}").format(error=error)
+            self._report_problem(op, message, path)
 
     def close(self) -> None:
         """Stop the recording and the ring, and finish the file. Errors are reported as events, not raised."""
@@ -173,8 +173,8 @@ class RecorderService:
         with self._tell_lock:
             self._report({"event": event, **content})
 
-    def _report_problem(self, op: str, sentence: str, path: str = "") -> None:
-        self.report("problem", op=op, sentence=sentence, path=path)
+    def _report_problem(self, op: str, message: str, path: str = "") -> None:
+        self.report("problem", op=op, sentence=message, path=path)
 
     def _wake_on_failure(self, _reason: str) -> None:
         # Called by a writer thread, which can't join itself.
@@ -262,13 +262,13 @@ class RecorderService:
         seconds, note = float(order.get("seconds", 60.0)), _text(order, "note", "")
 
         def copy() -> None:
-            kept = ring.save(path, seconds, note)
+            saved = ring.save(path, seconds, note)
             self.report(
-                "kept", path=path, message_count=kept.message_count, duration_s=kept.duration_s, note=note
+                "kept", path=path, message_count=saved.message_count, duration_s=saved.duration_s, note=note
             )
 
-        work = partial(self._report_errors, "keep", path, copy)
-        self._copies.append(threading.Thread(target=work, name="recorder-keep", daemon=True))
+        target = partial(self._report_errors, "keep", path, copy)
+        self._copies.append(threading.Thread(target=target, name="recorder-keep", daemon=True))
         self._copies[-1].start()
 
     def _stop_ring(self, _order: Mapping[str, Any]) -> None:

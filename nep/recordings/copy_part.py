@@ -134,13 +134,13 @@ class _PartCopier:
         self._write_stats(self._last_ns, is_final=True)
         writer.flush()
         if self._figures is not None or recording.recorder_metadata:
-            words = {
+            metadata = {
                 "started_ns": str(writer.start_ns or 0),
                 "ended_ns": str(writer.end_ns),
                 "note": recording.recorder_metadata.get("note", ""),
                 "end": "",
             }
-            writer.add_metadata("nep.recording", words)
+            writer.add_metadata("nep.recording", metadata)
         if self._figures is not None:
             writer.add_metadata("nep.figures", self._figures.to_plain())
         for name, values in recording.info.metadata:
@@ -172,10 +172,10 @@ class _StatsCounter:
             return None
         self._next_ns = at_ns + _STATS_INTERVAL_NS
         counters = dict(self._counters) if is_final else dict(changed(self._counters))
-        plain = {topic: each.stats().to_plain() for topic, each in counters.items()}
-        for each in counters.values():
-            each.is_changed = False
-        return orjson.dumps({"topics": plain, "is_final": is_final})
+        stats_by_topic = {topic: counter.stats().to_plain() for topic, counter in counters.items()}
+        for counter in counters.values():
+            counter.is_changed = False
+        return orjson.dumps({"topics": stats_by_topic, "is_final": is_final})
 
     def to_plain(self) -> dict[str, str]:
         return {

@@ -167,8 +167,8 @@ def _exportable_topics(
         }.get(kind, _("no topic has values for a table"))
         raise RecordingError(str(recording.path), reason)
     if kind != "mcap" and len(topics) > MAX_FILES:
-        sentence = _("the recording has {count} suitable topics; choose at most {most}")
-        raise RecordingError(str(recording.path), sentence.format(count=len(topics), most=MAX_FILES))
+        template = _("the recording has {count} suitable topics; choose at most {most}")
+        raise RecordingError(str(recording.path), template.format(count=len(topics), most=MAX_FILES))
     counts = _counts(recording, topics, part)
     if kind != "mcap":
         topics = [name for name in topics if counts.get(name)]
@@ -188,16 +188,16 @@ def _counts(recording: Recording, topics: list[str], part: Part) -> dict[str, in
     counted = recording.densities(start_ns, end_ns, 1, topics)
     counts = {}
     for name in topics:
-        some = next(recording.read(start_ns, end_ns, (name,)), None) if start_ns < end_ns else None
-        counts[name] = max(1, sum(counted.get(name, ()))) if some is not None else 0
+        first_message = next(recording.read(start_ns, end_ns, (name,)), None) if start_ns < end_ns else None
+        counts[name] = max(1, sum(counted.get(name, ()))) if first_message is not None else 0
     return counts
 
 
 def _remove(path: Path) -> None:
     with suppress(OSError):
         if path.is_dir():
-            for each in path.iterdir():
-                each.unlink()
+            for child in path.iterdir():
+                child.unlink()
             path.rmdir()
         else:
             path.unlink(missing_ok=True)
@@ -205,10 +205,10 @@ def _remove(path: Path) -> None:
 
 def _file_name(topic: str, used_names: set[str], suffix: str) -> str:
     # Valid on every operating system, and unique.
-    plain = re.sub(r"[^\w.-]+", "_", topic).strip("._") or "topic"
-    name, number = plain[:100], 2
+    safe_name = re.sub(r"[^\w.-]+", "_", topic).strip("._") or "topic"
+    name, number = safe_name[:100], 2
     while name.lower() in used_names:
-        name, number = f"{plain[:100]}-{number}", number + 1
+        name, number = f"{safe_name[:100]}-{number}", number + 1
     used_names.add(name.lower())
     return name + suffix
 
@@ -234,32 +234,32 @@ class _Source:
         self.unreadable = 0
 
     def messages(self, *, is_counted: bool = True) -> Iterator[RecordedMessage]:
-        for each in self._recording.read(self._part.start_ns, self._part.end_ns, (self.topic,)):
+        for record in self._recording.read(self._part.start_ns, self._part.end_ns, (self.topic,)):
             if is_counted:
                 self._counted.add()
-            yield each
+            yield record
 
     def rows(self, *, is_counted: bool = True) -> Iterator[dict[str, object]]:
         # Flat values with the times first; a field of the payload with the same name becomes "payload.seq".
         self.unreadable = 0
-        for each in self.messages(is_counted=is_counted):
+        for record in self.messages(is_counted=is_counted):
             try:
-                values = flatten(each.message.payload)
+                values = flatten(record.message.payload)
             except (DecodeError, RecursionError):
                 self.unreadable += 1
                 continue
-            row = _time_columns(each)
+            row = _time_columns(record)
             for name, value in values.items():
                 column = _escape_surrogates(name) if name not in row else f"payload.{name}"
                 row[column] = _escape_surrogates(value) if isinstance(value, str) else value
             yield row
 
 
-def _time_columns(each: RecordedMessage) -> dict[str, object]:
-    message = each.message
+def _time_columns(record: RecordedMessage) -> dict[str, object]:
+    message = record.message
     return {
-        "time_ns": each.log_ns,
-        "time_s": each.log_ns / 1e9,
+        "time_ns": record.log_ns,
+        "time_s": record.log_ns / 1e9,
         "stamp_ns": message.stamp_ns,
         "stamp_s": None if message.stamp_ns is None else message.stamp_ns / 1e9,
         "seq": message.seq,
@@ -284,11 +284,11 @@ def flatten(payload: object) -> dict[str, object]:
 
 def _flatten(value: object, path: str, columns: dict[str, object], depth: int) -> None:
     if isinstance(value, Mapping) and value and depth > 0:
-        for key, each in value.items():
-            _flatten(each, f"{path}.{key}" if path else str(key), columns, depth - 1)
+        for key, item in value.items():
+            _flatten(item, f"{path}.{key}" if path else str(key), columns, depth - 1)
     elif isinstance(value, list | tuple) and 0 < len(value) <= _MAX_LIST_COLUMNS and depth > 0:
-        for number, each in enumerate(value):
-            _flatten(each, f"{path}[{number}]", columns, depth - 1)
+        for number, item in enumerate(value):
+            _flatten(item, f"{path}[{number}]", columns, depth - 1)
     elif value is None or isinstance(value, bool | int | float | str):
         columns[path or "value"] = value
     else:
@@ -431,8 +431,8 @@ def _write_pictures(source: _Source, path: Path, _fps: float) -> int:
     # JPEG and PNG files unchanged; raw images as PNG, or raw where PNG lacks the number type.
     path.mkdir()
     count = 0
-    for each in source.messages():
-        picture = _picture_file(each.message)
+    for record in source.messages():
+        picture = _picture_file(record.message)
         if picture is None:
             source.unreadable += 1
             continue
@@ -474,12 +474,12 @@ def _write_video(source: _Source, path: Path, fps: float, container: Container) 
     film = VideoFile(opencv, path, fps, container)
     count = 0
     try:
-        for each in source.messages():
-            frame = decode_frame(opencv, each.message)
+        for record in source.messages():
+            frame = decode_frame(opencv, record.message)
             if frame is None:
                 source.unreadable += 1
                 continue
-            film.add(each.log_ns, frame)
+            film.add(record.log_ns, frame)
             count += 1
         film.finish()
     finally:

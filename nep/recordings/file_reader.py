@@ -150,8 +150,12 @@ class _LoadedChunk:
                     yield record
             return
         offsets = self._offsets if self._offsets is not None else self._index()
-        found = [offsets[each] for each in channels if each in offsets]
-        for offset in found[0] if len(found) == 1 else sorted(each for some in found for each in some):
+        channel_offsets = [offsets[each] for each in channels if each in offsets]
+        for offset in (
+            channel_offsets[0]
+            if len(channel_offsets) == 1
+            else sorted(each for offset_group in channel_offsets for each in offset_group)
+        ):
             found_there = next(messages_in(self.data, offset), None)
             if isinstance(found_there, RawMessage):
                 yield found_there
@@ -235,8 +239,8 @@ class FileReader:
         counts = index.counts
         if counts is None or len(self._chunks) <= _MAX_COUNTED_CHUNKS:
             counts = {}
-            for at in range(len(self._chunks)):
-                for channel, count in self._chunk_counts(at).items():
+            for chunk_index in range(len(self._chunks)):
+                for channel, count in self._chunk_counts(chunk_index).items():
                     counts[channel] = counts.get(channel, 0) + count
         return FileInfo(
             index.definitions.channels,
@@ -285,25 +289,27 @@ class FileReader:
         numbers = self._chunks_in(start_ns, end_ns, channels, pieces)
         first, last = start_ns or 0, 2**64 if end_ns is None else end_ns
         pending: list[tuple[int, int, RawMessage]] = []
-        order = held = 0
-        for at, number in enumerate(numbers):
-            messages = [each for each in self._messages(number, channels) if first <= each.log_ns < last]
+        order = buffered_bytes = 0
+        for position, number in enumerate(numbers):
+            messages = [
+                message for message in self._messages(number, channels) if first <= message.log_ns < last
+            ]
             messages.sort(key=_log_ns)  # usually sorted, which costs no time
-            following = numbers[at + 1] if at + 1 < len(numbers) else None
+            following = numbers[position + 1] if position + 1 < len(numbers) else None
             limit = 2**64 if following is None else self._starts[following]
-            held += self._chunk_size(number)
-            if following is None or held + self._chunk_size(following) > _MAX_OVERLAP_BYTES:
+            buffered_bytes += self._chunk_size(number)
+            if following is None or buffered_bytes + self._chunk_size(following) > _MAX_OVERLAP_BYTES:
                 limit = 2**64
             until = 0 if pending else bisect_left(messages, limit, key=_log_ns)
             yield from messages[:until]
-            for each in messages[until:]:
+            for message in messages[until:]:
                 order += 1
-                heappush(pending, (each.log_ns, order, each))
+                heappush(pending, (message.log_ns, order, message))
             del messages
             while pending and pending[0][0] < limit:
                 yield heappop(pending)[2]
             if not pending:
-                held = 0
+                buffered_bytes = 0
 
     def _chunk_size(self, number: int) -> int:
         return self._chunks[number].uncompressed_bytes
@@ -320,14 +326,14 @@ class FileReader:
         last = (
             len(self._chunks) if end_ns is None else bisect_left(self._starts, max(0, min(end_ns, 2**64 - 1)))
         )
-        found = {
+        chunk_numbers = {
             number
             for channel in channels
             for number in self._chunks_of(channel, first, last)
             if (start_ns is None or self._chunks[number].end_ns >= start_ns)
             and (pieces is None or number in pieces)
         }
-        return sorted(found)
+        return sorted(chunk_numbers)
 
     def _chunks_of(self, channel: int, first: int, last: int) -> Sequence[int]:
         numbers = self._in_chunks.get(channel, ())
@@ -335,33 +341,33 @@ class FileReader:
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
         """Return the last message at or before a time for each group of channels. See `RawFile.newest`."""
-        found: list[RawMessage | None] = []
+        messages: list[RawMessage | None] = []
         for group in groups:
-            places = [
-                (*place, channel)
+            candidates = [
+                (*location, channel)
                 for channel in group
-                if (place := self._last_before(channel, at_ns)) is not None
+                if (location := self._last_before(channel, at_ns)) is not None
             ]
-            found.append(self._message_at(*max(places)[1:]) if places else None)
-        return found
+            messages.append(self._message_at(*max(candidates)[1:]) if candidates else None)
+        return messages
 
     def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
         """Return the log time of the last message by channel. See `RawFile.newest_times`."""
-        places = {channel: self._last_before(channel, at_ns) for channel in channels}
-        return {channel: place[0] for channel, place in places.items() if place is not None}
+        locations = {channel: self._last_before(channel, at_ns) for channel in channels}
+        return {channel: location[0] for channel, location in locations.items() if location is not None}
 
     def _last_before(self, channel: int, at_ns: int) -> tuple[int, int, int] | None:
         # (time, chunk, offset)
         numbers = self._in_chunks.get(channel, array("L"))
-        place = (
+        position = (
             bisect_right(numbers, bisect_right(self._starts, max(-1, min(at_ns, 2**64 - 1))) - 1)
             if at_ns >= 0
             else 0
         )
         best: tuple[int, int, int] | None = None
-        while place > 0:
-            place -= 1
-            number = numbers[place]
+        while position > 0:
+            position -= 1
+            number = numbers[position]
             if best is not None and self._latest_ends[number] <= best[0]:
                 break
             for log_ns, offset in self._entries(number, channel):
@@ -429,8 +435,8 @@ class FileReader:
         counts = chunk.counts
         if len(counts) < chunk.channel_count:
             missing = set(chunk.channels) - counts.keys()
-            for each in self._messages(number, missing):
-                counts[each.channel] = counts.get(each.channel, 0) + 1
+            for message in self._messages(number, missing):
+                counts[message.channel] = counts.get(message.channel, 0) + 1
         return counts
 
     # ---- chunks
@@ -447,7 +453,7 @@ class FileReader:
         Returns:
             False if the check stopped at `most_bytes`.
         """
-        done, whole = 0, sum(each.length for each in self._chunks)
+        done, total = 0, sum(each.length for each in self._chunks)
         expanded = 0
         for number, chunk in enumerate(self._chunks):
             expanded += chunk.uncompressed_bytes
@@ -456,14 +462,14 @@ class FileReader:
             self._chunk(number)
             done += chunk.length
             if progress is not None:
-                progress(done, whole)
+                progress(done, total)
         return True
 
     def _messages(self, number: int, channels: Collection[int]) -> Iterator[RawMessage]:
         chunk = self._chunk(number)
         if chunk is not None:
-            for each in chunk.messages(self._chunks[number], channels):
-                yield self._detach(each, chunk)
+            for message in chunk.messages(self._chunks[number], channels):
+                yield self._detach(message, chunk)
 
     def _detach(self, raw: RawMessage, chunk: _LoadedChunk) -> RawMessage:
         if len(chunk.data) <= _LARGE_CHUNK_BYTES:
@@ -474,10 +480,10 @@ class FileReader:
         # None if it is damaged.
         with self._lock:
             self._check_open()
-            known = self._cache.get(number)
-            if known is not None:
+            cached = self._cache.get(number)
+            if cached is not None:
                 self._cache.move_to_end(number)
-                return known
+                return cached
             if number in self._unreadable:
                 return None
             info = self._chunks[number]
@@ -498,13 +504,17 @@ class FileReader:
 
     def _corrupt_range(self, info: ChunkInfo) -> CorruptRange:
         counts = info.counts
-        own = {
+        own_channels = {
             number
             for number, each in self._index.definitions.channels.items()
             if number in counts and "nep.role" in dict(each.metadata)
         }
         is_known = len(counts) == info.channel_count > 0
-        count = sum(many for channel, many in counts.items() if channel not in own) if is_known else None
+        count = (
+            sum(message_count for channel, message_count in counts.items() if channel not in own_channels)
+            if is_known
+            else None
+        )
         return CorruptRange(info.offset, info.length, info.start_ns, info.end_ns, count)
 
     def _evict_chunks(self, size: int) -> None:
@@ -529,9 +539,9 @@ class FileReader:
         self.close()
 
 
-def _distribute(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], count: int) -> None:
+def _distribute(counts: list[int], span: tuple[int, int], chunk: tuple[int, int], count: int) -> None:
     # Distributes messages evenly over the chunk's time.
-    (start, end), (chunk_start, chunk_end), buckets = whole, chunk, len(counts)
+    (start, end), (chunk_start, chunk_end), buckets = span, chunk, len(counts)
     first = (chunk_start - start) * buckets // (end - start)
     last = (chunk_end - start) * buckets // (end - start)
     if first == last:
@@ -539,19 +549,19 @@ def _distribute(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int
             counts[first] += count
         return
 
-    def count_until(at: int) -> int:
-        if at < first:
+    def count_until(bucket: int) -> int:
+        if bucket < first:
             return 0
-        if at >= last:
+        if bucket >= last:
             return count
-        part_end = start + (at + 1) * (end - start) // buckets
+        part_end = start + (bucket + 1) * (end - start) // buckets
         return count * (part_end - chunk_start) // (chunk_end - chunk_start)
 
-    shown = range(max(0, first), min(last, buckets - 1) + 1)
-    before = count_until(shown.start - 1)
-    for at in shown:
-        total = count_until(at)
-        counts[at] += total - before
+    covered = range(max(0, first), min(last, buckets - 1) + 1)
+    before = count_until(covered.start - 1)
+    for bucket in covered:
+        total = count_until(bucket)
+        counts[bucket] += total - before
         before = total
 
 

@@ -172,11 +172,11 @@ class Playback:
     def step(self, topic: str, *, forward: bool = True) -> bool:
         """Pause, and move to the next or previous message of a topic; return False if there is none."""
         find = self._recording.after if forward else self._recording.before
-        found = find(self._position_ns, topic)
+        record = find(self._position_ns, topic)
         self.pause()
-        if found is None:
+        if record is None:
             return False
-        self.seek(found.log_ns)
+        self.seek(record.log_ns)
         return True
 
     def select_topics(self, topics: Collection[str]) -> Sequence[Message]:
@@ -330,8 +330,8 @@ class Playback:
             return None
         if self._jump is not None:
             return 0.0
-        ahead = self._last_ns() if self._next is None else min(self._next.log_ns, self._last_ns())
-        return max(0.0, min(_MAX_WAIT_S, (ahead - self._position_ns) / 1e9 / self._speed))
+        next_ns = self._last_ns() if self._next is None else min(self._next.log_ns, self._last_ns())
+        return max(0.0, min(_MAX_WAIT_S, (next_ns - self._position_ns) / 1e9 / self._speed))
 
     def _first_ns(self) -> int:
         return self._recording.start_ns if self._loop is None else self._loop[0]
@@ -371,20 +371,20 @@ class Playback:
         new = self._remap.get(message.topic)
         if new is None:
             return message
-        known = self._kinds.get(id(message.kind))
-        if known is None:
+        cached = self._kinds.get(id(message.kind))
+        if cached is None:
             if len(self._kinds) >= _MAX_CACHED_KINDS:
                 self._kinds.clear()
-            known = self._kinds[id(message.kind)] = (message.kind, message.kind._replace(topic=new))
+            cached = self._kinds[id(message.kind)] = (message.kind, message.kind._replace(topic=new))
         copy = new_message(Message)
-        copy.kind = known[1]
+        copy.kind = cached[1]
         copy.raw, copy.stamp_ns, copy.seq = message.raw, message.stamp_ns, message.seq
         copy.publisher, copy.extension, copy.decoded = message.publisher, message.extension, UNDECODED
         return copy
 
 
-def _log_ns(each: RecordedMessage) -> int:
-    return each.log_ns
+def _log_ns(record: RecordedMessage) -> int:
+    return record.log_ns
 
 
 def moving_topics(recording: Recording) -> MovingTopics:
@@ -396,9 +396,9 @@ def moving_topics(recording: Recording) -> MovingTopics:
     robots = dict[RobotControls, None]()
     for _at, message in recording.read(topics=described) if described else ():
         with suppress(NepError):
-            found = parse_controls(message.payload, robot_name_of(message.topic))
-            if found is not None and len(robots) < _MAX_DESCRIPTIONS:
-                robots[found] = None
+            controls = parse_controls(message.payload, robot_name_of(message.topic))
+            if controls is not None and len(robots) < _MAX_DESCRIPTIONS:
+                robots[controls] = None
     typed = (each.name for each in recording.topics.values() if each.msg_type in _COMMAND_TYPES)
     return MovingTopics(robots, unidentified=typed, uses_names=True)
 

@@ -102,14 +102,14 @@ class Recording:
         self.start_ns, self.end_ns = self.info.start_ns, self.info.end_ns
         self._roles = {
             number: role
-            for number, each in self.info.channels.items()
-            if (role := dict(each.metadata).get("nep.role")) is not None
+            for number, channel in self.info.channels.items()
+            if (role := dict(channel.metadata).get("nep.role")) is not None
         }
         self.topics: Mapping[str, RecordedTopic] = self._topics()
         self._channels_of: dict[str, list[int]] = {}
-        for number, each in self.info.channels.items():
+        for number, channel in self.info.channels.items():
             if number not in self._roles:
-                self._channels_of.setdefault(each.topic, []).append(number)
+                self._channels_of.setdefault(channel.topic, []).append(number)
 
     def _topics(self) -> dict[str, RecordedTopic]:
         topics: dict[str, RecordedTopic] = {}
@@ -117,17 +117,17 @@ class Recording:
             if number in self._roles:
                 continue
             count, decoder = self.info.counts.get(number, 0), self._decoders[number]
-            known = topics.get(definition.topic)
-            if known is not None and (known.message_count or not count):
-                publishers = tuple(dict.fromkeys((*known.publishers, decoder.publisher)))
-                topics[known.name] = RecordedTopic(
-                    known.name,
-                    known.msg_type,
-                    known.codec,
-                    known.message_count + count,
+            topic = topics.get(definition.topic)
+            if topic is not None and (topic.message_count or not count):
+                publishers = tuple(dict.fromkeys((*topic.publishers, decoder.publisher)))
+                topics[topic.name] = RecordedTopic(
+                    topic.name,
+                    topic.msg_type,
+                    topic.codec,
+                    topic.message_count + count,
                     publishers,
-                    known.encoding,
-                    known.schema_encoding,
+                    topic.encoding,
+                    topic.schema_encoding,
                 )
                 continue
             topics[definition.topic] = RecordedTopic(
@@ -190,13 +190,13 @@ class Recording:
         for name, values in self.info.metadata:
             if name == "nep.figures":
                 for topic, text in values.items():
-                    known = parse_stats(text)
-                    if known is not None:
-                        totals[topic] = known
+                    topic_stats = parse_stats(text)
+                    if topic_stats is not None:
+                        totals[topic] = topic_stats
         if totals:
             return totals
-        for _log_ns, each in self.stats_over_time():
-            totals.update(each)
+        for _log_ns, stats_by_topic in self.stats_over_time():
+            totals.update(stats_by_topic)
         return totals
 
     def stats_chunks(self) -> Sequence[int]:
@@ -286,11 +286,11 @@ class Recording:
             at_ns: Time in ns since 1970.
             topics: Names of topics; None for all.
         """
-        wanted = [topic for topic in self._known_topics(topics) if self.topics[topic].message_count]
-        found = self.file.newest(at_ns, [self._channels_of[topic] for topic in wanted])
+        selected = [topic for topic in self._known_topics(topics) if self.topics[topic].message_count]
+        raw_messages = self.file.newest(at_ns, [self._channels_of[topic] for topic in selected])
         return {
             topic: RecordedMessage(raw.log_ns, self._decoders[raw.channel].message(raw))
-            for topic, raw in zip(wanted, found, strict=True)
+            for topic, raw in zip(selected, raw_messages, strict=True)
             if raw is not None
         }
 
@@ -342,8 +342,10 @@ class Recording:
             return result
         for channel, counts in self.file.densities(start_ns, end_ns, buckets, self._channels(topics)).items():
             topic = self.info.channels[channel].topic
-            known = result.get(topic)
-            result[topic] = list(counts) if known is None else list(map(sum, zip(known, counts, strict=True)))
+            existing = result.get(topic)
+            result[topic] = (
+                list(counts) if existing is None else list(map(sum, zip(existing, counts, strict=True)))
+            )
         return result
 
     def close(self) -> None:

@@ -55,17 +55,17 @@ class TopicSelection:
     excluded: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for each in (*self.topics, *self.excluded):
-            check_topic(each)
+        for topic in (*self.topics, *self.excluded):
+            check_topic(topic)
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Minimal set of topics and patterns that covers the selection."""
-        chosen: list[str] = []
-        for each in map(widened_pattern, self.topics or (_ALL_TOPICS,)):
-            if not any(glob_matches(other, each) for other in chosen):
-                chosen = [*(other for other in chosen if not glob_matches(each, other)), each]
-        return tuple(chosen)
+        selected: list[str] = []
+        for pattern in map(widened_pattern, self.topics or (_ALL_TOPICS,)):
+            if not any(glob_matches(other, pattern) for other in selected):
+                selected = [*(other for other in selected if not glob_matches(pattern, other)), pattern]
+        return tuple(selected)
 
     def has(self, topic: str) -> bool:
         """Return True if a topic is selected."""
@@ -137,9 +137,9 @@ class Recorder:
     def _type_of(self, topic: str) -> str:
         # Subscribing with another type would cause an alert.
         with suppress(NepError):
-            known = self._node.graph(_MASTER_TIMEOUT_S).topics.get(topic)
-            if known is not None and known.msg_type:
-                return known.msg_type
+            info = self._node.graph(_MASTER_TIMEOUT_S).topics.get(topic)
+            if info is not None and info.msg_type:
+                return info.msg_type
         return "json"
 
     def _record(self, number: int, messages: Sequence[Message]) -> None:
@@ -150,16 +150,16 @@ class Recorder:
 
     def _owning_subscription(self, topic: str) -> int:
         # -1 if the topic is not selected.
-        known = self._owners.get(topic)
-        if known is None:
+        owner = self._owners.get(topic)
+        if owner is None:
             if len(self._owners) >= _MAX_CACHED_TOPICS:
                 self._owners.clear()
-            known = -1
+            owner = -1
             if self._selection.has(topic):
-                heard = enumerate(self._subscriptions)
-                known = next((at for at, each in heard if glob_matches(each, topic)), -1)
-            self._owners[topic] = known
-        return known
+                subscriptions = enumerate(self._subscriptions)
+                owner = next((index for index, each in subscriptions if glob_matches(each, topic)), -1)
+            self._owners[topic] = owner
+        return owner
 
     # ---- once a second
 
@@ -193,8 +193,8 @@ class Recorder:
         self._unsubscribe()
 
     def _unsubscribe(self) -> None:
-        for each in self._subscribers:
-            each.close()
+        for subscriber in self._subscribers:
+            subscriber.close()
 
     def __enter__(self) -> Self:
         return self

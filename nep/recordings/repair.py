@@ -214,13 +214,13 @@ class _Repair:
         offset = len(MAGIC)
         while offset + HEAD_BYTES <= self._size:
             self._progress(offset, self._size)
-            place = self._record_location(offset)
-            if place is not None:
-                self._others.add(place.opcode)
-            if place is not None and place.opcode == Opcode.DATA_END:
+            location = self._record_location(offset)
+            if location is not None:
+                self._others.add(location.opcode)
+            if location is not None and location.opcode == Opcode.DATA_END:
                 break
-            if place is not None and self._copy(place):
-                offset += HEAD_BYTES + place.length
+            if location is not None and self._copy(location):
+                offset += HEAD_BYTES + location.length
                 continue
             offset = self._skip_corruption(offset)
         else:
@@ -233,28 +233,28 @@ class _Repair:
         # The record may be truncated.
         self._file.seek(offset)
         opcode, length = RECORD_HEAD.unpack(self._file.read(HEAD_BYTES))
-        known = 0 < opcode <= Opcode.DATA_END or opcode >= 0x80
-        return RecordLocation(offset, opcode, length) if known and length < 2**39 else None
+        is_known = 0 < opcode <= Opcode.DATA_END or opcode >= 0x80
+        return RecordLocation(offset, opcode, length) if is_known and length < 2**39 else None
 
-    def _copy(self, place: RecordLocation) -> bool:
+    def _copy(self, location: RecordLocation) -> bool:
         # False if it is not a whole record.
-        end = place.offset + HEAD_BYTES + place.length
+        end = location.offset + HEAD_BYTES + location.length
         if end > self._size:
             return False
-        if place.opcode == Opcode.CHUNK:
-            return self._copy_chunk_at(place)
-        limit = MAX_CHUNK_BYTES if place.opcode == Opcode.MESSAGE else MAX_RECORD_BYTES
-        if place.opcode in _PARSED_OPCODES and place.length > limit:
+        if location.opcode == Opcode.CHUNK:
+            return self._copy_chunk_at(location)
+        limit = MAX_CHUNK_BYTES if location.opcode == Opcode.MESSAGE else MAX_RECORD_BYTES
+        if location.opcode in _PARSED_OPCODES and location.length > limit:
             return False
-        if place.opcode == Opcode.MESSAGE_INDEX:
-            self._count_lost(place)
-        elif place.opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
-            self._define(place.opcode, self._read_content(place))
-        elif place.opcode == Opcode.METADATA:
-            self._copy_metadata(self._read_content(place))
-        elif place.opcode == Opcode.MESSAGE:
-            self._file.seek(place.offset)
-            for record in messages_in(self._file.read(end - place.offset)):
+        if location.opcode == Opcode.MESSAGE_INDEX:
+            self._count_lost(location)
+        elif location.opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
+            self._define(location.opcode, self._read_content(location))
+        elif location.opcode == Opcode.METADATA:
+            self._copy_metadata(self._read_content(location))
+        elif location.opcode == Opcode.MESSAGE:
+            self._file.seek(location.offset)
+            for record in messages_in(self._file.read(end - location.offset)):
                 self._copy_record(record)
         return self._is_record_at(end)
 
@@ -264,9 +264,9 @@ class _Repair:
             return True
         return self._record_location(offset) is not None
 
-    def _read_content(self, place: RecordLocation) -> bytes:
-        self._file.seek(place.offset + HEAD_BYTES)
-        return self._file.read(place.length)
+    def _read_content(self, location: RecordLocation) -> bytes:
+        self._file.seek(location.offset + HEAD_BYTES)
+        return self._file.read(location.length)
 
     def _define(self, opcode: int, content: bytes | memoryview) -> None:
         for number in self._definitions.add(opcode, content):
@@ -288,53 +288,53 @@ class _Repair:
 
     # ---- chunks
 
-    def _copy_chunk_at(self, place: RecordLocation) -> bool:
-        self._file.seek(place.offset)
-        head = read_chunk_head(self._file.read(CHUNK_HEAD_BYTES), place.length)
+    def _copy_chunk_at(self, location: RecordLocation) -> bool:
+        self._file.seek(location.offset)
+        header = read_chunk_head(self._file.read(CHUNK_HEAD_BYTES), location.length)
         self._corrupt_chunk = None
-        if head is None:
+        if header is None:
             return False
-        self._file.seek(place.offset)
-        record = memoryview(self._file.read(HEAD_BYTES + place.length))
+        self._file.seek(location.offset)
+        record = memoryview(self._file.read(HEAD_BYTES + location.length))
         try:
-            chunk = decompress(record[head.data_offset :], head)
+            chunk = decompress(record[header.data_offset :], header)
         except ValueError:
-            if not self._is_record_at(place.offset + HEAD_BYTES + place.length):
+            if not self._is_record_at(location.offset + HEAD_BYTES + location.length):
                 return False
-            self._corrupt_chunk = head
+            self._corrupt_chunk = header
             self._counts.corrupt_range_count += 1
             self._counts.is_unknown = True  # until its message indexes are read
-            self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
-            self._discard_bytes(HEAD_BYTES + place.length)
+            self._counts.last_ns = max(self._counts.last_ns, header.end_ns)
+            self._discard_bytes(HEAD_BYTES + location.length)
             return True
-        self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
-        self._copy_chunk(record, head, chunk)
+        self._counts.last_ns = max(self._counts.last_ns, header.end_ns)
+        self._copy_chunk(record, header, chunk)
         return True
 
-    def _copy_chunk(self, record: memoryview, head: ChunkHead, chunk: bytes | memoryview) -> None:
+    def _copy_chunk(self, record: memoryview, header: ChunkHead, chunk: bytes | memoryview) -> None:
         # Copied unchanged if it contains only messages of known channels.
         indexes: dict[int, list[int]] = {}
         is_plain = True
-        for each in messages_in(chunk):
-            if not isinstance(each, RawMessage) or each.channel not in self._definitions.channels:
+        for item in messages_in(chunk):
+            if not isinstance(item, RawMessage) or item.channel not in self._definitions.channels:
                 is_plain = False
                 break
-            indexes.setdefault(each.channel, []).extend((each.log_ns, each.offset))
-            self._read_entry(each)
+            indexes.setdefault(item.channel, []).extend((item.log_ns, item.offset))
+            self._read_entry(item)
         if not is_plain or not indexes:
-            for each in messages_in(chunk):
-                self._copy_record(each)
+            for item in messages_in(chunk):
+                self._copy_record(item)
             return
         info = ChunkInfo(
-            head.start_ns,
-            head.end_ns,
+            header.start_ns,
+            header.end_ns,
             0,
             len(record),
             b"",
             0,
-            head.compression,
-            head.data_bytes,
-            head.uncompressed_bytes,
+            header.compression,
+            header.data_bytes,
+            header.uncompressed_bytes,
         )
         packed = {number: pack_message_index(number, entries) for number, entries in indexes.items()}
         self.writer.copy_chunk(record, info, packed)
@@ -373,14 +373,14 @@ class _Repair:
         with suppress(orjson.JSONDecodeError, AttributeError):
             self._counts.stats.update(orjson.loads(record.data).get("topics", {}))
 
-    def _count_lost(self, place: RecordLocation) -> None:
+    def _count_lost(self, location: RecordLocation) -> None:
         # The index of a damaged chunk has the number of its lost messages.
         if self._corrupt_chunk is None:
             return
         with suppress(ValueError):
-            channel, entries = read_message_index(self._read_content(place))
-            known = self._definitions.channels.get(channel)
-            if known is None or ChannelDecoder(known).role is None:
+            channel, entries = read_message_index(self._read_content(location))
+            definition = self._definitions.channels.get(channel)
+            if definition is None or ChannelDecoder(definition).role is None:
                 self._counts.discarded += len(entries)
             self._counts.is_unknown = False
 
@@ -391,15 +391,15 @@ class _Repair:
 
     def _skip_corruption(self, offset: int) -> int:
         # Returns the offset to continue at. Keeps whole messages of a chunk truncated by the end of the file.
-        found = next(self._complete_chunks(offset + 1), None)
+        chunk_offset = next(self._complete_chunks(offset + 1), None)
         self._counts.corrupt_range_count += 1
         self._counts.is_unknown = True
-        if found is None:
+        if chunk_offset is None:
             copied = self._copy_truncated_chunk(offset)
             self._discard_bytes(self._size - offset - copied)
             return self._size
-        self._discard_bytes(found - offset)
-        return found
+        self._discard_bytes(chunk_offset - offset)
+        return chunk_offset
 
     def _has_chunk_after(self, offset: int) -> bool:
         return next(self._complete_chunks(offset), None) is not None
@@ -410,28 +410,28 @@ class _Repair:
             self._file.seek(offset)
             window = self._file.read(_WINDOW_BYTES)
             for match in _CHUNK_PATTERN.finditer(window):
-                at = match.start()
-                _opcode, length = RECORD_HEAD.unpack_from(window, at)
-                if offset + at + HEAD_BYTES + length > self._size:
+                window_offset = match.start()
+                _opcode, length = RECORD_HEAD.unpack_from(window, window_offset)
+                if offset + window_offset + HEAD_BYTES + length > self._size:
                     continue
                 try:
-                    is_whole = self._is_complete_chunk(offset + at, length)
+                    is_whole = self._is_complete_chunk(offset + window_offset, length)
                 except RecordingTooLargeError:  # too many places look like chunks
                     return
                 if is_whole:
-                    yield offset + at
+                    yield offset + window_offset
             offset += max(1, len(window) - CHUNK_HEAD_BYTES)
             self._progress(min(offset, self._size), self._size)
 
     def _is_complete_chunk(self, offset: int, length: int) -> bool:
         self._file.seek(offset)
-        head = read_chunk_head(self._file.read(CHUNK_HEAD_BYTES), length)
-        if head is None or not head.crc:
+        header = read_chunk_head(self._file.read(CHUNK_HEAD_BYTES), length)
+        if header is None or not header.crc:
             return False
-        self._search_budget.spend(head.data_bytes + min(head.uncompressed_bytes, _WINDOW_BYTES))
-        self._file.seek(offset + head.data_offset)
+        self._search_budget.spend(header.data_bytes + min(header.uncompressed_bytes, _WINDOW_BYTES))
+        self._file.seek(offset + header.data_offset)
         try:
-            decompress(memoryview(self._file.read(head.data_bytes)), head)
+            decompress(memoryview(self._file.read(header.data_bytes)), header)
         except ValueError:
             return False
         return True
@@ -443,19 +443,19 @@ class _Repair:
         if len(begin) < HEAD_BYTES or begin[0] != Opcode.CHUNK:
             return 0
         _opcode, length = RECORD_HEAD.unpack_from(begin)
-        head = read_chunk_head(begin, length)
-        if head is None or offset + HEAD_BYTES + length <= self._size:
+        header = read_chunk_head(begin, length)
+        if header is None or offset + HEAD_BYTES + length <= self._size:
             return 0
         self._file.seek(offset)
         record = memoryview(self._file.read(HEAD_BYTES + length))
-        self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
+        self._counts.last_ns = max(self._counts.last_ns, header.end_ns)
         before = self._counts.recovered
-        for each in messages_in(decompress_partial(record[head.data_offset :], head)):
-            if isinstance(each, RawMessage):
-                is_plausible = head.start_ns <= each.log_ns <= head.end_ns
-                if not is_plausible or each.channel not in self._definitions.channels:
+        for item in messages_in(decompress_partial(record[header.data_offset :], header)):
+            if isinstance(item, RawMessage):
+                is_plausible = header.start_ns <= item.log_ns <= header.end_ns
+                if not is_plausible or item.channel not in self._definitions.channels:
                     break
-            self._copy_record(each)
+            self._copy_record(item)
         return len(record) if self._counts.recovered > before else 0
 
     # ---- finishing
@@ -463,15 +463,15 @@ class _Repair:
     def _finish(self) -> None:
         counts, writer = self._counts, self.writer
         writer.flush()
-        words = dict(counts.recorder_metadata)
-        words["repaired"] = "1"
-        words["recovered"] = str(counts.recovered)
-        words["discarded"] = "" if counts.is_unknown else str(counts.discarded)
-        words["discarded_bytes"] = str(counts.discarded_bytes)
-        writer.add_metadata("nep.recording", words)
+        recorder_metadata = dict(counts.recorder_metadata)
+        recorder_metadata["repaired"] = "1"
+        recorder_metadata["recovered"] = str(counts.recovered)
+        recorder_metadata["discarded"] = "" if counts.is_unknown else str(counts.discarded)
+        recorder_metadata["discarded_bytes"] = str(counts.discarded_bytes)
+        writer.add_metadata("nep.recording", recorder_metadata)
         if counts.stats:
-            figures = {topic: orjson.dumps(each).decode() for topic, each in counts.stats.items()}
-            writer.add_metadata("nep.figures", figures)
+            stats_by_topic = {topic: orjson.dumps(each).decode() for topic, each in counts.stats.items()}
+            writer.add_metadata("nep.figures", stats_by_topic)
         for name, values in counts.metadata:
             writer.add_metadata(name, values)
         writer.finish()

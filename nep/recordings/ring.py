@@ -167,12 +167,12 @@ class _Segments:
 
     def finish(self) -> None:
         with self._lock:
-            for each in self._all:
+            for segment in self._all:
                 with suppress(OSError):
-                    each.writer.close()
-                each.is_removed = True
-                if not each.user_count:
-                    _remove(each.path)
+                    segment.writer.close()
+                segment.is_removed = True
+                if not segment.user_count:
+                    _remove(segment.path)
             self._all = self._all[-1:]
 
     abort = finish
@@ -213,10 +213,10 @@ def _remove(path: Path) -> None:
 
 def _remove_stale_segments(folder: Path) -> None:
     # Of processes that have ended.
-    for each in folder.glob(f"{_PREFIX}*-*.mcap"):
-        pid = each.name.removeprefix(_PREFIX).split("-")[0]
+    for path in folder.glob(f"{_PREFIX}*-*.mcap"):
+        pid = path.name.removeprefix(_PREFIX).split("-")[0]
         if pid.isascii() and pid.isdigit() and int(pid) < 2**31 and not psutil.pid_exists(int(pid)):
-            _remove(each)
+            _remove(path)
 
 
 class FlightRecorder:
@@ -321,20 +321,24 @@ class FlightRecorder:
     ) -> SavedRecording:
         writer = FileWriter(target, self._segments.table)
         try:
-            figures = _ChunkStats(self._segments.table)
+            chunk_stats = _ChunkStats(self._segments.table)
             damaged = 0
             for segment, chunks in segments:
                 with segment.path.open("rb") as file:
                     for chunk in chunks:
-                        damaged += not _copy_chunk(file, chunk, writer, figures)
+                        damaged += not _copy_chunk(file, chunk, writer, chunk_stats)
             if damaged and writer.start_ns is None:
                 raise ValueError("nothing is left")
-            words = {"note": note, "started_ns": str(writer.start_ns or 0), "ended_ns": str(writer.end_ns)}
-            writer.add_metadata("nep.recording", {**words, "end": "", "kept": "1", "damaged": str(damaged)})
-            totals = figures.stats(writer.counts)
+            metadata = {"note": note, "started_ns": str(writer.start_ns or 0), "ended_ns": str(writer.end_ns)}
+            writer.add_metadata(
+                "nep.recording", {**metadata, "end": "", "kept": "1", "damaged": str(damaged)}
+            )
+            totals = chunk_stats.stats(writer.counts)
             if totals:
-                plain = {topic: orjson.dumps(each.to_plain()).decode() for topic, each in totals.items()}
-                writer.add_metadata("nep.figures", plain)
+                stats_by_topic = {
+                    topic: orjson.dumps(each.to_plain()).decode() for topic, each in totals.items()
+                }
+                writer.add_metadata("nep.figures", stats_by_topic)
             writer.finish()
         except (OSError, ValueError) as error:
             writer.close()
@@ -358,19 +362,19 @@ class FlightRecorder:
         self.close()
 
 
-def _copy_chunk(file: BinaryIO, chunk: ChunkInfo, writer: FileWriter, figures: _ChunkStats) -> bool:
+def _copy_chunk(file: BinaryIO, chunk: ChunkInfo, writer: FileWriter, chunk_stats: _ChunkStats) -> bool:
     # False if it was damaged on disk. Raises `OSError`.
     file.seek(chunk.offset)
     record = memoryview(file.read(chunk.length))
     if len(record) != chunk.length or record[0] != Opcode.CHUNK:
         return False
-    head = read_chunk_head(record, chunk.length - HEAD_BYTES)
+    header = read_chunk_head(record, chunk.length - HEAD_BYTES)
     indexes = dict(_split_indexes(file.read(chunk.index_bytes)))
-    if head is None or head.start_ns != chunk.start_ns or indexes.keys() != set(chunk.channels):
+    if header is None or header.start_ns != chunk.start_ns or indexes.keys() != set(chunk.channels):
         return False
-    if figures.has_stats(chunk):
+    if chunk_stats.has_stats(chunk):
         try:
-            figures.read(decompress(record[head.data_offset :], head))
+            chunk_stats.read(decompress(record[header.data_offset :], header))
         except ValueError:
             return False
     writer.copy_chunk(record, chunk, indexes)
@@ -379,12 +383,12 @@ def _copy_chunk(file: BinaryIO, chunk: ChunkInfo, writer: FileWriter, figures: _
 
 def _split_indexes(data: bytes) -> Iterator[tuple[int, bytes]]:
     # (channel, message index) of consecutive records.
-    at = 0
-    while at + HEAD_BYTES + 2 <= len(data):
-        length = HEAD_BYTES + int.from_bytes(data[at + 1 : at + HEAD_BYTES], "little")
-        index = data[at : at + length]
+    offset = 0
+    while offset + HEAD_BYTES + 2 <= len(data):
+        length = HEAD_BYTES + int.from_bytes(data[offset + 1 : offset + HEAD_BYTES], "little")
+        index = data[offset : offset + length]
         yield int.from_bytes(index[HEAD_BYTES : HEAD_BYTES + 2], "little"), index
-        at += length
+        offset += length
 
 
 class _ChunkStats:
@@ -408,11 +412,11 @@ class _ChunkStats:
         for record in messages_in(records):
             if not isinstance(record, RawMessage) or self._role(record.channel) != "figures":
                 continue
-            for topic, plain in orjson.loads(record.data)["topics"].items():
-                figures = parse_stats(plain)
-                if figures is not None:
-                    self._first.setdefault(topic, figures)
-                    self._last[topic] = figures
+            for topic, fields in orjson.loads(record.data)["topics"].items():
+                stats = parse_stats(fields)
+                if stats is not None:
+                    self._first.setdefault(topic, stats)
+                    self._last[topic] = stats
 
     def stats(self, counts: dict[int, int]) -> dict[str, TopicStats]:
         counts_by_topic: dict[str, int] = {}

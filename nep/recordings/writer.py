@@ -137,17 +137,19 @@ class _Part:
             self.latched[key] = message
             self.latched_bytes += grown
 
-    def stats_of_part(self, figures: Mapping[str, TopicStats]) -> dict[str, TopicStats]:
+    def stats_of_part(self, stats_by_topic: Mapping[str, TopicStats]) -> dict[str, TopicStats]:
         nothing = TopicStats()
-        return {topic: each.difference(self.before.get(topic, nothing)) for topic, each in figures.items()}
+        return {
+            topic: each.difference(self.before.get(topic, nothing)) for topic, each in stats_by_topic.items()
+        }
 
-    def next_part(self, figures: Mapping[str, TopicStats], messages: int, size_bytes: int) -> _Part:
+    def next_part(self, stats_by_topic: Mapping[str, TopicStats], messages: int, size_bytes: int) -> _Part:
         return _Part(
             self.number + 1,
             messages,
             size_bytes,
             0,
-            dict(figures),
+            dict(stats_by_topic),
             self.latched,
             self.latched_bytes,
         )
@@ -189,13 +191,15 @@ class RecordingWriter:
         self._clock = LogClock() if clock is None else clock
         self._started_ns = self._clock()
         if isinstance(path, str | os.PathLike):
-            whole = Path(path)
+            file_path = Path(path)
             try:
-                self._destination: Destination = SingleFile(FileWriter(whole), limits.min_free_bytes)
+                self._destination: Destination = SingleFile(FileWriter(file_path), limits.min_free_bytes)
             except FileExistsError:
-                raise RecordingError(str(whole), _("the file already exists; choose another name")) from None
+                raise RecordingError(
+                    str(file_path), _("the file already exists; choose another name")
+                ) from None
             except OSError as error:
-                raise disk_error(whole, error) from error
+                raise disk_error(file_path, error) from error
         else:
             self._destination = path
         self._limits = limits
@@ -245,7 +249,7 @@ class RecordingWriter:
 
     def _post_part_locked(self, messages: Sequence[Message], now: int, *, may_fit: bool) -> None:
         # Called with the lock held, when there is not room for all.
-        fits = []
+        accepted = []
         for message in messages:
             size = message.size_bytes
             has_room = (
@@ -253,7 +257,7 @@ class RecordingWriter:
                 and self._queued_messages < self._limits.queue_messages
             )
             if may_fit and has_room:
-                fits.append(message)
+                accepted.append(message)
                 self._queued_bytes += size
                 self._queued_messages += 1
                 continue
@@ -263,8 +267,8 @@ class RecordingWriter:
             count = self._dropped_counts.setdefault(key, [0, 0])
             count[0] += 1
             count[1] += size
-        if fits:
-            self._queue.append((now, fits))
+        if accepted:
+            self._queue.append((now, accepted))
             self._lock.notify_all()
 
     def write_entry(self, role: Role, value: object) -> None:
@@ -293,10 +297,10 @@ class RecordingWriter:
         """
         with self._lock:
             self._flush_wanted += 1
-            wanted = self._flush_wanted
+            flush_number = self._flush_wanted
             self._lock.notify_all()
             is_done = self._lock.wait_for(
-                lambda: self._flush_done >= wanted or self._has_ended or bool(self._problem), timeout_s
+                lambda: self._flush_done >= flush_number or self._has_ended or bool(self._problem), timeout_s
             )
             return is_done and not self._problem
 
@@ -382,14 +386,14 @@ class RecordingWriter:
                     self._lock.wait(max(0.0, min(flush_at, look_at) - time.monotonic()))
                 batch = list(self._queue)
                 self._queue.clear()
-                is_closing, wanted = self._is_closing, self._flush_wanted
+                is_closing, flush_number = self._is_closing, self._flush_wanted
             self._write_batch(batch)
             now = time.monotonic()
-            if wanted > self._flush_done or now >= flush_at:
+            if flush_number > self._flush_done or now >= flush_at:
                 self._flush()
                 flush_at = now + self._limits.flush_interval_s
                 with self._lock:
-                    self._flush_done = wanted
+                    self._flush_done = flush_number
                     self._lock.notify_all()
             if now >= look_at:
                 look_at = now + self._limits.stats_interval_s
@@ -406,13 +410,13 @@ class RecordingWriter:
             else:
                 now, messages = part
                 size, count = 0, len(messages)
-                for at, message in enumerate(messages):
+                for index, message in enumerate(messages):
                     size += message.size_bytes
                     try:
                         self._write_message(message, self._log_ns(message, now))
                     except Exception:
                         self._unwritten = [
-                            messages[at + 1 :],
+                            messages[index + 1 :],
                             *(each[1] for each in batch[number + 1 :] if not isinstance(each, _Entry)),
                         ]
                         raise
@@ -433,24 +437,24 @@ class RecordingWriter:
         return log_ns
 
     def _write_message(self, message: Message, log_ns: int) -> None:
-        known = self._known.get(id(message.kind))
-        if known is None or known.publisher != message.publisher:
-            known = self._cache_kind(message)
+        cached = self._known.get(id(message.kind))
+        if cached is None or cached.publisher != message.publisher:
+            cached = self._cache_kind(message)
         encoding = encoding_of(message, log_ns)
         key = (encoding.form, message.seq is None, message.stamp_ns is None)
-        channel = known.channels.get(key)
+        channel = cached.channels.get(key)
         if channel is None:
             channel, encoding = self._channel(message, encoding, log_ns)
             if channel is None:
-                known.counter.count_skipped(message.publisher, 1, message.size_bytes)
+                cached.counter.count_skipped(message.publisher, 1, message.size_bytes)
                 return
             if not encoding.is_self_contained:
-                known.channels[key] = channel
+                cached.channels[key] = channel
         if message.kind.is_latched:
             self._part.store_latched(message)
         file = self._destination.file
         file.add(channel, (log_ns, encoding.publish_ns), encoding.sequence, encoding.before, message.raw)
-        known.counter.add(
+        cached.counter.add(
             message.publisher, message.seq, message.size_bytes, is_decodable=encoding.is_decodable
         )
         if file.pending_bytes >= CHUNK_BYTES:
@@ -459,9 +463,9 @@ class RecordingWriter:
     def _cache_kind(self, message: Message) -> _KindCache:
         if len(self._known) >= _MAX_CACHED_KINDS:
             self._known.clear()
-        known = _KindCache(message.kind, message.publisher, self._counter(message.topic))
-        self._known[id(message.kind)] = known  # `known` keeps the kind alive, so its id stays unique
-        return known
+        cached = _KindCache(message.kind, message.publisher, self._counter(message.topic))
+        self._known[id(message.kind)] = cached  # `known` keeps the kind alive, so its id stays unique
+        return cached
 
     def _counter(self, topic: str) -> TopicCounter:
         if topic not in self._counters and len(self._counters) >= MAX_TOPICS:
@@ -518,13 +522,15 @@ class RecordingWriter:
         counters = dict(self._counters) if all_of_them else dict(changed(self._counters))
         if not counters:
             return
-        figures = {topic: counter.stats() for topic, counter in counters.items()}
+        stats_by_topic = {topic: counter.stats() for topic, counter in counters.items()}
         for counter in counters.values():
             counter.is_changed = False
         with self._lock:
-            self._figures = {**self._figures, **figures}
-        plain = {topic: each.to_plain() for topic, each in self._part.stats_of_part(figures).items()}
-        self._write_recorder_entry("figures", orjson.dumps({"topics": plain, "is_final": all_of_them}))
+            self._figures = {**self._figures, **stats_by_topic}
+        part_stats = {
+            topic: each.to_plain() for topic, each in self._part.stats_of_part(stats_by_topic).items()
+        }
+        self._write_recorder_entry("figures", orjson.dumps({"topics": part_stats, "is_final": all_of_them}))
 
     # ---- finishing
 
@@ -540,28 +546,30 @@ class RecordingWriter:
         self._update_counts(file)
 
     def _add_metadata(self, file: FileWriter, reason: str) -> None:
-        words = {
+        values = {
             "started_ns": str(self._started_ns),
             "ended_ns": str(self._last_ns or self._started_ns),
             "note": self._note,
             "end": reason,
         }
         if self._part.number > 1 or self._destination.is_full:
-            words["part"] = str(self._part.number)
-        file.add_metadata("nep.recording", words)
-        plain = {
+            values["part"] = str(self._part.number)
+        file.add_metadata("nep.recording", values)
+        encoded_stats = {
             topic: orjson.dumps(each.to_plain()).decode()
             for topic, each in sorted(self._part.stats_of_part(self._figures).items())
         }
-        if plain:
-            file.add_metadata("nep.figures", plain)
+        if encoded_stats:
+            file.add_metadata("nep.figures", encoded_stats)
         self._update_counts(file)
 
     def _update_counts(self, file: FileWriter) -> None:
         part = self._part
-        own = sum(file.counts.get(each, 0) for each in self._own_numbers)
+        own_count = sum(file.counts.get(each, 0) for each in self._own_numbers)
         with self._lock:
-            self._message_count = part.messages_before + max(0, file.message_count - own - part.repeated)
+            self._message_count = part.messages_before + max(
+                0, file.message_count - own_count - part.repeated
+            )
             self._size_bytes = part.bytes_before + file.size_bytes
 
     def _finish_early(self, error: RecordingError) -> None:
@@ -580,8 +588,8 @@ class RecordingWriter:
                 self._count_dropped_locked(messages)
             for number, count in file.pending_counts.items():  # received, but only in memory
                 definition = file.table.definitions[number]
-                left = self._dropped_counts.setdefault((definition.topic, None), [0, 0])
-                left[0] += 0 if number in self._own_numbers else count
+                dropped = self._dropped_counts.setdefault((definition.topic, None), [0, 0])
+                dropped[0] += 0 if number in self._own_numbers else count
         self._update_counts(file)
         self._close_after_error()
         self._stop(error.reason)

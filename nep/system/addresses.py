@@ -54,19 +54,19 @@ def master_address(address: str | None = None) -> str:
                 example=DEFAULT_MASTER, kind=type(address).__name__
             )
         )
-    chosen = (address or os.environ.get(MASTER_VARIABLE) or DEFAULT_MASTER).removeprefix("tcp://")
-    if _is_ipv6(chosen):
-        check_host(chosen)
-    host, colon, port = chosen.rpartition(":")
+    resolved = (address or os.environ.get(MASTER_VARIABLE) or DEFAULT_MASTER).removeprefix("tcp://")
+    if _is_ipv6(resolved):
+        check_host(resolved)
+    host, colon, port = resolved.rpartition(":")
     if not colon:
-        chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)
+        resolved, host, port = f"{resolved}:{_DEFAULT_PORT}", resolved, str(_DEFAULT_PORT)
     if not _HOST_PATTERN.fullmatch(host) or not _is_valid_host(host) or not _is_port(port):
         raise NepError(
             _("'{chosen}' isn't a valid address of a master; use an address such as '{example}'").format(
-                chosen=quotable(chosen), example=DEFAULT_MASTER
+                chosen=quotable(resolved), example=DEFAULT_MASTER
             )
         )
-    return chosen
+    return resolved
 
 
 def check_host(host: object) -> str:
@@ -99,16 +99,16 @@ def check_host(host: object) -> str:
 
 def _is_ipv6(address: str) -> bool:
     # Also in brackets and with a port.
-    bare = address[1:].partition("]")[0] if address.startswith("[") else address
+    host = address[1:].partition("]")[0] if address.startswith("[") else address
     try:
-        ipaddress.IPv6Address(bare)
+        ipaddress.IPv6Address(host)
     except ValueError:
         return False
     return True
 
 
-def _is_port(word: str) -> bool:
-    return _PORT_PATTERN.fullmatch(word) is not None and int(word) <= 65535
+def _is_port(text: str) -> bool:
+    return _PORT_PATTERN.fullmatch(text) is not None and int(text) <= 65535
 
 
 def _is_valid_host(host: str) -> bool:
@@ -122,8 +122,8 @@ def _is_valid_host(host: str) -> bool:
 
 def is_endpoint(endpoint: str) -> bool:
     """Return True if the text is a valid endpoint of a publisher: tcp://HOST:PORT or ipc://@nep-PORT."""
-    found = _ENDPOINT_PATTERN.fullmatch(endpoint)
-    return found is not None and 0 < int(found[1] or found[2]) < 65536
+    match = _ENDPOINT_PATTERN.fullmatch(endpoint)
+    return match is not None and 0 < int(match[1] or match[2]) < 65536
 
 
 def endpoint_of(address: str) -> str:
@@ -151,13 +151,13 @@ class OwnAddress(NamedTuple):
 def own_addresses() -> tuple[OwnAddress, ...]:
     """Return the addresses at which other computers may reach this one; tunnels and containers come last."""
     up = {name for name, stats in psutil.net_if_stats().items() if stats.isup}
-    found = [
+    candidates = [
         OwnAddress(each.address, name)
         for name, addresses in psutil.net_if_addrs().items()
         for each in addresses
         if name in up and each.family == socket.AF_INET and not _is_hidden(each.address)
     ]
-    return tuple(sorted(found, key=lambda own: (_is_tunnel(own.interface), own.interface, own.host)))
+    return tuple(sorted(candidates, key=lambda own: (_is_tunnel(own.interface), own.interface, own.host)))
 
 
 def has_address(host: str) -> bool:
@@ -280,15 +280,17 @@ class MasterNameResolver:
         """Wait until the name is resolved; return False after the time limit (None: no limit)."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self._resolved.is_set():
-            left = _WAIT_SLICE_S if deadline is None else min(_WAIT_SLICE_S, deadline - time.monotonic())
-            if left <= 0.0:
+            remaining_s = (
+                _WAIT_SLICE_S if deadline is None else min(_WAIT_SLICE_S, deadline - time.monotonic())
+            )
+            if remaining_s <= 0.0:
                 return False
-            self._resolved.wait(left)
+            self._resolved.wait(remaining_s)
         return True
 
     def _resolve(self) -> None:
         try:
-            known = f"{self._look_up(self._host)}:{self._port}"
+            address = f"{self._look_up(self._host)}:{self._port}"
         except (OSError, UnicodeError) as error:
             if not self._is_failure_logged:
                 self._is_failure_logged = True
@@ -297,9 +299,9 @@ class MasterNameResolver:
                 )
             return
         self._is_failure_logged = False
-        if known != self.known:
-            self.known = known
-            self._on_change(known)
+        if address != self.known:
+            self.known = address
+            self._on_change(address)
         self._resolved.set()
 
 

@@ -30,10 +30,10 @@ def check_type_name(name: str, value: object) -> str:
     if not value:
         raise ValueError(_("{name} is empty; use a name such as 'json'").format(name=name))
     if len(value) > _MAX_LENGTH or first_control(value):
-        shown = escaped(shortened(value, 40))
+        display_value = escaped(shortened(value, 40))
         raise ValueError(
             _("{name} is '{said}'; use at most {most} characters, without control characters").format(
-                name=name, said=shown, most=_MAX_LENGTH
+                name=name, said=display_value, most=_MAX_LENGTH
             )
         )
     return value
@@ -61,35 +61,35 @@ def check_choice(name: str, value: T, allowed: Sequence[T]) -> T:
     return value
 
 
-def check_at_least(name: str, value: object, least: int) -> int:
-    """Validate an int of at least `least` and return it. Raises `ValueError`."""
+def check_at_least(name: str, value: object, minimum: int) -> int:
+    """Validate an int of at least `minimum` and return it. Raises `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} must be a whole number of at least {least}, not {value}").format(
-                name=name, value=_bounded_repr(value), least=least
+                name=name, value=_bounded_repr(value), least=minimum
             )
         )
-    if value < least:
+    if value < minimum:
         raise ValueError(
             _("{name} must be a whole number of at least {least}, not {value}").format(
-                name=name, value=_bounded_repr(value), least=least
+                name=name, value=_bounded_repr(value), least=minimum
             )
         )
     return value
 
 
-def check_range(name: str, value: object, least: int, most: int) -> int:
-    """Validate an int from `least` to `most` and return it. Raises `ValueError`."""
+def check_range(name: str, value: object, minimum: int, maximum: int) -> int:
+    """Validate an int from `minimum` to `maximum` and return it. Raises `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} must be a whole number from {least} to {most}, not {value}").format(
-                name=name, value=_bounded_repr(value), least=least, most=most
+                name=name, value=_bounded_repr(value), least=minimum, most=maximum
             )
         )
-    if not least <= value <= most:
+    if not minimum <= value <= maximum:
         raise ValueError(
             _("{name} must be a whole number from {least} to {most}, not {value}").format(
-                name=name, value=_bounded_repr(value), least=least, most=most
+                name=name, value=_bounded_repr(value), least=minimum, most=maximum
             )
         )
     return value

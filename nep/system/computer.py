@@ -41,10 +41,10 @@ def _boot_id() -> str:
 
 def _boot_session() -> str:
     # macOS: new at each boot.
-    answer, size = ctypes.create_string_buffer(64), ctypes.c_size_t(64)
-    ask = ctypes.CDLL(None).sysctlbyname
-    failed = ask(b"kern.bootsessionuuid", answer, ctypes.byref(size), None, ctypes.c_size_t(0))
-    return "" if failed else answer.value.decode("ascii")
+    buffer, size = ctypes.create_string_buffer(64), ctypes.c_size_t(64)
+    sysctl = ctypes.CDLL(None).sysctlbyname
+    failed = sysctl(b"kern.bootsessionuuid", buffer, ctypes.byref(size), None, ctypes.c_size_t(0))
+    return "" if failed else buffer.value.decode("ascii")
 
 
 def _machine_guid() -> str:

@@ -35,12 +35,12 @@ class CpuLoad:
         now = self._clock()
         if self._last_reading is not None and now - self._last_reading[0] < _MIN_INTERVAL_S:
             return self._ratio
-        used = self._used_s()
-        if used is None:
+        used_s = self._used_s()
+        if used_s is None:
             self._last_reading = self._ratio = None
             return None
         if self._last_reading is not None:
-            then, before = self._last_reading
-            self._ratio = max(0.0, used - before) / (now - then)
-        self._last_reading = (now, used)
+            previous_s, before = self._last_reading
+            self._ratio = max(0.0, used_s - before) / (now - previous_s)
+        self._last_reading = (now, used_s)
         return self._ratio

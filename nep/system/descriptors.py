@@ -59,27 +59,27 @@ class _DescriptorCheck:
         self._polled_limit: int | None = None
         self._pollers: dict[int, select.poll] = {}
 
-    def check(self, needed: int, what: str) -> None:
-        most = descriptor_limit()
-        if most is not None and not self.has_free(needed + RESERVED_DESCRIPTORS):
-            raise TooManyFilesError(what, open_descriptor_count(), most)
+    def check(self, needed: int, purpose: str) -> None:
+        limit = descriptor_limit()
+        if limit is not None and not self.has_free(needed + RESERVED_DESCRIPTORS):
+            raise TooManyFilesError(purpose, open_descriptor_count(), limit)
 
     def has_free(self, needed: int) -> bool:
-        most = descriptor_limit()
-        if most is None or self._count_free_at_end(most, needed) >= needed:
+        limit = descriptor_limit()
+        if limit is None or self._count_free_at_end(limit, needed) >= needed:
             return True
         count = open_descriptor_count()
-        return count is None or most - count >= needed
+        return count is None or limit - count >= needed
 
-    def _count_free_at_end(self, most: int, needed: int) -> int:
+    def _count_free_at_end(self, limit: int, needed: int) -> int:
         with self._lock:
-            if self._polled_limit != most:
-                self._polled_limit = most
+            if self._polled_limit != limit:
+                self._polled_limit = limit
                 self._pollers.clear()
             last = self._pollers.get(needed)
             if last is None:
                 last = self._pollers[needed] = select.poll()
-                for number in range(max(0, most - needed), most):
+                for number in range(max(0, limit - needed), limit):
                     last.register(number, 0)
             return sum(event == select.POLLNVAL for _number, event in last.poll(0))
 
@@ -87,14 +87,14 @@ class _DescriptorCheck:
 _descriptor_check = _DescriptorCheck()
 
 
-def check_free_descriptors(needed: int, what: str) -> None:
+def check_free_descriptors(needed: int, purpose: str) -> None:
     """Raise `TooManyFilesError` if fewer than `RESERVED_DESCRIPTORS` would be left.
 
     Args:
         needed: Number of descriptors to be opened.
-        what: Purpose of the descriptors, for the error message.
+        purpose: Purpose of the descriptors, for the error message.
     """
-    _descriptor_check.check(needed, what)
+    _descriptor_check.check(needed, purpose)
 
 
 def has_free_descriptors(needed: int) -> bool:

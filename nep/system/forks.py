@@ -60,9 +60,9 @@ def call_in_child(call: Callable[[], None]) -> None:
 def _notify_owners() -> None:
     owners = list(_fork_aware_objects)
     _fork_aware_objects.clear()
-    for tell in (*(owner.forked for owner in owners), *_handlers):
+    for callback in (*(owner.forked for owner in owners), *_handlers):
         with contextlib.suppress(Exception):  # a failure must not prevent the others
-            tell()
+            callback()
     if _inherited_endpoints:
         with contextlib.suppress(OSError):
             _close_sockets(*_addresses(_inherited_endpoints))
@@ -74,10 +74,10 @@ def _addresses(endpoints: set[str]) -> tuple[set[object], set[object]]:
     exact: set[object] = set()
     ports: set[object] = set()
     for endpoint in endpoints:
-        scheme, _colon, place = endpoint.partition("://")
-        host, _colon, port = place.rpartition(":")
-        if scheme == "ipc" and place.startswith("@"):
-            exact.add(b"\0" + place[1:].encode())
+        scheme, _colon, address = endpoint.partition("://")
+        host, _colon, port = address.rpartition(":")
+        if scheme == "ipc" and address.startswith("@"):
+            exact.add(b"\0" + address[1:].encode())
         elif scheme == "tcp" and port.isdigit():
             exact.add((host, int(port)))
             if host in _ANY_HOSTS:
@@ -108,15 +108,15 @@ def _close_matching(exact: set[object], ports: set[object]) -> None:
 
 
 def _socket_addresses(number: int) -> list[object]:
-    ends: list[object] = []
-    known = socket.socket(fileno=number)
+    addresses: list[object] = []
+    sock = socket.socket(fileno=number)
     try:
-        for ask in (known.getsockname, known.getpeername):
+        for get_address in (sock.getsockname, sock.getpeername):
             with contextlib.suppress(OSError):
-                ends.append(ask())
+                addresses.append(get_address())
     finally:
-        known.detach()
-    return ends
+        sock.detach()
+    return addresses
 
 
 if sys.platform != "win32":

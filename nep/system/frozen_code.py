@@ -31,8 +31,8 @@ def keep_archive_open() -> bool:
     if archive is None or not sys.platform.startswith("linux"):
         return False
     try:
-        held = os.open(archive._filename, os.O_RDONLY | os.O_CLOEXEC)  # noqa: SLF001 - there is no public API
+        descriptor = os.open(archive._filename, os.O_RDONLY | os.O_CLOEXEC)  # noqa: SLF001 - there is no public API
     except OSError:
         return False
-    archive._filename = f"/proc/self/fd/{held}"  # noqa: SLF001
+    archive._filename = f"/proc/self/fd/{descriptor}"  # noqa: SLF001
     return True

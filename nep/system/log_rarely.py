@@ -21,15 +21,15 @@ class SuppressedErrors:
     suppressed too, because it would end the thread.
     """
 
-    def __init__(self, logger: logging.Logger, what: str) -> None:
+    def __init__(self, logger: logging.Logger, operation: str) -> None:
         """Initialize the context manager.
 
         Args:
             logger: Logger for the exceptions.
-            what: Name of the work; the log message is "WORK failed (N so far)".
+            operation: Name of the work; the log message is "WORK failed (N so far)".
         """
         self.count = 0
-        self._logger, self._what = logger, what
+        self._logger, self._what = logger, operation
 
     def add(self, error: BaseException) -> None:
         """Count an exception and log it at increasing intervals."""

@@ -48,7 +48,7 @@ def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]
         PluginsMissingError: The package has no plug-ins (left out of a frozen program).
         TypeError: A module binds an object of another type.
     """
-    found: dict[str, T] = {}
+    plugins: dict[str, T] = {}
     home = importlib.import_module(package)
     for info in pkgutil.iter_modules(home.__path__, f"{package}."):
         bound = getattr(importlib.import_module(info.name), attribute, None)
@@ -56,10 +56,10 @@ def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]
             continue
         if not isinstance(bound, kind):
             raise TypeError(f"'{info.name}.{attribute}' is not a '{kind.__name__}'")
-        found[bound.name] = bound
-    if not found:
+        plugins[bound.name] = bound
+    if not plugins:
         raise PluginsMissingError(package, attribute)
-    return found
+    return plugins
 
 
 def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
@@ -77,7 +77,7 @@ def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
         PluginsMissingError: The package has no plug-ins (left out of a frozen program).
         TypeError: A module binds an object of another type.
     """
-    found = dict(discover_own(package, attribute, kind))
+    plugins = dict(discover_own(package, attribute, kind))
     for point in metadata.entry_points(group=package):
         try:
             bound = point.load()
@@ -85,7 +85,7 @@ def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
             _logger.exception("can't load the plug-in '%s' of '%s'", point.name, package)
             continue
         if isinstance(bound, kind):
-            found.setdefault(bound.name, bound)
+            plugins.setdefault(bound.name, bound)
         else:
             _logger.error("the plug-in '%s' of '%s' is not a '%s'", point.name, package, kind.__name__)
-    return found
+    return plugins

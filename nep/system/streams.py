@@ -35,11 +35,11 @@ def prepare_streams() -> None:
     get their descriptors. Reading or writing them fails as usual; messages to a closed stderr are discarded.
     """
     codecs.register_error(_ERROR_HANDLER, _replace_unencodable)
-    ways = {"stdin": os.O_WRONLY, "stdout": os.O_RDONLY, "stderr": os.O_WRONLY}
-    for name, way in ways.items():
+    open_flags = {"stdin": os.O_WRONLY, "stdout": os.O_RDONLY, "stderr": os.O_WRONLY}
+    for name, flags in open_flags.items():
         stream = getattr(sys, name)
         if stream is None:
-            mode, nowhere = "r" if name == "stdin" else "w", os.open(os.devnull, way)
+            mode, nowhere = "r" if name == "stdin" else "w", os.open(os.devnull, flags)
             setattr(sys, name, open(nowhere, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - stays open
         elif name != "stdin" and isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors=_ERROR_HANDLER)
@@ -63,7 +63,7 @@ def command_line_arguments() -> list[str]:
     if os.name != "posix":
         return sys.argv[1:]
     escape = "surrogateescape"
-    return [word.encode("utf-8", escape).decode("utf-8", escape) for word in sys.argv[1:]]
+    return [argument.encode("utf-8", escape).decode("utf-8", escape) for argument in sys.argv[1:]]
 
 
 def _replace_unencodable(error: UnicodeError) -> tuple[str, int]:

@@ -76,8 +76,8 @@ class Waker:
 
     def _close(self) -> None:
         event, self._event = self._event, -1
-        ends, self._ends = self._ends, ()
+        sockets, self._ends = self._ends, ()
         if event >= 0:
             os.close(event)
-        for end in ends:
+        for end in sockets:
             end.close()

@@ -95,7 +95,7 @@ class Play:
         self.link = link or FakeLink()
         self.lines: list[str] = []
         self.runtime = Runtime(
-            self.lines.append, labels=program.labels, readings=program.readings, asked=asked
+            self.lines.append, labels=program.labels, readings=program.readings, on_question=asked
         )
         self.robots = robots
         self.steps: list[str] = []

@@ -111,11 +111,11 @@ def test_exceptions_are_explained():
 
 
 def test_event_block_keeps_newest_events_and_counts_dropped_ones():
-    hat = ScriptTrigger("x", most=3)
+    hat = ScriptTrigger("x", max_waiting=3)
     for number in range(5):
         hat.enqueue((number,))
     assert hat.dropped == 2
-    lone = ScriptTrigger("x", most=1)
+    lone = ScriptTrigger("x", max_waiting=1)
     lone.enqueue(())
     lone.enqueue(())
     assert lone.dropped == 0  # a second touch while the script runs is one more run, not a loss

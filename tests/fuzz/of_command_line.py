@@ -87,7 +87,7 @@ def values_on_a_terminal(data: bytes) -> None:
     for made in (encode_json(value), encode_json(value, indent=True)):
         json.loads(made)
     for whole in (False, True):
-        shown = format_payload(value, whole=whole)
+        shown = format_payload(value, in_full=whole)
         shown.encode()
         assert not first_control(shown.replace("\n", ""))
 

@@ -45,7 +45,7 @@ def answers() -> Answers:
 
 @pytest.fixture
 def window(qtbot, theme: Theme, session: Session, answers: Answers) -> Iterator[MainWindow]:
-    made = MainWindow(session, theme, PANELS, [], asks=answers)
+    made = MainWindow(session, theme, PANELS, [], dialogs=answers)
     qtbot.addWidget(made)
     theme.apply()
     made.resize(1440, 900)

@@ -21,9 +21,12 @@ _WHERE = ChoiceField("WHERE", _POSITIONS_OR_RANDOM)
 
 
 def _templates_by_position(
-    call: str, places: tuple[tuple[str, str], ...] = _POSITIONS_OR_RANDOM
+    call: str, positions: tuple[tuple[str, str], ...] = _POSITIONS_OR_RANDOM
 ) -> dict[str, str]:
-    return {place: call.replace("@", "%NUMBER" if place == "number" else f"'{place}'") for _, place in places}
+    return {
+        position: call.replace("@", "%NUMBER" if position == "number" else f"'{position}'")
+        for _, position in positions
+    }
 
 
 _CREATE_BLOCKS = (

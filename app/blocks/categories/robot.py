@@ -38,30 +38,30 @@ _SIMPLE_KINDS = ("boolean", "number", "integer", "text", "choice")
 _NUMBER_KINDS = ("number", "integer")
 
 
-def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
+def robot_blocks(robot: Robot, all_robots: Sequence[Robot]) -> tuple[Block, ...]:
     """Return all blocks of a robot.
 
     Args:
         robot: Description of the robot.
-        known: All robots; the drop-down of the robot's blocks offers the robots of the same model.
+        all_robots: All robots; the drop-down of the robot's blocks offers the robots of the same model.
     """
-    alike = [other.name for other in known if other.model == robot.model] or [robot.name]
+    alike = [other.name for other in all_robots if other.model == robot.model] or [robot.name]
     blocks = [_action_block(robot, action, alike) for action in robot.actions]
     blocks += [_sensor_block(robot, sensor, alike) for sensor in robot.sensors if _has_block(sensor)]
     blocks += [_event_block(robot, event, alike) for event in robot.events if event.text]
     return (*blocks, *_change_event_blocks(robot, alike))
 
 
-def robot_groups(robot: Robot, known: Sequence[Robot]) -> tuple[Group, ...]:
+def robot_groups(robot: Robot, all_robots: Sequence[Robot]) -> tuple[Group, ...]:
     """Return the block groups under the heading of a robot; sensors and events come last.
 
     Args:
         robot: Description of the robot.
-        known: All robots; see `robot_blocks`.
+        all_robots: All robots; see `robot_blocks`.
     """
     titles = {action.name: _group_title(action) for action in robot.actions}
     groups: dict[str, list[ToolboxEntry]] = {title: [] for title in GROUPS}
-    for block in robot_blocks(robot, known):
+    for block in robot_blocks(robot, all_robots):
         use = block.robot
         if use is None:
             continue
@@ -94,11 +94,11 @@ def _action_block(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
         if parameter.name in parts.shown
     ]
     returns = _result_field(robot, action)
-    called = [action.name, action.title, *_semantic_types(robot, "actions", action.name)]
-    called += [parameter.name for parameter in action.parameters]
-    found = action_search_words(called, action.uses)
-    do = "robot(%ROBOT).do(%X_NAME, **%X_INPUT)"
-    ask = "robot(%ROBOT).ask(%X_NAME, %X_FIELD, **%X_INPUT)"
+    names_and_titles = [action.name, action.title, *_semantic_types(robot, "actions", action.name)]
+    names_and_titles += [parameter.name for parameter in action.parameters]
+    keywords = action_search_words(names_and_titles, action.uses)
+    action_code = "robot(%ROBOT).do(%X_NAME, **%X_INPUT)"
+    request_code = "robot(%ROBOT).ask(%X_NAME, %X_FIELD, **%X_INPUT)"
     return Block(
         type=block_type_of(robot.model, "do", action.name),
         text=parts.text,
@@ -106,14 +106,14 @@ def _action_block(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
         style="robot",
         icon=action.icon or "bot",
         tooltip=_tooltip(robot, action),
-        python=do if returns is None else ask,
+        python=action_code if returns is None else request_code,
         arguments=(*arguments, *(argument for _, argument in inputs)),
         constants={"X_NAME": action.name} | ({} if returns is None else {"X_FIELD": returns}),
         keywords={"X_INPUT": tuple((argument.name, parameter.name) for parameter, argument in inputs)},
         robot=RobotUse("action", action.name, action.title, robot.model),
         about={argument.name: (parameter.title, about(parameter)) for parameter, argument in inputs},
-        search_words=", ".join((found.words, translate("category", _group_title(action)))),
-        english_search_words=found.english,
+        search_words=", ".join((keywords.words, translate("category", _group_title(action)))),
+        english_search_words=keywords.english,
     )
 
 
@@ -126,7 +126,7 @@ def _tooltip(robot: Robot, action: Action) -> str:
 def _sensor_block(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
     parts = BlockTemplate(sensor.text, [])
     robots = robot_field(robot.model, alike)
-    found = sensor_search_words(
+    keywords = sensor_search_words(
         (sensor.name, sensor.title, *_semantic_types(robot, "properties", sensor.name))
     )
     if sensor.kind == "object":
@@ -142,8 +142,8 @@ def _sensor_block(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
             arguments=(robots, ChoiceField("FIELD", fields), LiveField("LIVE")),
             constants={"X_NAME": sensor.name},
             robot=RobotUse("sensor", sensor.name, sensor.title, robot.model),
-            search_words=found.words,
-            english_search_words=found.english,
+            search_words=keywords.words,
+            english_search_words=keywords.english,
         )
     boolean = sensor.kind == "boolean"
     return Block(
@@ -158,8 +158,8 @@ def _sensor_block(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
         check="Boolean" if boolean else "Number" if sensor.kind in _NUMBER_KINDS else "String",
         constants={"X_NAME": sensor.name},
         robot=RobotUse("sensor", sensor.name, sensor.title, robot.model),
-        search_words=found.words,
-        english_search_words=found.english,
+        search_words=keywords.words,
+        english_search_words=keywords.english,
     )
 
 
@@ -171,7 +171,7 @@ def _event_block(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
         for name in event.filters
         if name in parts.shown
     ]
-    found = sensor_search_words((event.name, event.title, *_semantic_types(robot, "events", event.name)))
+    keywords = sensor_search_words((event.name, event.title, *_semantic_types(robot, "events", event.name)))
     return Block(
         type=block_type_of(robot.model, "when", event.name),
         text=parts.text,
@@ -184,26 +184,28 @@ def _event_block(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
         constants={"X_NAME": event.name},
         keywords={"X_INPUT": tuple((argument.name, name) for name, argument in filters)},
         robot=RobotUse("event", event.name, event.title, robot.model),
-        search_words=found.words,
-        english_search_words=found.english,
+        search_words=keywords.words,
+        english_search_words=keywords.english,
     )
 
 
 def _change_event_blocks(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
-    told = [sensor for sensor in robot.sensors if _has_block(sensor) and sensor.kind in _SIMPLE_KINDS]
-    numbers = [sensor for sensor in told if sensor.kind in _NUMBER_KINDS]
+    observable_sensors = [
+        sensor for sensor in robot.sensors if _has_block(sensor) and sensor.kind in _SIMPLE_KINDS
+    ]
+    numbers = [sensor for sensor in observable_sensors if sensor.kind in _NUMBER_KINDS]
     hats = []
-    if told:
+    if observable_sensors:
         hats.append(
             Block(
-                type=block_type_of(robot.model, "when", "changes", plain=True),
+                type=block_type_of(robot.model, "when", "changes", without_verb=True),
                 text=pgettext("block", "when %ROBOT %SENSOR changes"),
                 shape="hat",
                 style="events",
                 icon="activity",
                 tooltip=_("The blocks below run each time the value of this sensor changes."),
                 python="robot(%ROBOT).on_change(%SENSOR)",
-                arguments=(robot_field(robot.model, alike), _sensor_field(told)),
+                arguments=(robot_field(robot.model, alike), _sensor_field(observable_sensors)),
                 robot=RobotUse("sensor", "", "changes", robot.model),
                 search_words=bilingual_search_words(CHANGE_SEARCH_WORDS).words,
                 english_search_words=bilingual_search_words(CHANGE_SEARCH_WORDS).english,
@@ -212,7 +214,7 @@ def _change_event_blocks(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...
     if numbers:
         hats.append(
             Block(
-                type=block_type_of(robot.model, "when", "passes", plain=True),
+                type=block_type_of(robot.model, "when", "passes", without_verb=True),
                 text=pgettext("block", "when %ROBOT %SENSOR goes %SIDE %LIMIT"),
                 shape="hat",
                 style="events",
@@ -241,8 +243,8 @@ def _sensor_field(sensors: Sequence[Sensor]) -> ChoiceField:
 
 
 def _result_field(robot: Robot, action: Action) -> str | None:
-    look = _member(robot, "actions", action.name).get("rb:block")
-    returns = look.get("returns") if isinstance(look, Mapping) else None
+    block_hints = _member(robot, "actions", action.name).get("rb:block")
+    returns = block_hints.get("returns") if isinstance(block_hints, Mapping) else None
     return returns if isinstance(returns, str) and returns else None
 
 
@@ -253,8 +255,8 @@ def _member(robot: Robot, kind: str, name: str) -> Mapping[str, object]:
 
 
 def _semantic_types(robot: Robot, kind: str, name: str) -> tuple[str, ...]:
-    told = _member(robot, kind, name).get("@type")
-    return (told,) if isinstance(told, str) else names(told)
+    semantic_type = _member(robot, kind, name).get("@type")
+    return (semantic_type,) if isinstance(semantic_type, str) else names(semantic_type)
 
 
 CATEGORY = Category(

@@ -58,12 +58,12 @@ class _UsedResources:
         self.listens: dict[str, None] = {}
         self.moves: dict[str, None] = {}
 
-    def add(self, placed: PlacedBlock, block: Block) -> None:
+    def add(self, placed_block: PlacedBlock, block: Block) -> None:
         use = block.robot
         if use is not None:
-            robot = placed.field_text("ROBOT") or _first_robot(block)
+            robot = placed_block.field_text("ROBOT") or _first_robot(block)
             self.robots[robot] = None
-            name = use.name or str(saved_value(block, placed, "SENSOR"))
+            name = use.name or str(saved_value(block, placed_block, "SENSOR"))
             if use.kind == "sensor":
                 self.sensors[robot, name] = None
             elif use.kind == "event":
@@ -71,22 +71,22 @@ class _UsedResources:
         for argument in block.arguments:
             if isinstance(argument, TopicField):
                 topics = self.publishes if block.publishes else self.listens
-                topics[str(saved_value(block, placed, argument.name))] = None
+                topics[str(saved_value(block, placed_block, argument.name))] = None
 
 
-def saved_value(block: Block, placed: PlacedBlock, name: str) -> object:
+def saved_value(block: Block, placed_block: PlacedBlock, name: str) -> object:
     """Return the value of a field of a placed block; None if the block has no such field.
 
     Args:
         block: Description of the block.
-        placed: Block in the workspace.
+        placed_block: Block in the workspace.
         name: Name of the field.
 
     Raises:
         FieldError: The saved value is invalid.
     """
     argument = block.argument(name)
-    return argument.read(placed.fields.get(name)) if isinstance(argument, Field) else None
+    return argument.read(placed_block.fields.get(name)) if isinstance(argument, Field) else None
 
 
 def _first_robot(block: Block) -> str:
@@ -144,7 +144,7 @@ class _Compiler:
         self._numbers: set[str] = set()  # blocks that must return a number
 
     def program(self) -> Program:
-        own = self._definitions()
+        definitions = self._definitions()
         functions = [
             function for script in self._workspace.scripts if (function := self._script(script)) is not None
         ]
@@ -152,13 +152,13 @@ class _Compiler:
         self._loose_ends.report(self._problems, self._workspace)
         self._problems.check_unknown()
         self._problems.check_names()
-        for found in ConflictFinder(
+        for conflict in ConflictFinder(
             self._workspace, self._catalogue, self._shaping.called_function
         ).conflicts():
-            self._problems.report_conflict(found)
+            self._problems.report_conflict(conflict)
         body: list[ast.stmt] = [
             *statements("\n".join(f"{name} = 0" for name in self._variables.values()), {}),
-            *own,
+            *definitions,
             *functions,
         ]
         actions = invoked_actions(body)  # before `render_instrumented` changes the trees
@@ -187,8 +187,8 @@ class _Compiler:
         )
 
     def _all_variables(self) -> tuple[Variable, ...]:
-        own, shown = self._shaping.variables, self._workspace.variables
-        names = dict(own) | {id: shown.get(id, id) for id in self._variables}
+        function_variables, workspace_variables = self._shaping.variables, self._workspace.variables
+        names = dict(function_variables) | {id: workspace_variables.get(id, id) for id in self._variables}
         return tuple(Variable(id, name, self._variables.get(id, "")) for id, name in names.items())
 
     # ---- scripts and statements
@@ -226,190 +226,192 @@ class _Compiler:
         return function
 
     def _definitions(self) -> list[ast.stmt]:
-        made: list[ast.stmt] = []
+        definitions: list[ast.stmt] = []
         for script in self._workspace.scripts:
             self._function = self._shaping.function(script[0])
             if self._function is not None and self._usable_block(script[0]) is not None:
-                made.append(self._definition(script[0], self._function))
+                definitions.append(self._definition(script[0], self._function))
         self._function = None
-        return made
+        return definitions
 
-    def _definition(self, placed: PlacedBlock, function: Function) -> ast.stmt:
+    def _definition(self, placed_block: PlacedBlock, function: Function) -> ast.stmt:
         self._in_message = False
-        self._store_block_text(placed)
-        body = self._statements(placed.inputs.get("BODY", ()) if placed.enabled else ())
+        self._store_block_text(placed_block)
+        body = self._statements(placed_block.inputs.get("BODY", ()) if placed_block.enabled else ())
         if function.has_result:
-            body += self._statement(replace(placed, type=f"{END_BLOCK}:{placed.id}"))
-        (made,) = statements("def script():\n    %BODY", {}, {"BODY": body})
-        if isinstance(made, ast.FunctionDef):
-            made.name = function.python_name
-            made.args.args = [ast.arg(name) for name in function.parameters.values()]
-            self._declare_globals(made)
-        self._marks[made] = placed.id
-        return made
+            body += self._statement(replace(placed_block, type=f"{END_BLOCK}:{placed_block.id}"))
+        (definition,) = statements("def script():\n    %BODY", {}, {"BODY": body})
+        if isinstance(definition, ast.FunctionDef):
+            definition.name = function.python_name
+            definition.args.args = [ast.arg(name) for name in function.parameters.values()]
+            self._declare_globals(definition)
+        self._marks[definition] = placed_block.id
+        return definition
 
     def _declare_globals(self, function: ast.FunctionDef) -> None:
-        own = set(self._variables.values())
+        variable_names = set(self._variables.values())
         stored = {
             node.id
             for node in ast.walk(function)
-            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id in own
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id in variable_names
         }
         if stored:
             function.body.insert(0, ast.Global(sorted(stored)))
 
     def _statements(self, chain: Sequence[PlacedBlock]) -> list[ast.stmt]:
-        made: list[ast.stmt] = []
-        for placed in chain:
-            if placed.enabled:
-                made += self._statement(placed)
-        return made
+        body: list[ast.stmt] = []
+        for placed_block in chain:
+            if placed_block.enabled:
+                body += self._statement(placed_block)
+        return body
 
-    def _statement(self, placed: PlacedBlock) -> list[ast.stmt]:
-        if placed.has_breakpoint:
-            self._breakpoints[placed.id] = None
-        block = self._usable_block(placed)
+    def _statement(self, placed_block: PlacedBlock) -> list[ast.stmt]:
+        if placed_block.has_breakpoint:
+            self._breakpoints[placed_block.id] = None
+        block = self._usable_block(placed_block)
         if block is None:
             return []
         if block.shape not in ("statement", "cap") or not self._is_allowed_here(block):
-            self._problems.report_misplaced(placed, block)
+            self._problems.report_misplaced(placed_block, block)
             return []
-        self._store_block_text(placed)
-        missing = self._problems.report_empty_slot(placed, block)
+        self._store_block_text(placed_block)
+        missing = self._problems.report_empty_slot(placed_block, block)
         if missing is not None:
             return self._record_block_id(
-                statements("fail(%SENTENCE)", {"SENTENCE": literal(missing)}), placed
+                statements("fail(%SENTENCE)", {"SENTENCE": literal(missing)}), placed_block
             )
         try:
-            expressions = self._expressions(placed, block)
+            expressions = self._expressions(placed_block, block)
         except _SkippedBlock:
             return []
-        self._uses.add(placed, block)
-        self._loose_ends.add(placed, block)
-        self._problems.report_hints(placed, block)
+        self._uses.add(placed_block, block)
+        self._loose_ends.add(placed_block, block)
+        self._problems.report_hints(placed_block, block)
         if block.publishes:
-            self._record_moved_robots(placed, block)
+            self._record_moved_robots(placed_block, block)
         bodies = {
-            argument.name: self._statements(placed.inputs.get(argument.name, ()))
+            argument.name: self._statements(placed_block.inputs.get(argument.name, ()))
             for argument in block.arguments
             if isinstance(argument, StatementInput)
         }
-        text = self._template(block, placed)
-        made = statements(text, expressions, bodies, keywords(block, expressions))
-        if block.calls_function and isinstance(made[0], ast.Expr):
-            self._marks[made[0].value] = placed.id
-            self._calls.add(placed.id)
-        return self._record_block_id(made, placed)
+        text = self._template(block, placed_block)
+        compiled = statements(text, expressions, bodies, keywords(block, expressions))
+        if block.calls_function and isinstance(compiled[0], ast.Expr):
+            self._marks[compiled[0].value] = placed_block.id
+            self._calls.add(placed_block.id)
+        return self._record_block_id(compiled, placed_block)
 
-    def _record_moved_robots(self, placed: PlacedBlock, block: Block) -> None:
+    def _record_moved_robots(self, placed_block: PlacedBlock, block: Block) -> None:
         topics = [argument.name for argument in block.arguments if isinstance(argument, TopicField)]
-        for topic in (str(saved_value(block, placed, name)) for name in topics):
+        for topic in (str(saved_value(block, placed_block, name)) for name in topics):
             names = robots_moved_by(topic, self._catalogue.connected.values())
             self._uses.robots |= dict.fromkeys(names)
             self._uses.moves |= dict.fromkeys(names)
-            self._problems.report_motion(placed, block, topic, names)
+            self._problems.report_motion(placed_block, block, topic, names)
 
     def _is_allowed_here(self, block: Block) -> bool:
         if not block.needs_function:
             return True
         return self._function is not None and self._function.has_result == (block.needs_function == "result")
 
-    def _record_block_id(self, made: list[ast.stmt], placed: PlacedBlock) -> list[ast.stmt]:
-        self._marks[made[0]] = placed.id
-        return made
+    def _record_block_id(self, compiled: list[ast.stmt], placed_block: PlacedBlock) -> list[ast.stmt]:
+        self._marks[compiled[0]] = placed_block.id
+        return compiled
 
     # ---- values
 
-    def _expressions(self, placed: PlacedBlock, block: Block) -> dict[str, ast.expr]:
-        made = {name: literal(constant) for name, constant in block.constants.items()} | dict(
+    def _expressions(self, placed_block: PlacedBlock, block: Block) -> dict[str, ast.expr]:
+        expressions = {name: literal(constant) for name, constant in block.constants.items()} | dict(
             block.constant_trees
         )
         for argument in block.arguments:
             if isinstance(argument, ValueInput):
-                made[argument.name] = self._value(placed, argument)
+                expressions[argument.name] = self._value(placed_block, argument)
             elif isinstance(argument, Field) and not argument.is_display_only:
-                made[argument.name] = self._field(placed, block, argument)
-        return made
+                expressions[argument.name] = self._field(placed_block, block, argument)
+        return expressions
 
-    def _value(self, holder: PlacedBlock, argument: ValueInput) -> ast.expr:
-        inner = holder.inputs.get(argument.name, ())
+    def _value(self, parent: PlacedBlock, argument: ValueInput) -> ast.expr:
+        inner = parent.inputs.get(argument.name, ())
         if not inner or not inner[0].enabled:
             return literal(argument.default)
-        placed = inner[0]
-        block = self._usable_block(placed, holder)
+        placed_block = inner[0]
+        block = self._usable_block(placed_block, parent)
         if block is None:
             raise _SkippedBlock
         if block.shape not in ("value", "boolean"):
-            self._problems.report_misplaced(placed, block)
+            self._problems.report_misplaced(placed_block, block)
             raise _SkippedBlock
         if block.needs_message and not self._in_message:
-            self._problems.report_no_message(placed, block)
+            self._problems.report_no_message(placed_block, block)
             return literal(None)
-        self._store_block_text(placed)
-        missing = self._problems.report_empty_slot(placed, block)
-        expressions = self._expressions(placed, block)
+        self._store_block_text(placed_block)
+        missing = self._problems.report_empty_slot(placed_block, block)
+        expressions = self._expressions(placed_block, block)
         if missing is not None:
-            made = expression("fail(%SENTENCE)", {"SENTENCE": literal(missing)})
+            compiled = expression("fail(%SENTENCE)", {"SENTENCE": literal(missing)})
         else:
-            self._uses.add(placed, block)
-            self._loose_ends.add(placed, block)
-            made = expression(self._template(block, placed), expressions, keywords(block, expressions))
+            self._uses.add(placed_block, block)
+            self._loose_ends.add(placed_block, block)
+            compiled = expression(
+                self._template(block, placed_block), expressions, keywords(block, expressions)
+            )
         if block.can_fail or missing is not None:
-            self._marks[made] = placed.id
+            self._marks[compiled] = placed_block.id
             if block.check == "Number" and missing is None:
-                self._numbers.add(placed.id)
+                self._numbers.add(placed_block.id)
             if block.calls_function:
-                self._calls.add(placed.id)
-        return made
+                self._calls.add(placed_block.id)
+        return compiled
 
-    def _field(self, placed: PlacedBlock, block: Block, field: Field) -> ast.expr:
+    def _field(self, placed_block: PlacedBlock, block: Block, field: Field) -> ast.expr:
         try:
-            value = field.read(placed.fields.get(field.name))
+            value = field.read(placed_block.fields.get(field.name))
         except FieldError as error:
-            self._problems.report_invalid_field(placed, block, error)
+            self._problems.report_invalid_field(placed_block, block, error)
             raise _SkippedBlock from None
         if isinstance(field, InputField):
-            return self._input(placed, block, str(value))
+            return self._input(placed_block, block, str(value))
         if isinstance(field, VariableField):
             return ast.Name(self._variable(str(value)), ast.Load())
         return literal(value)
 
-    def _input(self, placed: PlacedBlock, block: Block, id: str) -> ast.expr:
+    def _input(self, placed_block: PlacedBlock, block: Block, id: str) -> ast.expr:
         name = self._function.parameters.get(id) if self._function is not None else None
         if name is None:
-            self._problems.report_unknown_input(placed, block)
+            self._problems.report_unknown_input(placed_block, block)
             raise _SkippedBlock
         return ast.Name(name, ast.Load())
 
     def _variable(self, id: str) -> str:
         if id not in self._variables:
             is_nameless = id in self._workspace.nameless_variables
-            words = id if is_nameless else self._workspace.variables.get(id, id)
-            self._variables[id] = self._names.new_name(words, "variable")
+            name = id if is_nameless else self._workspace.variables.get(id, id)
+            self._variables[id] = self._names.new_name(name, "variable")
         return self._variables[id]
 
     # ---- block look-up
 
-    def _usable_block(self, placed: PlacedBlock, holder: PlacedBlock | None = None) -> Block | None:
-        if placed.is_too_deep:
-            self._problems.report_too_deep(placed)
+    def _usable_block(self, placed_block: PlacedBlock, parent: PlacedBlock | None = None) -> Block | None:
+        if placed_block.is_too_deep:
+            self._problems.report_too_deep(placed_block)
             return None
-        block = self._catalogue.blocks.get(placed.type)
-        if self._problems.report_unsupported(placed, block, holder):
+        block = self._catalogue.blocks.get(placed_block.type)
+        if self._problems.report_unsupported(placed_block, block, parent):
             return None
         if block is not None and block.undefined_message:
-            self._problems.report_undefined(placed, block)
+            self._problems.report_undefined(placed_block, block)
         return block
 
-    def _template(self, block: Block, placed: PlacedBlock) -> str:
-        return template(block, placed, in_function=self._function is not None)
+    def _template(self, block: Block, placed_block: PlacedBlock) -> str:
+        return template(block, placed_block, in_function=self._function is not None)
 
-    def _store_block_text(self, placed: PlacedBlock) -> str:
-        words = block_text(placed, self._catalogue.blocks, self._workspace.variables)
-        self._readings[placed.id] = words
-        block = self._catalogue.blocks.get(placed.type)
-        self._labels[placed.id] = self._problems.label(placed, block)
-        return words
+    def _store_block_text(self, placed_block: PlacedBlock) -> str:
+        text = block_text(placed_block, self._catalogue.blocks, self._workspace.variables)
+        self._readings[placed_block.id] = text
+        block = self._catalogue.blocks.get(placed_block.type)
+        self._labels[placed_block.id] = self._problems.label(placed_block, block)
+        return text
 
 
 def keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, list[ast.keyword]]:
@@ -421,31 +423,39 @@ def keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, lis
         block: Description of the block.
         expressions: Expression of each argument by name.
     """
-    made: dict[str, list[ast.keyword]] = {}
+    keywords_by_placeholder: dict[str, list[ast.keyword]] = {}
     for hole, pairs in block.keywords.items():
-        plain = [ast.keyword(name, expressions[at]) for at, name in pairs if _is_keyword_name(name)]
-        odd = [(literal(name), expressions[at]) for at, name in pairs if not _is_keyword_name(name)]
+        arguments = [
+            ast.keyword(name, expressions[argument_name])
+            for argument_name, name in pairs
+            if _is_keyword_name(name)
+        ]
+        odd = [
+            (literal(name), expressions[argument_name])
+            for argument_name, name in pairs
+            if not _is_keyword_name(name)
+        ]
         if odd:
             table = ast.Dict([key for key, _ in odd], [value for _, value in odd])
-            plain.append(ast.keyword(None, table))
-        made[hole] = plain
-    return made
+            arguments.append(ast.keyword(None, table))
+        keywords_by_placeholder[hole] = arguments
+    return keywords_by_placeholder
 
 
-def template(block: Block, placed: PlacedBlock, *, in_function: bool) -> str:
+def template(block: Block, placed_block: PlacedBlock, *, in_function: bool) -> str:
     """Return the Python template of a placed block.
 
     Args:
         block: Description of the block.
-        placed: Block in the workspace, whose field values may select the template.
+        placed_block: Block in the workspace, whose field values may select the template.
         in_function: True if the block is inside a function definition.
     """
     if in_function and block.python_in_function:
         return block.python_in_function
     if isinstance(block.python, str):
         return block.python
-    chosen = saved_value(block, placed, block.variant or "")
-    return block.python[str(chosen)]
+    option = saved_value(block, placed_block, block.variant or "")
+    return block.python[str(option)]
 
 
 def _is_keyword_name(name: str) -> bool:
@@ -458,7 +468,7 @@ def invoked_actions(body: Sequence[ast.stmt]) -> dict[str, tuple[str, ...]] | No
     The actions are read from the syntax tree that is executed, so that a program can't execute an action that
     is not in the result.
     """
-    found: dict[str, dict[str, None]] = {}
+    actions_by_robot: dict[str, dict[str, None]] = {}
     for call in (node for statement in body for node in ast.walk(statement)):
         if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute)):
             continue
@@ -467,8 +477,8 @@ def invoked_actions(body: Sequence[ast.stmt]) -> dict[str, tuple[str, ...]] | No
         robot, action = _first_argument_text(call.func.value), _first_argument_text(call)
         if robot is None or action is None:
             return None
-        found.setdefault(robot, {})[action] = None
-    return {robot: tuple(actions) for robot, actions in found.items()}
+        actions_by_robot.setdefault(robot, {})[action] = None
+    return {robot: tuple(actions) for robot, actions in actions_by_robot.items()}
 
 
 def _first_argument_text(node: ast.expr) -> str | None:

@@ -83,15 +83,18 @@ class ConflictFinder:
         ]
         if len(scripts) < 2:
             return
-        used = [self._find_action_uses(script[1:])[0] for script in scripts]
-        for one, other in itertools.combinations(range(len(scripts)), 2):
-            told: set[tuple[str, str]] = set()
-            for first, second in itertools.product(used[one], used[other]):
+        uses_by_script = [self._find_action_uses(script[1:])[0] for script in scripts]
+        for first_index, other in itertools.combinations(range(len(scripts)), 2):
+            reported: set[tuple[str, str]] = set()
+            for first, second in itertools.product(uses_by_script[first_index], uses_by_script[other]):
                 for part in _shared_resources(first, second):
-                    if (first.robot, part) not in told:
-                        told.add((first.robot, part))
+                    if (first.robot, part) not in reported:
+                        reported.add((first.robot, part))
                         yield Conflict(
-                            first, second, part, self._possible_reordering(scripts[one], scripts[other])
+                            first,
+                            second,
+                            part,
+                            self._possible_reordering(scripts[first_index], scripts[other]),
                         )
 
     def _find_action_uses(
@@ -100,49 +103,49 @@ class ConflictFinder:
         when: int = IMMEDIATE,
         *,
         endless: bool = False,
-        deep: tuple[str, ...] = (),
+        call_stack: tuple[str, ...] = (),
     ) -> tuple[list[ActionUse], int]:
-        used: list[ActionUse] = []
-        for placed in chain:
-            if not placed.enabled:
+        uses: list[ActionUse] = []
+        for placed_block in chain:
+            if not placed_block.enabled:
                 continue
-            found = self._robot_action(placed)
-            if found is not None:
-                used.append(ActionUse(placed, *found, when, endless))
+            robot_action = self._robot_action(placed_block)
+            if robot_action is not None:
+                uses.append(ActionUse(placed_block, *robot_action, when, endless))
                 when = max(when, LATER)  # actions take time
-            is_condition = placed.type.partition(":")[0] in _CONDITIONAL_BLOCKS
-            loops = endless or placed.type in _ENDLESS_BLOCKS
-            for inner in placed.inputs.values():
-                inside, after = self._find_action_uses(
-                    inner, UNCERTAIN if is_condition else when, endless=loops, deep=deep
+            is_condition = placed_block.type.partition(":")[0] in _CONDITIONAL_BLOCKS
+            loops = endless or placed_block.type in _ENDLESS_BLOCKS
+            for inner in placed_block.inputs.values():
+                inner_uses, after = self._find_action_uses(
+                    inner, UNCERTAIN if is_condition else when, endless=loops, call_stack=call_stack
                 )
-                used += inside
-                when = max(when, (LATER if inside else when) if is_condition else after)
-            called = self._function(placed)
-            if called is not None and called.definition.id not in deep:
-                body = called.definition.inputs.get("BODY", ())
-                inside, when = self._find_action_uses(
-                    body, when, endless=endless, deep=(*deep, called.definition.id)
+                uses += inner_uses
+                when = max(when, (LATER if inner_uses else when) if is_condition else after)
+            function = self._function(placed_block)
+            if function is not None and function.definition.id not in call_stack:
+                body = function.definition.inputs.get("BODY", ())
+                inner_uses, when = self._find_action_uses(
+                    body, when, endless=endless, call_stack=(*call_stack, function.definition.id)
                 )
-                used += inside
-            when = max(when, _TIMING_OF_WAIT_BLOCKS.get(placed.type, IMMEDIATE))
-        return used, when
+                uses += inner_uses
+            when = max(when, _TIMING_OF_WAIT_BLOCKS.get(placed_block.type, IMMEDIATE))
+        return uses, when
 
-    def _robot_action(self, placed: PlacedBlock) -> tuple[str, Action] | None:
-        block = self._catalogue.blocks.get(placed.type)
+    def _robot_action(self, placed_block: PlacedBlock) -> tuple[str, Action] | None:
+        block = self._catalogue.blocks.get(placed_block.type)
         if block is None or block.robot is None or block.robot.kind != "action":
             return None
-        name = placed.field_text("ROBOT")
+        name = placed_block.field_text("ROBOT")
         robot = self._catalogue.connected.get(name)
         action = robot.action(block.robot.name) if robot is not None else None
         return (name, action) if action is not None and action.uses else None
 
     def _possible_reordering(
-        self, one: Sequence[PlacedBlock], other: Sequence[PlacedBlock]
+        self, script: Sequence[PlacedBlock], other: Sequence[PlacedBlock]
     ) -> tuple[str, str] | None:
-        if not self._is_endless(one):
-            return other[0].id, one[0].id
-        return None if self._is_endless(other) else (one[0].id, other[0].id)
+        if not self._is_endless(script):
+            return other[0].id, script[0].id
+        return None if self._is_endless(other) else (script[0].id, other[0].id)
 
     def _is_endless(self, script: Sequence[PlacedBlock]) -> bool:
         block = self._catalogue.blocks.get(script[-1].type)

@@ -22,23 +22,23 @@ class NameUsage:
         self._sent: dict[str, tuple[PlacedBlock, Block]] = {}
         self._received: dict[str, tuple[PlacedBlock, Block]] = {}
 
-    def add(self, placed: PlacedBlock, block: Block) -> None:
+    def add(self, placed_block: PlacedBlock, block: Block) -> None:
         """Record which variables a block reads or sets, and which broadcasts it sends or receives."""
         for argument in block.arguments:
             if isinstance(argument, ValueInput) and (argument.check == "List" or argument.variable == "list"):
-                inner = placed.inputs.get(argument.name, ())
+                inner = placed_block.inputs.get(argument.name, ())
                 if inner and inner[0].type == _READS:
                     self._as_list.add(_variable_id(inner[0]))
             elif isinstance(argument, VariableField) and not isinstance(argument, InputField):
-                self._add_variable(placed, block)
+                self._add_variable(placed_block, block)
             elif isinstance(argument, BroadcastField):
                 both = self._received if block.type == _RECEIVES else self._sent
-                both.setdefault(_broadcast_name(argument, placed), (placed, block))
+                both.setdefault(_broadcast_name(argument, placed_block), (placed_block, block))
 
-    def _add_variable(self, placed: PlacedBlock, block: Block) -> None:
-        id = _variable_id(placed)
+    def _add_variable(self, placed_block: PlacedBlock, block: Block) -> None:
+        id = _variable_id(placed_block)
         if block.type == _READS:
-            self._read.setdefault(id, (placed, block))
+            self._read.setdefault(id, (placed_block, block))
         elif block.type == _CHANGES:
             self._changed.add(id)
         else:
@@ -46,27 +46,29 @@ class NameUsage:
 
     def report(self, notes: ProblemCollector, workspace: Workspace) -> None:
         """Report variables that are read but never set, and broadcasts without a sender or receiver."""
-        for id, (placed, block) in self._read.items():
+        for id, (placed_block, block) in self._read.items():
             is_list = id in self._as_list
             if id not in self._set and (is_list or id not in self._changed):
-                notes.report_never_set(placed, block, id, workspace.variables.get(id, id), is_list=is_list)
-        for name, (placed, block) in self._sent.items():
+                notes.report_never_set(
+                    placed_block, block, id, workspace.variables.get(id, id), is_list=is_list
+                )
+        for name, (placed_block, block) in self._sent.items():
             if name not in self._received:
-                notes.report_never_received(placed, block, name)
-        for name, (placed, block) in self._received.items():
+                notes.report_never_received(placed_block, block, name)
+        for name, (placed_block, block) in self._received.items():
             if name not in self._sent:
-                notes.report_never_sent(placed, block, name)
+                notes.report_never_sent(placed_block, block, name)
 
 
-def _variable_id(placed: PlacedBlock) -> str:
+def _variable_id(placed_block: PlacedBlock) -> str:
     try:
-        return str(VariableField("VAR").read(placed.fields.get("VAR")))
+        return str(VariableField("VAR").read(placed_block.fields.get("VAR")))
     except FieldError:
         return ""
 
 
-def _broadcast_name(field: BroadcastField, placed: PlacedBlock) -> str:
+def _broadcast_name(field: BroadcastField, placed_block: PlacedBlock) -> str:
     try:
-        return str(field.read(placed.fields.get(field.name)))
+        return str(field.read(placed_block.fields.get(field.name)))
     except FieldError:
         return ""

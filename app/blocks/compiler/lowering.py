@@ -63,61 +63,68 @@ class Lowering:
                 self._by_id[script[0].id] = _parse_function(script[0], names)
         self._by_name = {function.name: function for function in reversed(self._by_id.values())}
         scripts = tuple(tuple(map(self._lower, script)) for script in workspace.scripts)
-        shown = {each.id: each.name for function in self._by_id.values() for each in function.inputs}
-        self.workspace = replace(workspace, scripts=scripts, variables={**workspace.variables, **shown})
+        input_names = {each.id: each.name for function in self._by_id.values() for each in function.inputs}
+        self.workspace = replace(workspace, scripts=scripts, variables={**workspace.variables, **input_names})
 
     def function(self, definition: PlacedBlock) -> Function | None:
         """Return the function that a block defines; None for disabled blocks and other blocks."""
         return self._by_id.get(definition.id)
 
-    def called_function(self, placed: PlacedBlock) -> Function | None:
+    def called_function(self, placed_block: PlacedBlock) -> Function | None:
         """Return the function that a block of the rewritten `workspace` calls; None if there is none."""
-        kind = placed.type.partition(":")[0]
-        found = self._find_function(placed) if kind in (CALL, CALL_RESULT) else None
-        if found is None:
+        kind = placed_block.type.partition(":")[0]
+        function = self._find_function(placed_block) if kind in (CALL, CALL_RESULT) else None
+        if function is None:
             return None
         definitions = (script[0] for script in self.workspace.scripts)
         return next(
-            (replace(found, definition=each) for each in definitions if each.id == found.definition.id), None
+            (replace(function, definition=each) for each in definitions if each.id == function.definition.id),
+            None,
         )
 
-    def _find_function(self, placed: PlacedBlock) -> Function | None:
-        found = self._by_id.get(str(placed.extra_state.get("function")))
-        found = found or self._by_name.get(function_name(placed))
-        return None if found is None or (placed.type == CALL_RESULT and not found.has_result) else found
-
-    def _lower(self, placed: PlacedBlock) -> PlacedBlock:
-        inner = {name: tuple(map(self._lower, chain)) for name, chain in placed.inputs.items()}
-        placed = replace(placed, inputs=inner)
-        block = self._catalogue.blocks.get(placed.type)
-        if block is None or not block.mutator:
-            return placed
-        if block.mutator == "items":
-            return self._lower_list(placed, block)
-        if block.mutator == "branches":
-            return self._lower_branches(placed, block)
+    def _find_function(self, placed_block: PlacedBlock) -> Function | None:
+        function = self._by_id.get(str(placed_block.extra_state.get("function")))
+        function = function or self._by_name.get(function_name(placed_block))
         return (
-            self._lower_call(placed, block)
-            if block.mutator == "call"
-            else self._lower_definition(placed, block)
+            None
+            if function is None or (placed_block.type == CALL_RESULT and not function.has_result)
+            else function
         )
 
-    def _lower_list(self, placed: PlacedBlock, block: Block) -> PlacedBlock:
+    def _lower(self, placed_block: PlacedBlock) -> PlacedBlock:
+        inner = {name: tuple(map(self._lower, chain)) for name, chain in placed_block.inputs.items()}
+        placed_block = replace(placed_block, inputs=inner)
+        block = self._catalogue.blocks.get(placed_block.type)
+        if block is None or not block.mutator:
+            return placed_block
+        if block.mutator == "items":
+            return self._lower_list(placed_block, block)
+        if block.mutator == "branches":
+            return self._lower_branches(placed_block, block)
+        return (
+            self._lower_call(placed_block, block)
+            if block.mutator == "call"
+            else self._lower_definition(placed_block, block)
+        )
+
+    def _lower_list(self, placed_block: PlacedBlock, block: Block) -> PlacedBlock:
         growing = next(argument for argument in block.arguments if isinstance(argument, Items))
-        gaps = growing.slots(placed.extra_state)
+        gaps = growing.slots(placed_block.extra_state)
         holes = [f"%{gap.name}" for gap in gaps]
         hole = f"%{growing.name}"
-        made = replace(
+        expanded_block = replace(
             block,
             type=f"{block.type}:{len(gaps)}",
             text=block.text.replace(hole, " ".join(holes)),
             python=str(block.python).replace(hole, ", ".join(holes)),
             arguments=gaps,
         )
-        return self._register_type(placed, made)
+        return self._register_type(placed_block, expanded_block)
 
-    def _lower_branches(self, placed: PlacedBlock, block: Block) -> PlacedBlock:
-        branches = Branches.from_extra_state(placed.extra_state, has_else=block.argument("ELSE") is not None)
+    def _lower_branches(self, placed_block: PlacedBlock, block: Block) -> PlacedBlock:
+        branches = Branches.from_extra_state(
+            placed_block.extra_state, has_else=block.argument("ELSE") is not None
+        )
         text, python = block.text.partition("%BODY")[0] + "%BODY", "if %CONDITION:\n    %BODY"
         for number in range(1, branches.else_ifs + 1):
             text += f" {_('else if')} %CONDITION{number} %BODY{number}"
@@ -126,77 +133,78 @@ class Lowering:
             text += f" {_('else')} %ELSE"
             python += "\nelse:\n    %ELSE"
         first = tuple(each for each in block.arguments if each.name in ("CONDITION", "BODY"))
-        made = replace(
+        expanded_block = replace(
             block,
             type=f"{block.type}:{branches.else_ifs}{'+' if branches.has_else else ''}",
             text=text,
             python=python,
             arguments=(*first, *branches.arguments()),
         )
-        return self._register_type(placed, made)
+        return self._register_type(placed_block, expanded_block)
 
-    def _lower_definition(self, placed: PlacedBlock, block: Block) -> PlacedBlock:
-        shown = " ".join(each.name for each in inputs_of(placed.extra_state))
-        text = block.text.replace("%NAME", _escape_placeholders(function_name(placed))).replace(
-            "%INPUTS", _escape_placeholders(shown)
+    def _lower_definition(self, placed_block: PlacedBlock, block: Block) -> PlacedBlock:
+        input_names = " ".join(each.name for each in inputs_of(placed_block.extra_state))
+        text = block.text.replace("%NAME", _escape_placeholders(function_name(placed_block))).replace(
+            "%INPUTS", _escape_placeholders(input_names)
         )
-        kept = tuple(argument for argument in block.arguments if f"%{argument.name}" in text)
-        if placed.type == RESULT:
-            result = tuple(argument for argument in kept if argument.name == "RESULT")
-            self._catalogue.blocks[f"{END_BLOCK}:{placed.id}"] = replace(
+        arguments = tuple(argument for argument in block.arguments if f"%{argument.name}" in text)
+        if placed_block.type == RESULT:
+            result = tuple(argument for argument in arguments if argument.name == "RESULT")
+            self._catalogue.blocks[f"{END_BLOCK}:{placed_block.id}"] = replace(
                 block, shape="statement", text="return %RESULT", python="return %RESULT", arguments=result
             )
         return self._register_type(
-            placed, replace(block, type=f"{block.type}:{placed.id}", text=text, arguments=kept)
+            placed_block,
+            replace(block, type=f"{block.type}:{placed_block.id}", text=text, arguments=arguments),
         )
 
-    def _lower_call(self, placed: PlacedBlock, block: Block) -> PlacedBlock:
-        function = self._find_function(placed)
-        inputs = inputs_of(placed.extra_state) if function is None else function.inputs
-        name = _escape_placeholders(function_name(placed) if function is None else function.name)
-        gaps, filled = _fill_slots(placed, inputs)
+    def _lower_call(self, placed_block: PlacedBlock, block: Block) -> PlacedBlock:
+        function = self._find_function(placed_block)
+        inputs = inputs_of(placed_block.extra_state) if function is None else function.inputs
+        name = _escape_placeholders(function_name(placed_block) if function is None else function.name)
+        gaps, filled = _fill_slots(placed_block, inputs)
         text = " ".join((name, *(f"{_escape_placeholders(each.name)} %{gap.name}" for each, gap in gaps)))
-        made = replace(block, type=f"{block.type}:{placed.id}", text=text)
+        expanded_block = replace(block, type=f"{block.type}:{placed_block.id}", text=text)
         if function is None:
-            sentence = _("The function “{name}” is missing. Define it, or delete this block.").format(
+            message = _("The function “{name}” is missing. Define it, or delete this block.").format(
                 name=name
             )
-            made = replace(
-                made, text=name, arguments=(), python="fail(%X_SENTENCE)",
-                constants={"X_SENTENCE": sentence}, undefined_message=sentence,
+            expanded_block = replace(
+                expanded_block, text=name, arguments=(), python="fail(%X_SENTENCE)",
+                constants={"X_SENTENCE": message}, undefined_message=message,
             )  # fmt: skip
         else:
             holes = ", ".join(f"%{gap.name}" for _, gap in gaps)
-            made = replace(
-                made, arguments=tuple(gap for _, gap in gaps), python=f"%X_FUNCTION({holes})",
+            expanded_block = replace(
+                expanded_block, arguments=tuple(gap for _, gap in gaps), python=f"%X_FUNCTION({holes})",
                 constant_trees={"X_FUNCTION": ast.Name(function.python_name, ast.Load())},
                 calls_function=True,
             )  # fmt: skip
-        return self._register_type(replace(placed, inputs=filled), made)
+        return self._register_type(replace(placed_block, inputs=filled), expanded_block)
 
-    def _register_type(self, placed: PlacedBlock, block: Block) -> PlacedBlock:
+    def _register_type(self, placed_block: PlacedBlock, block: Block) -> PlacedBlock:
         self._catalogue.blocks[block.type] = block
-        return replace(placed, type=block.type)
+        return replace(placed_block, type=block.type)
 
 
-def _parse_function(placed: PlacedBlock, names: PythonNames) -> Function:
-    inputs = inputs_of(placed.extra_state)
-    name = function_name(placed)
+def _parse_function(placed_block: PlacedBlock, names: PythonNames) -> Function:
+    inputs = inputs_of(placed_block.extra_state)
+    name = function_name(placed_block)
     python = names.new_name(name, "function")
     parameters = {each.id: names.new_name(each.name, "input") for each in inputs}
-    return Function(placed, name, python, parameters, inputs, _HAS_RESULT[placed.type])
+    return Function(placed_block, name, python, parameters, inputs, _HAS_RESULT[placed_block.type])
 
 
 def _fill_slots(
-    placed: PlacedBlock, inputs: tuple[FunctionInput, ...]
+    placed_block: PlacedBlock, inputs: tuple[FunctionInput, ...]
 ) -> tuple[list[tuple[FunctionInput, Argument]], dict[str, tuple[PlacedBlock, ...]]]:
     gaps: list[tuple[FunctionInput, Argument]] = []
     filled: dict[str, tuple[PlacedBlock, ...]] = {}
-    for number, (each, gap) in enumerate(Inputs("INPUTS").slots(inputs)):
-        gaps.append((each, ValueInput(f"G{number}")))
-        filled[f"G{number}"] = placed.inputs.get(gap.name, ())
+    for number, (function_input, gap) in enumerate(Inputs("INPUTS").slots(inputs)):
+        gaps.append((function_input, ValueInput(f"G{number}")))
+        filled[f"G{number}"] = placed_block.inputs.get(gap.name, ())
     return gaps, filled
 
 
-def _escape_placeholders(words: str) -> str:
-    return words.replace("%", "％")  # noqa: RUF001 (looks the same, but is not a hole)
+def _escape_placeholders(text: str) -> str:
+    return text.replace("%", "％")  # noqa: RUF001 (looks the same, but is not a hole)

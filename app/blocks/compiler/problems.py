@@ -48,9 +48,9 @@ class ProblemCollector:
         """Return all problems, the most severe first."""
         return tuple(sorted(self._problems.values(), key=lambda problem: _SEVERITY_ORDER[problem.severity]))
 
-    def label(self, placed: PlacedBlock, block: Block | None) -> str:
+    def label(self, placed_block: PlacedBlock, block: Block | None) -> str:
         """Return the label of a block for use in messages."""
-        return label_of_unknown(placed) if block is None else label(placed, block)
+        return label_of_unknown(placed_block) if block is None else label(placed_block, block)
 
     def check_starts(self, starts: int) -> None:
         """Report a workspace that contains blocks but no script that can start.
@@ -68,29 +68,29 @@ class ProblemCollector:
             fix=_("Add “when started”"), fix_action=f"add:{_START_BLOCK}",
         )  # fmt: skip
 
-    def report_unattached(self, placed: PlacedBlock, block: Block) -> None:
+    def report_unattached(self, placed_block: PlacedBlock, block: Block) -> None:
         """Report a block that is neither below a start block nor in a slot of another block."""
-        name = self.label(placed, block)
+        name = self.label(placed_block, block)
         if block.shape in ("value", "boolean"):
-            words = _("{block} isn't used. Drag it into an empty slot of another block.")
-            self._add("info", placed, block, name, words.format(block=name))
+            template = _("{block} isn't used. Drag it into an empty slot of another block.")
+            self._add("info", placed_block, block, name, template.format(block=name))
             return
-        sentence = _("{block} doesn't run. Put it below “{start}”.")
+        message = _("{block} doesn't run. Put it below “{start}”.")
         start = pgettext("block", "when started")
-        self._add("info", placed, block, name, sentence.format(block=name, start=start))
+        self._add("info", placed_block, block, name, message.format(block=name, start=start))
 
-    def report_misplaced(self, placed: PlacedBlock, block: Block) -> None:
+    def report_misplaced(self, placed_block: PlacedBlock, block: Block) -> None:
         """Report a block at an invalid position, which the editor prevents but a file may contain."""
-        name = self.label(placed, block)
-        sentence = _("{block} can't be used here. It stays in the file but is skipped.")
-        self._add("warning", placed, block, name, sentence.format(block=name))
+        name = self.label(placed_block, block)
+        message = _("{block} can't be used here. It stays in the file but is skipped.")
+        self._add("warning", placed_block, block, name, message.format(block=name))
 
-    def report_too_deep(self, placed: PlacedBlock) -> None:
+    def report_too_deep(self, placed_block: PlacedBlock) -> None:
         """Report a block that is nested too deeply for Python."""
-        block = self._catalogue.blocks.get(placed.type)
-        name = self.label(placed, block)
+        block = self._catalogue.blocks.get(placed_block.type)
+        name = self.label(placed_block, block)
         self._add(
-            "error", placed, block, name,
+            "error", placed_block, block, name,
             _(
 
             "{block} is nested too deeply. Save intermediate results in variables, or move inner "
@@ -99,36 +99,36 @@ class ProblemCollector:
             ).format(block=name),
         )  # fmt: skip
 
-    def report_no_message(self, placed: PlacedBlock, block: Block) -> None:
+    def report_no_message(self, placed_block: PlacedBlock, block: Block) -> None:
         """Report a block that reads the received message but is not in a script started by a message."""
-        name = self.label(placed, block)
+        name = self.label(placed_block, block)
         self._add(
-            "warning", placed, block, name,
+            "warning", placed_block, block, name,
             _("{block} only works below “when a message arrives”.").format(block=name),
         )  # fmt: skip
 
-    def report_unknown_input(self, placed: PlacedBlock, block: Block) -> None:
+    def report_unknown_input(self, placed_block: PlacedBlock, block: Block) -> None:
         """Report a function input that is used outside of its function, or that was removed."""
-        name = block_text(placed, self._catalogue.blocks, self._workspace.variables)
-        sentence = _(
+        name = block_text(placed_block, self._catalogue.blocks, self._workspace.variables)
+        message = _(
             "“{name}” only works inside its own function. It stays in the file but is skipped."
         ).format(name=name)
-        self._add("warning", placed, block, name, sentence)
+        self._add("warning", placed_block, block, name, message)
 
-    def report_undefined(self, placed: PlacedBlock, block: Block) -> None:
+    def report_undefined(self, placed_block: PlacedBlock, block: Block) -> None:
         """Report a call of an undefined function."""
         self._add(
-            "error", placed, block, self.label(placed, block), block.undefined_message,
-            fix=_("Define it"), fix_action=f"define:{placed.id}",
+            "error", placed_block, block, self.label(placed_block, block), block.undefined_message,
+            fix=_("Define it"), fix_action=f"define:{placed_block.id}",
         )  # fmt: skip
 
     def report_never_set(
-        self, placed: PlacedBlock, block: Block, id: str, name: str, *, is_list: bool
+        self, placed_block: PlacedBlock, block: Block, id: str, name: str, *, is_list: bool
     ) -> None:
         """Report a variable that is read but never set, so that its value remains 0.
 
         Args:
-            placed: First block that reads the variable.
+            placed_block: First block that reads the variable.
             block: Description of the block.
             id: Id of the variable.
             name: Name of the variable.
@@ -136,147 +136,150 @@ class ProblemCollector:
         """
         subject = f"“{name}”"
         self._add(
-            "warning", placed, block, subject, _("{name} is used but never set.").format(name=subject),
+            "warning", placed_block, block, subject, _("{name} is used but never set.").format(name=subject),
             fix=_("Set it to an empty list at the start") if is_list else _("Set it to 0 at the start"),
             fix_action=f"begin:{'list' if is_list else 'number'}:{id}",
         )  # fmt: skip
 
-    def report_never_received(self, placed: PlacedBlock, block: Block, name: str) -> None:
+    def report_never_received(self, placed_block: PlacedBlock, block: Block, name: str) -> None:
         """Report a broadcast that no script receives."""
         subject = f"“{name}”"
         self._add(
-            "warning", placed, block, subject, _("Nothing receives {name}.").format(name=subject),
+            "warning", placed_block, block, subject, _("Nothing receives {name}.").format(name=subject),
             fix=_("Add “when I receive”"), fix_action=f"receive:{name}",
         )  # fmt: skip
 
-    def report_never_sent(self, placed: PlacedBlock, block: Block, name: str) -> None:
+    def report_never_sent(self, placed_block: PlacedBlock, block: Block, name: str) -> None:
         """Report a script that waits for a broadcast which is never sent."""
         subject = f"“{name}”"
-        sentence = _("Nothing broadcasts {name}, so this script doesn't run.").format(name=subject)
-        self._add("info", placed, block, subject, sentence)
+        message = _("Nothing broadcasts {name}, so this script doesn't run.").format(name=subject)
+        self._add("info", placed_block, block, subject, message)
 
-    def report_conflict(self, found: Conflict) -> None:
+    def report_conflict(self, conflict: Conflict) -> None:
         """Report two scripts that use the same resource of a robot, at the block of the second script."""
-        placed, name = found.second.block, found.second.action.title
-        part = _RESOURCE_NAMES.get(found.resource)
-        words = _("“{action}” and “{other}” both move {robot} at the same time: one replaces the other.")
-        if part is not None or found.resource != "base":
-            words = _(
+        placed_block, name = conflict.second.block, conflict.second.action.title
+        part = _RESOURCE_NAMES.get(conflict.resource)
+        template = _("“{action}” and “{other}” both move {robot} at the same time: one replaces the other.")
+        if part is not None or conflict.resource != "base":
+            template = _(
                 "“{action}” and “{other}” both use {part} of {robot} at the same time: "
                 "one replaces the other."
             )
-        sentence = words.format(
-            action=found.first.action.title, other=name, robot=found.second.robot,
-            part=_("the {part}").format(part=found.resource) if part is None else _(part),
+        message = template.format(
+            action=conflict.first.action.title, other=name, robot=conflict.second.robot,
+            part=_("the {part}").format(part=conflict.resource) if part is None else _(part),
         )  # fmt: skip
         self._add(
-            "warning", placed, self._catalogue.blocks.get(placed.type), name, sentence,
-            fix=_("Run one after the other") if found.reordering else None,
-            fix_action=f"after:{':'.join(found.reordering)}" if found.reordering else None,
+            "warning", placed_block, self._catalogue.blocks.get(placed_block.type), name, message,
+            fix=_("Run one after the other") if conflict.reordering else None,
+            fix_action=f"after:{':'.join(conflict.reordering)}" if conflict.reordering else None,
         )  # fmt: skip
 
-    def report_invalid_field(self, placed: PlacedBlock, block: Block, error: FieldError) -> None:
+    def report_invalid_field(self, placed_block: PlacedBlock, block: Block, error: FieldError) -> None:
         """Report an invalid field value."""
-        name = self.label(placed, block)
-        sentence = _("{block} {what_is_wrong}. It stays in the file but is skipped.")
-        self._add("error", placed, block, name, sentence.format(block=name, what_is_wrong=error))
+        name = self.label(placed_block, block)
+        message = _("{block} {what_is_wrong}. It stays in the file but is skipped.")
+        self._add("error", placed_block, block, name, message.format(block=name, what_is_wrong=error))
 
     def report_unsupported(
-        self, placed: PlacedBlock, block: Block | None, holder: PlacedBlock | None
+        self, placed_block: PlacedBlock, block: Block | None, parent: PlacedBlock | None
     ) -> bool:
         """Report a block that is unknown or not supported by its robot, and return True if it was reported.
 
         Args:
-            placed: Block in the workspace.
+            placed_block: Block in the workspace.
             block: Description of the block; None if the type is unknown.
-            holder: Block that contains the block in a slot, and that is skipped too; None for a statement.
+            parent: Block that contains the block in a slot, and that is skipped too; None for a statement.
         """
-        robot = placed.fields.get("ROBOT")
-        name = self.label(placed, block)
+        robot = placed_block.fields.get("ROBOT")
+        name = self.label(placed_block, block)
         skipped = name
-        if holder is not None:
-            outer = self.label(holder, self._catalogue.blocks.get(holder.type))
+        if parent is not None:
+            outer = self.label(parent, self._catalogue.blocks.get(parent.type))
             skipped = _("{outer_block} with {inner_block}").format(outer_block=outer, inner_block=name)
         if (
             isinstance(robot, str)
             and robot not in self._catalogue.connected
-            and placed.type.startswith("robot_")
+            and placed_block.type.startswith("robot_")
         ):
-            sentence = _("{robot} isn't connected, so {block} will be skipped.")
+            message = _("{robot} isn't connected, so {block} will be skipped.")
             self._add(
-                "warning", placed, block, name, sentence.format(robot=robot, block=skipped),
+                "warning", placed_block, block, name, message.format(robot=robot, block=skipped),
                 fix=_("Show the robots"), fix_action=f"connect:{robot}", style="robot",
             )  # fmt: skip
             return True
         if block is None:
-            self._report_unknown(placed, name)
+            self._report_unknown(placed_block, name)
             return True
         if isinstance(robot, str) and block.robot is not None and not self._is_supported(robot, block):
-            sentence = _("{robot} can't do this, so {block} will be skipped.")
-            self._add("warning", placed, block, name, sentence.format(robot=robot, block=skipped))
+            message = _("{robot} can't do this, so {block} will be skipped.")
+            self._add("warning", placed_block, block, name, message.format(robot=robot, block=skipped))
             return True
         return False
 
-    def _report_unknown(self, placed: PlacedBlock, name: str) -> None:
-        own = self._catalogue.blocks.get(EQUIVALENT_BLOCKS.get(placed.type, ""))
+    def _report_unknown(self, placed_block: PlacedBlock, name: str) -> None:
+        equivalent = self._catalogue.blocks.get(EQUIVALENT_BLOCKS.get(placed_block.type, ""))
         prefixes = {each.partition("_")[0] for each in self._catalogue.blocks}
-        if placed.type.startswith("robot_"):
-            sentence = _(
+        if placed_block.type.startswith("robot_"):
+            message = _(
                 "This file uses “{block}”, which no connected robot supports. It stays in the file but is "
                 "skipped."
             )
-            self._add("warning", placed, None, name, sentence.format(block=name), style="robot")
-        elif own is not None:
-            words = label(PlacedBlock("", own.type), own)
-            sentence = _(
+            self._add("warning", placed_block, None, name, message.format(block=name), style="robot")
+        elif equivalent is not None:
+            equivalent_label = label(PlacedBlock("", equivalent.type), equivalent)
+            message = _(
                 "“{block}” belongs to another program and can't run here. It stays in the file but is "
                 "skipped. “{own_block}” does the same."
             )
             self._add(
-                "warning", placed, None, name, sentence.format(block=name, own_block=words),
-                fix=_("Show “{block}”").format(block=words), fix_action=f"point.block:{own.type}",
+                "warning", placed_block, None, name, message.format(block=name, own_block=equivalent_label),
+                fix=_("Show “{block}”").format(block=equivalent_label),
+                fix_action=f"point.block:{equivalent.type}",
             )  # fmt: skip
-        elif placed.type.partition("_")[0] in prefixes:
-            sentence = _(
+        elif placed_block.type.partition("_")[0] in prefixes:
+            message = _(
                 "“{block}” isn't known to this version of NEP Studio. It stays in the file but is skipped."
             )
-            self._add("warning", placed, None, name, sentence.format(block=name))
+            self._add("warning", placed_block, None, name, message.format(block=name))
         else:
-            sentence = _(
+            message = _(
                 "“{block}” belongs to another program and can't run here. It stays in the file but is "
                 "skipped."
             )
-            self._add("warning", placed, None, name, sentence.format(block=name))
+            self._add("warning", placed_block, None, name, message.format(block=name))
 
     def check_unknown(self) -> None:
         """Report unknown blocks that the compiler didn't reach because they are inside skipped blocks."""
-        told = {id for id, _sentence in self._problems}
-        for placed in self._enabled_blocks():
-            if placed.type not in self._catalogue.blocks and placed.id not in told:
-                self._report_unknown(placed, self.label(placed, None))
+        reported_ids = {id for id, _sentence in self._problems}
+        for placed_block in self._enabled_blocks():
+            if placed_block.type not in self._catalogue.blocks and placed_block.id not in reported_ids:
+                self._report_unknown(placed_block, self.label(placed_block, None))
 
     def _enabled_blocks(self) -> Iterator[PlacedBlock]:
-        waiting = [placed for script in reversed(self._workspace.scripts) for placed in reversed(script)]
+        waiting = [
+            placed_block for script in reversed(self._workspace.scripts) for placed_block in reversed(script)
+        ]
         while waiting:
-            placed = waiting.pop()
-            if placed.enabled:
-                yield placed
-                inner = [each for chain in placed.inputs.values() for each in chain]
+            placed_block = waiting.pop()
+            if placed_block.enabled:
+                yield placed_block
+                inner = [each for chain in placed_block.inputs.values() for each in chain]
                 waiting += reversed(inner)
 
     def check_names(self) -> None:
         """Report used variables that have no name in the file."""
-        told: set[str] = set()
-        for placed in self._enabled_blocks() if self._workspace.nameless_variables else ():
-            block = self._catalogue.blocks.get(placed.type)
+        reported_ids: set[str] = set()
+        for placed_block in self._enabled_blocks() if self._workspace.nameless_variables else ():
+            block = self._catalogue.blocks.get(placed_block.type)
             for argument in block.arguments if block is not None else ():
-                id = _variable_id(argument, placed)
-                if id not in self._workspace.nameless_variables or id in told:
+                id = _variable_id(argument, placed_block)
+                if id not in self._workspace.nameless_variables or id in reported_ids:
                     continue
-                told.add(id)
-                name = self.label(placed, block)
+                reported_ids.add(id)
+                name = self.label(placed_block, block)
                 self._add(
-                    "warning", placed, block, name,
+                    "warning", placed_block, block, name,
                     _(
                         "The variable in “{block}” has no name in this file. Name it, or choose another "
                         "variable in the block."
@@ -287,11 +290,11 @@ class ProblemCollector:
     def absent_blocks(self) -> tuple[str, ...]:
         """Return the ids of all blocks of disconnected robots, including blocks outside of scripts."""
         return tuple(
-            placed.id
-            for placed in self._workspace.all_blocks()
-            if placed.type.startswith("robot_")
-            and isinstance(placed.fields.get("ROBOT"), str)
-            and placed.fields["ROBOT"] not in self._catalogue.connected
+            placed_block.id
+            for placed_block in self._workspace.all_blocks()
+            if placed_block.type.startswith("robot_")
+            and isinstance(placed_block.fields.get("ROBOT"), str)
+            and placed_block.fields["ROBOT"] not in self._catalogue.connected
         )
 
     def _is_supported(self, name: str, block: Block) -> bool:
@@ -299,102 +302,107 @@ class ProblemCollector:
         robot = self._catalogue.connected[name]
         if use is None or not use.name:
             return True
-        known = (
+        capability = (
             robot.action(use.name)
             if use.kind == "action"
             else robot.sensor(use.name)
             if use.kind == "sensor"
             else robot.event(use.name)
         )
-        return known is not None
+        return capability is not None
 
-    def report_empty_slot(self, placed: PlacedBlock, block: Block) -> str | None:
+    def report_empty_slot(self, placed_block: PlacedBlock, block: Block) -> str | None:
         """Report the first required slot that is empty and return the message; None if there is none."""
         for argument in block.arguments:
             if not isinstance(argument, ValueInput):
                 continue
-            inner = placed.inputs.get(argument.name, ())
-            if (inner and inner[0].enabled) or not argument.is_present(placed.fields):
+            inner = placed_block.inputs.get(argument.name, ())
+            if (inner and inner[0].enabled) or not argument.is_present(placed_block.fields):
                 continue
-            name = self.label(placed, block)
-            sentence = _("{block} needs {what}. Drag one into its slot.").format(
+            name = self.label(placed_block, block)
+            message = _("{block} needs {what}. Drag one into its slot.").format(
                 block=name, what=_(_SLOT_TYPE_NAMES[argument.check])
             )
-            self._add("error", placed, block, name, sentence)
-            return sentence
+            self._add("error", placed_block, block, name, message)
+            return message
         return None
 
-    def report_hints(self, placed: PlacedBlock, block: Block) -> None:
+    def report_hints(self, placed_block: PlacedBlock, block: Block) -> None:
         """Report a wait without time limit, and invalid values in the input of an action."""
-        if block.type == "control_wait_until" and not _is_literal(placed, "CONDITION"):
+        if block.type == "control_wait_until" and not _is_literal(placed_block, "CONDITION"):
             self._add(
-                "info", placed, block, self.label(placed, block), self._wait_forever_message(placed, block),
-                fix=_("Add a time limit"), fix_action=f"limit:{placed.id}",
+                "info", placed_block, block, self.label(placed_block, block),
+                self._wait_forever_message(placed_block, block),
+                fix=_("Add a time limit"), fix_action=f"limit:{placed_block.id}",
             )  # fmt: skip
-        robot = self._catalogue.connected.get(str(placed.fields.get("ROBOT")))
+        robot = self._catalogue.connected.get(str(placed_block.fields.get("ROBOT")))
         action = robot.action(block.robot.name) if robot and block.robot else None
         if action is not None:
-            self._check_input(placed, block, action)
+            self._check_input(placed_block, block, action)
 
-    def report_motion(self, placed: PlacedBlock, block: Block, topic: str, robots: Sequence[str]) -> None:
+    def report_motion(
+        self, placed_block: PlacedBlock, block: Block, topic: str, robots: Sequence[str]
+    ) -> None:
         """Report a block that moves robots by publishing on a topic.
 
         Args:
-            placed: Block in the workspace.
+            placed_block: Block in the workspace.
             block: Description of the block.
             topic: Name of the topic.
             robots: Names of the moved robots; virtual robots are not reported.
         """
         real = [name for name in robots if not self._catalogue.connected[name].virtual]
         if real:
-            who, name = format_list(real), self.label(placed, block)
-            said = _(
+            robot_names, name = format_list(real), self.label(placed_block, block)
+            message = _(
                 "{block} on {topic} moves {robots}. Studio asks for permission first; Stop ends the movement."
             )
-            self._add("info", placed, block, name, said.format(block=name, topic=topic, robots=who))
+            self._add(
+                "info", placed_block, block, name, message.format(block=name, topic=topic, robots=robot_names)
+            )
 
-    def _wait_forever_message(self, placed: PlacedBlock, block: Block) -> str:
-        name = self.label(placed, block)
-        condition = placed.inputs["CONDITION"][0]
-        words = block_text(condition, self._catalogue.blocks, self._workspace.variables, robot=False)
-        if any(word in words for word in ("face", "person", "people")):
+    def _wait_forever_message(self, placed_block: PlacedBlock, block: Block) -> str:
+        name = self.label(placed_block, block)
+        condition = placed_block.inputs["CONDITION"][0]
+        text = block_text(condition, self._catalogue.blocks, self._workspace.variables, robot=False)
+        if any(keyword in text for keyword in ("face", "person", "people")):
             return _("{block} waits forever if no one appears.").format(block=name)
         return _("{block} waits forever if that never happens.").format(block=name)
 
-    def _check_input(self, placed: PlacedBlock, block: Block, action: Action) -> None:
-        given: dict[str, object] = {}
-        for at, name in block.keywords.get("X_INPUT", ()):
-            found = _literal_value(placed, block, at)
-            if found is not None:
-                given[name] = found
+    def _check_input(self, placed_block: PlacedBlock, block: Block, action: Action) -> None:
+        literal_values: dict[str, object] = {}
+        for argument_name, name in block.keywords.get("X_INPUT", ()):
+            value = _literal_value(placed_block, block, argument_name)
+            if value is not None:
+                literal_values[name] = value
         # Skip problems that exist without these values: the missing ones are computed at run time.
         without = set(action.problems(action.complete({})))
-        for problem in action.problems(action.complete(given)):
+        for problem in action.problems(action.complete(literal_values)):
             if problem not in without:
-                name = self.label(placed, block)
-                self._add("error", placed, block, name, f"{name}: {problem.message}.")
+                name = self.label(placed_block, block)
+                self._add("error", placed_block, block, name, f"{name}: {problem.message}.")
 
     def _add(
         self,
         severity: Severity,
-        placed: PlacedBlock | None,
+        placed_block: PlacedBlock | None,
         block: Block | None,
         subject: str,
-        sentence: str,
+        message: str,
         *,
         fix: str | None = None,
         fix_action: str | None = None,
         style: str | None = None,
     ) -> None:
-        id = None if placed is None else placed.id
+        id = None if placed_block is None else placed_block.id
         self._problems.setdefault(
-            (id, sentence),
+            (id, message),
             Problem(
                 severity=severity,
                 block_id=id,
                 category=block.style if block is not None else style,
                 subject=subject,
-                message=sentence,
+                message=message,
                 fix=fix,
                 fix_action=fix_action,
                 icon=block.icon if block is not None else "circle-help",
@@ -402,37 +410,37 @@ class ProblemCollector:
         )
 
 
-def _is_literal(placed: PlacedBlock, name: str) -> bool:
-    inner = placed.inputs.get(name, ())
+def _is_literal(placed_block: PlacedBlock, name: str) -> bool:
+    inner = placed_block.inputs.get(name, ())
     return bool(inner) and inner[0].type == "values_boolean"
 
 
-def _variable_id(argument: Argument, placed: PlacedBlock) -> str:
+def _variable_id(argument: Argument, placed_block: PlacedBlock) -> str:
     if not isinstance(argument, VariableField):
         return ""
     try:
-        return str(argument.read(placed.fields.get(argument.name)))
+        return str(argument.read(placed_block.fields.get(argument.name)))
     except FieldError:
         return ""
 
 
-def _literal_value(placed: PlacedBlock, block: Block, name: str) -> object:
+def _literal_value(placed_block: PlacedBlock, block: Block, name: str) -> object:
     # None for a value that is computed at run time.
     argument = block.argument(name)
     if isinstance(argument, Field):
         try:
-            return argument.read(placed.fields.get(name))
+            return argument.read(placed_block.fields.get(name))
         except FieldError:
             return None
-    inner = placed.inputs.get(name, ())
+    inner = placed_block.inputs.get(name, ())
     if not inner or inner[0].type not in _LITERAL_FIELDS:
         return None
     return _literal_block_value(inner[0])
 
 
-def _literal_block_value(placed: PlacedBlock) -> object:
-    name = _LITERAL_FIELDS[placed.type]
-    saved = placed.fields.get(name)
+def _literal_block_value(placed_block: PlacedBlock) -> object:
+    name = _LITERAL_FIELDS[placed_block.type]
+    saved = placed_block.fields.get(name)
     if name == "TEXT":
         return TextField(name).read(saved)
     return saved if isinstance(saved, (int, float)) and not isinstance(saved, bool) else None

@@ -26,11 +26,11 @@ def render_source(body: Sequence[ast.stmt], marks: BlockIdByNode) -> tuple[str, 
         parts += (_blank_lines_between(before, statement), ast.unparse(statement).strip("\n"), "\n")
     text = "".join(parts)
     lines: dict[int, str] = {}
-    for ours, theirs in _matched_statements(body, parse_module(text).body):
-        if ours in marks:
-            first = getattr(theirs, "decorator_list", None) or [theirs]
-            for line in range(first[0].lineno, theirs.lineno + 1):
-                lines.setdefault(line, marks[ours])
+    for original, parsed in _matched_statements(body, parse_module(text).body):
+        if original in marks:
+            first = getattr(parsed, "decorator_list", None) or [parsed]
+            for line in range(first[0].lineno, parsed.lineno + 1):
+                lines.setdefault(line, marks[original])
     return text, lines
 
 
@@ -59,12 +59,12 @@ def _blank_lines_between(before: ast.stmt | None, statement: ast.stmt) -> str:
 
 
 def _matched_statements(
-    ours: Sequence[ast.stmt], theirs: Sequence[ast.stmt]
+    originals: Sequence[ast.stmt], parsed: Sequence[ast.stmt]
 ) -> Iterator[tuple[ast.stmt, ast.stmt]]:
-    for one, other in zip(ours, theirs, strict=True):
-        yield one, other
+    for original, other in zip(originals, parsed, strict=True):
+        yield original, other
         for name in ("body", "orelse"):
-            inner = getattr(one, name, None)
+            inner = getattr(original, name, None)
             if isinstance(inner, list):
                 yield from _matched_statements(inner, getattr(other, name))
 
@@ -83,17 +83,19 @@ class _Instrumenter(ast.NodeTransformer):
 
     def instrument_statement(self, node: ast.stmt) -> list[ast.stmt]:
         id = self._marks.get(node)
-        made = node
-        self.generic_visit(made)
+        instrumented = node
+        self.generic_visit(instrumented)
         for name in ("body", "orelse"):
-            inner = getattr(made, name, None)
+            inner = getattr(instrumented, name, None)
             if isinstance(inner, list):
-                setattr(made, name, [step for each in inner for step in self.instrument_statement(each)])
-        if id is None or isinstance(made, ast.FunctionDef):
-            return [made]
-        if isinstance(made, (ast.While, ast.For)):
-            made.body.append(_step_call(id))
-        return [_step_call(id), made]
+                setattr(
+                    instrumented, name, [step for each in inner for step in self.instrument_statement(each)]
+                )
+        if id is None or isinstance(instrumented, ast.FunctionDef):
+            return [instrumented]
+        if isinstance(instrumented, (ast.While, ast.For)):
+            instrumented.body.append(_step_call(id))
+        return [_step_call(id), instrumented]
 
     def generic_visit(self, node: ast.AST) -> ast.AST:
         # Visits expressions only; `statement` handles nested statements.
@@ -106,12 +108,12 @@ class _Instrumenter(ast.NodeTransformer):
         return node
 
     def visit(self, node: ast.AST) -> ast.AST:
-        made = self.generic_visit(node)
+        visited = self.generic_visit(node)
         id = self._marks.get(node)
-        if id is None or not isinstance(made, ast.expr):
-            return made
+        if id is None or not isinstance(visited, ast.expr):
+            return visited
         empty = ast.arguments([], [], None, [], [], None, [])
-        later = ast.Lambda(empty, made)
+        later = ast.Lambda(empty, visited)
         name = "called" if id in self._calls else "number" if id in self._numbers else "value"
         return ast.Call(ast.Name(name, ast.Load()), [literal(id), later], [])
 

@@ -39,15 +39,17 @@ class Stack:
         return self.kind == "value"
 
     @classmethod
-    def from_json(cls, told: object) -> Stack:
+    def from_json(cls, request: object) -> Stack:
         """Parse a request of the editor's page.
 
         An invalid request results in a stack whose block doesn't exist.
         """
-        known: SavedJson = told if isinstance(told, Mapping) else {}
-        state = known.get("state")
+        request_fields: SavedJson = request if isinstance(request, Mapping) else {}
+        state = request_fields.get("state")
         return cls(
-            str(known.get("id")), str(known.get("kind")), state if isinstance(state, Mapping) else None
+            str(request_fields.get("id")),
+            str(request_fields.get("kind")),
+            state if isinstance(state, Mapping) else None,
         )
 
     def workspace(self, behaviour: SavedJson) -> dict[str, object] | None:
@@ -58,42 +60,44 @@ class Stack:
         Args:
             behaviour: Saved workspace of the behaviour.
         """
-        made: dict[str, object] = copy.deepcopy(dict(behaviour))
-        blocks = made.get("blocks")
+        result: dict[str, object] = copy.deepcopy(dict(behaviour))
+        blocks = result.get("blocks")
         tops = blocks.get("blocks") if isinstance(blocks, dict) else None
-        found = copy.deepcopy(dict(self.state)) if self.state is not None else self._find_first_block(made)
-        first = self._blocks_to_run(found) if found is not None else None
+        first_block = (
+            copy.deepcopy(dict(self.state)) if self.state is not None else self._find_first_block(result)
+        )
+        first = self._blocks_to_run(first_block) if first_block is not None else None
         if first is None:
             return None
         functions = [
             top for top in tops or () if isinstance(top, dict) and top.get("type") in (PLAIN, RESULT)
         ]
-        made["blocks"] = {"languageVersion": 0, "blocks": [*functions, {**_HAT, "next": {"block": first}}]}
-        return made
+        result["blocks"] = {"languageVersion": 0, "blocks": [*functions, {**_HAT, "next": {"block": first}}]}
+        return result
 
     def first_block_type(self, behaviour: SavedJson) -> str:
         """Return the type of the first block of the stack; "" if the block doesn't exist."""
-        found = self.state if self.state is not None else self._find_first_block(behaviour)
-        return str(found.get("type")) if found is not None else ""
+        first_block = self.state if self.state is not None else self._find_first_block(behaviour)
+        return str(first_block.get("type")) if first_block is not None else ""
 
     def variable_id(self, behaviour: SavedJson) -> str | None:
         """Return the id of the variable if the stack is a variable block, else None."""
-        found = self.state if self.state is not None else self._find_first_block(behaviour)
-        if not self.is_value or found is None or found.get("type") != "variables_get":
+        first_block = self.state if self.state is not None else self._find_first_block(behaviour)
+        if not self.is_value or first_block is None or first_block.get("type") != "variables_get":
             return None
-        fields = found.get("fields")
-        chosen = fields.get("VAR") if isinstance(fields, Mapping) else None
-        return str(chosen.get("id")) if isinstance(chosen, Mapping) else None
+        fields = first_block.get("fields")
+        variable = fields.get("VAR") if isinstance(fields, Mapping) else None
+        return str(variable.get("id")) if isinstance(variable, Mapping) else None
 
     def _find_first_block(self, workspace: SavedJson) -> dict[str, object] | None:
         return next((block for block in saved_blocks(workspace) if block.get("id") == self.id), None)
 
-    def _blocks_to_run(self, found: dict[str, object]) -> dict[str, object] | None:
+    def _blocks_to_run(self, block: dict[str, object]) -> dict[str, object] | None:
         # For an event block, only the blocks below it.
         if self.is_value:
-            return {"type": "messages_write", "id": SHOW_BLOCK_ID, "inputs": {"VALUE": {"block": found}}}
+            return {"type": "messages_write", "id": SHOW_BLOCK_ID, "inputs": {"VALUE": {"block": block}}}
         if self.kind != "hat":
-            return found
-        below = found.get("next")
+            return block
+        below = block.get("next")
         first = below.get("block") if isinstance(below, dict) else None
         return first if isinstance(first, dict) else None

@@ -34,29 +34,29 @@ def fix(workspace: Mapping[str, object], action: str) -> dict[str, object] | Non
         action: `Problem.fix_action` of a problem.
     """
     verb, _, object_ = action.partition(":")
-    made: dict[str, object] = copy.deepcopy(dict(workspace))
+    result: dict[str, object] = copy.deepcopy(dict(workspace))
     if verb == "limit":
-        for block in saved_blocks(made):
+        for block in saved_blocks(result):
             if block.get("id") == object_ and block.get("type") == "control_wait_until":
                 _add_time_limit(block)
-                return made
+                return result
     if verb == "define":
-        for block in saved_blocks(made):
+        for block in saved_blocks(result):
             if block.get("id") == object_ and block.get("type") in (CALL, CALL_RESULT):
-                return _with_definition(made, block)
-    return _fix_scripts(made, verb, object_)
+                return _with_definition(result, block)
+    return _fix_scripts(result, verb, object_)
 
 
-def _fix_scripts(made: dict[str, object], verb: str, object_: str) -> dict[str, object] | None:
+def _fix_scripts(workspace: dict[str, object], verb: str, object_: str) -> dict[str, object] | None:
     if verb == "begin":
         kind, _, variable = object_.partition(":")
-        return _with_initial_value(made, variable, is_list=kind == "list")
+        return _with_initial_value(workspace, variable, is_list=kind == "list")
     if verb == "receive":
-        return _with_script(made, {"type": "events_received", "fields": {"NAME": object_}})
+        return _with_script(workspace, {"type": "events_received", "fields": {"NAME": object_}})
     if verb == "after":
-        return _join_scripts(made, object_)
+        return _join_scripts(workspace, object_)
     if verb == "add":
-        return _with_start(made, object_)
+        return _with_start(workspace, object_)
     return None
 
 
@@ -85,8 +85,8 @@ def _top_blocks(workspace: dict[str, object]) -> list[object]:
 
 def _with_script(workspace: dict[str, object], block: dict[str, object]) -> dict[str, object]:
     tops = _top_blocks(workspace)
-    places = [top.get("x") for top in tops if isinstance(top, dict)]
-    right = max((x for x in places if isinstance(x, (int, float))), default=LEFT - SCRIPT_SPACING)
+    x_positions = [top.get("x") for top in tops if isinstance(top, dict)]
+    right = max((x for x in x_positions if isinstance(x, (int, float))), default=LEFT - SCRIPT_SPACING)
     tops.append({**block, "x": right + SCRIPT_SPACING, "y": TOP})
     return workspace
 
@@ -100,17 +100,17 @@ def _add_time_limit(block: dict[str, object]) -> None:
 
 def _with_definition(workspace: dict[str, object], call: Mapping[str, object]) -> dict[str, object]:
     extra = call.get("extraState")
-    known: Mapping[str, object] = extra if isinstance(extra, Mapping) else {}
-    placed = PlacedBlock("", "", {}, extra_state=known)
+    extra_state: Mapping[str, object] = extra if isinstance(extra, Mapping) else {}
+    call_block = PlacedBlock("", "", {}, extra_state=extra_state)
     definition: dict[str, object] = {
         "type": RESULT if call.get("type") == CALL_RESULT else PLAIN,
         "x": 40,
         "y": 40,
-        "fields": {"NAME": function_name(placed)},
-        "extraState": {"inputs": [{"id": each.id, "name": each.name} for each in inputs_of(known)]},
+        "fields": {"NAME": function_name(call_block)},
+        "extraState": {"inputs": [{"id": each.id, "name": each.name} for each in inputs_of(extra_state)]},
     }
-    if isinstance(known.get("function"), str):
-        definition["id"] = known["function"]
+    if isinstance(extra_state.get("function"), str):
+        definition["id"] = extra_state["function"]
     blocks = workspace.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, dict) else None
     if isinstance(tops, list):
@@ -127,9 +127,9 @@ def _join_scripts(workspace: dict[str, object], hats: str) -> dict[str, object] 
         return None
     by_id = {top.get("id"): top for top in tops if isinstance(top, dict)}
     parts = hats.split(":")
-    pairs = ((":".join(parts[:at]), ":".join(parts[at:])) for at in range(1, len(parts)))
-    found = ((by_id[later], by_id[earlier]) for later, earlier in pairs if {later, earlier} <= by_id.keys())
-    moved, end = next(found, (None, None))
+    pairs = ((":".join(parts[:index]), ":".join(parts[index:])) for index in range(1, len(parts)))
+    matches = ((by_id[later], by_id[earlier]) for later, earlier in pairs if {later, earlier} <= by_id.keys())
+    moved, end = next(matches, (None, None))
     if moved is None or end is None or moved is end or not isinstance(moved.get("next"), dict):
         return None
     while isinstance(below := end.get("next"), dict) and isinstance(below.get("block"), dict):
@@ -156,7 +156,7 @@ def _with_start(workspace: dict[str, object], block_type: str) -> dict[str, obje
 
 
 def _can_follow(block_type: str) -> bool:
-    known = {block.type: block.shape for category in categories() for block in category.blocks}
-    if block_type in known:
-        return known[block_type] in ("statement", "cap")
+    shapes = {block.type: block.shape for category in categories() for block in category.blocks}
+    if block_type in shapes:
+        return shapes[block_type] in ("statement", "cap")
     return "_get_" not in block_type and "_when_" not in block_type

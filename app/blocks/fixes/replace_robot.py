@@ -18,23 +18,23 @@ def blocks_of(workspace: Mapping[str, object], robot: str) -> tuple[dict[str, ob
 
 def block_types_by_robot(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
     """Return the block types that a workspace uses, by name of the robot."""
-    found: dict[str, set[str]] = {}
+    types_by_robot: dict[str, set[str]] = {}
     for block in saved_blocks(workspace):
         robot = _robot_of(block)
         if isinstance(robot, str):
-            found.setdefault(robot, set()).add(str(block.get("type")))
-    return {robot: frozenset(types) for robot, types in found.items()}
+            types_by_robot.setdefault(robot, set()).add(str(block.get("type")))
+    return {robot: frozenset(types) for robot, types in types_by_robot.items()}
 
 
 def block_counts_by_robot(workspace: Mapping[str, object], ids: Collection[str]) -> Mapping[str, int]:
     """Return the number of blocks with one of these ids, by name of the robot."""
-    wanted = frozenset(ids)
-    found: dict[str, int] = {}
-    for block in saved_blocks(workspace) if wanted else ():
+    requested_ids = frozenset(ids)
+    counts: dict[str, int] = {}
+    for block in saved_blocks(workspace) if requested_ids else ():
         robot = _robot_of(block)
-        if isinstance(robot, str) and block.get("id") in wanted:
-            found[robot] = found.get(robot, 0) + 1
-    return found
+        if isinstance(robot, str) and block.get("id") in requested_ids:
+            counts[robot] = counts.get(robot, 0) + 1
+    return counts
 
 
 def block_types_of(robot: Robot) -> frozenset[str]:
@@ -43,18 +43,20 @@ def block_types_of(robot: Robot) -> frozenset[str]:
 
 
 def supports_blocks(
-    asked: Collection[str], model: str, robot: Robot, known: Collection[str] | None = None
+    block_types: Collection[str], model: str, robot: Robot, supported_types: Collection[str] | None = None
 ) -> bool:
     """Return True if a robot supports all given block types of another robot; False if there are none.
 
     Args:
-        asked: Block types that the other robot uses.
+        block_types: Block types that the other robot uses.
         model: Model of the other robot.
         robot: Robot to check.
-        known: Result of ``types_of(robot)`` if it was already computed.
+        supported_types: Result of ``types_of(robot)`` if it was already computed.
     """
-    known = block_types_of(robot) if known is None else known
-    return bool(asked) and all(_translated_type(each, model, robot) in known for each in asked)
+    supported_types = block_types_of(robot) if supported_types is None else supported_types
+    return bool(block_types) and all(
+        _translated_type(each, model, robot) in supported_types for each in block_types
+    )
 
 
 def with_robot_replaced(
@@ -68,18 +70,24 @@ def with_robot_replaced(
         model: Model of the missing robot.
         robot: Robot to use instead.
     """
-    made: dict[str, object] = copy.deepcopy(dict(workspace))
-    for block in blocks_of(made, missing):
+    result: dict[str, object] = copy.deepcopy(dict(workspace))
+    for block in blocks_of(result, missing):
         block["type"] = _translated_type(str(block.get("type")), model, robot)
         fields = block["fields"]
         if isinstance(fields, dict):
             fields["ROBOT"] = robot.name
-    return made
+    return result
 
 
 def _translated_type(block_type: str, model: str, robot: Robot) -> str:
-    ours, theirs = (block_type_of(each, "", "", plain=True) for each in (model, robot.model))
-    return theirs + block_type.removeprefix(ours) if block_type.startswith(ours) else block_type
+    missing_prefix, robot_prefix = (
+        block_type_of(each, "", "", without_verb=True) for each in (model, robot.model)
+    )
+    return (
+        robot_prefix + block_type.removeprefix(missing_prefix)
+        if block_type.startswith(missing_prefix)
+        else block_type
+    )
 
 
 def _robot_of(block: Mapping[str, object]) -> object:

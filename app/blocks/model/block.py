@@ -87,43 +87,49 @@ class Block:
 
     def problems(self) -> tuple[str, ...]:
         """Return the inconsistencies of the description, one message each; empty if it is consistent."""
-        known = {argument.name for argument in self.arguments} | {
+        argument_names = {argument.name for argument in self.arguments} | {
             *self.constants,
             *self.constant_trees,
             *self.keywords,
         }
-        named = {argument for pairs in self.keywords.values() for argument, _ in pairs}
-        missing = {hole for text in self.templates for hole in placeholders(text)} - known
-        found = [f"{self.type}: its Python needs %{name}" for name in sorted(missing)]
-        shown = set(_PLACEHOLDER.findall(self.text))
-        found += [f"{self.type}: its text needs %{name}" for name in sorted(shown - known)]
-        used = {hole for text in self.templates for hole in placeholders(text)} | named | {self.variant}
-        found += [
+        keyword_arguments = {argument for pairs in self.keywords.values() for argument, _ in pairs}
+        missing = {hole for text in self.templates for hole in placeholders(text)} - argument_names
+        messages = [f"{self.type}: its Python needs %{name}" for name in sorted(missing)]
+        text_placeholders = set(_PLACEHOLDER.findall(self.text))
+        messages += [
+            f"{self.type}: its text needs %{name}" for name in sorted(text_placeholders - argument_names)
+        ]
+        used_names = (
+            {hole for text in self.templates for hole in placeholders(text)}
+            | keyword_arguments
+            | {self.variant}
+        )
+        messages += [
             f"{self.type}: %{argument.name} is used nowhere"
             for argument in self.arguments
-            if argument.name not in used and not argument.is_display_only and self.shape != "definition"
+            if argument.name not in used_names and not argument.is_display_only and self.shape != "definition"
         ]
-        return tuple(found)
+        return tuple(messages)
 
-    def translated(self, say: Translate) -> Block:
+    def translated(self, translate: Translate) -> Block:
         """Return the block with translated texts; type and Python code are unchanged.
 
         ``tools/words.py`` calls this method to collect the texts.
 
         Args:
-            say: Called with the context and the English text of everything that the user reads; returns the
-                translation.
+            translate: Called with the context and the English text of everything that the user reads;
+                returns the translation.
         """
-        words = say(f"words to find {self.type}", self.search_words) if self.search_words else ""
+        search_words = translate(f"words to find {self.type}", self.search_words) if self.search_words else ""
         return replace(
             self,
-            text=say("block", self.text),
-            tooltip=say(None, self.tooltip),
-            help=say(None, self.help),
-            arguments=tuple(argument.translated(say) for argument in self.arguments),
-            search_words=words,
+            text=translate("block", self.text),
+            tooltip=translate(None, self.tooltip),
+            help=translate(None, self.help),
+            arguments=tuple(argument.translated(translate) for argument in self.arguments),
+            search_words=search_words,
             english_search_words=""
-            if words == self.search_words
+            if search_words == self.search_words
             else f"{_text_without_placeholders(self.text)}, {self.search_words}",
         )
 
@@ -178,33 +184,33 @@ def _message_json(block: Block) -> dict[str, object]:
         argument = block.argument(match[1])
         if argument is None:
             continue
-        words = _escape_percent(block.text[position : match.start()])
+        text_part = _escape_percent(block.text[position : match.start()])
         position = match.end()
         if isinstance(argument, StatementInput):
-            if words.strip():
-                lines[-1] = (lines[-1][0] + words, lines[-1][1])
+            if text_part.strip():
+                lines[-1] = (lines[-1][0] + text_part, lines[-1][1])
             lines += [("%1", [argument.to_blockly()]), ("", [])]
             continue
         text, arguments = lines[-1]
         if isinstance(argument, ValueInput) and argument.only_if is not None:
             # An optional slot must not remove the words and fields before it.
-            words = f"{words}%{len(arguments) + 1} "
+            text_part = f"{text_part}%{len(arguments) + 1} "
             arguments = [*arguments, {"type": "input_dummy", "name": f"BEFORE_{argument.name}"}]
-        lines[-1] = (f"{text}{words}%{len(arguments) + 1}", [*arguments, argument.to_blockly()])
+        lines[-1] = (f"{text}{text_part}%{len(arguments) + 1}", [*arguments, argument.to_blockly()])
     lines[-1] = (lines[-1][0] + _escape_percent(block.text[position:]), lines[-1][1])
     return _numbered_messages(lines)
 
 
 def _numbered_messages(lines: Sequence[tuple[str, list[Mapping[str, object]]]]) -> dict[str, object]:
     result: dict[str, object] = {}
-    shown = [(text.strip(), arguments) for text, arguments in lines if text.strip()]
-    for number, (text, arguments) in enumerate(shown):
+    visible_lines = [(text.strip(), arguments) for text, arguments in lines if text.strip()]
+    for number, (text, arguments) in enumerate(visible_lines):
         result[f"message{number}"] = text
         if arguments:
             result[f"args{number}"] = arguments
     return result
 
 
-def _escape_percent(words: str) -> str:
+def _escape_percent(text: str) -> str:
     # Blockly would treat a per cent sign before a digit as an argument.
-    return words.replace("%", "%%")
+    return text.replace("%", "%%")

@@ -24,19 +24,23 @@ _MAX_LENGTH = 80
 
 
 def block_text(
-    placed: PlacedBlock, blocks: Mapping[str, Block], variables: Mapping[str, str], *, robot: bool = True
+    placed_block: PlacedBlock,
+    blocks: Mapping[str, Block],
+    variables: Mapping[str, str],
+    *,
+    robot: bool = True,
 ) -> str:
     """Return a block with its arguments as one line of text, truncated to 80 characters.
 
     Args:
-        placed: Block in the workspace.
+        placed_block: Block in the workspace.
         blocks: Descriptions of blocks by type.
         variables: Names of variables by id.
         robot: False to omit the name of the robot.
     """
-    block = blocks.get(placed.type)
+    block = blocks.get(placed_block.type)
     if block is None:
-        return label_of_unknown(placed)
+        return label_of_unknown(placed_block)
 
     def replacement(match: re.Match[str]) -> str:
         argument = block.argument(match[1])
@@ -45,25 +49,25 @@ def block_text(
         if match[1] == "ROBOT" and not robot:
             return ""
         if isinstance(argument, VariableField):
-            id = _variable_id(argument, placed)
+            id = _variable_id(argument, placed_block)
             return variables.get(id, id or argument.value)
         if isinstance(argument, Field) and not argument.is_display_only:
-            words = _field_text(argument, placed)
+            text = _field_text(argument, placed_block)
             is_quoted = is_text and isinstance(argument, TextField)
-            return _("“{name}”").format(name=words) if is_quoted else words
+            return _("“{name}”").format(name=text) if is_quoted else text
         if isinstance(argument, ValueInput):
-            if not argument.is_present(placed.fields):
+            if not argument.is_present(placed_block.fields):
                 return ""
-            inner = placed.inputs.get(argument.name, ())
+            inner = placed_block.inputs.get(argument.name, ())
             return block_text(inner[0], blocks, variables) if inner else "…"
         return ""
 
     is_text = block.shape == "value"
-    words = " ".join(_PLACEHOLDER.sub(replacement, block.text).split())
-    return words if len(words) <= _MAX_LENGTH else f"{words[: _MAX_LENGTH - 1]}…"
+    text = " ".join(_PLACEHOLDER.sub(replacement, block.text).split())
+    return text if len(text) <= _MAX_LENGTH else f"{text[: _MAX_LENGTH - 1]}…"
 
 
-def label(placed: PlacedBlock, block: Block) -> str:
+def label(placed_block: PlacedBlock, block: Block) -> str:
     """Return the label of a block: its text before the first slot, such as "wait until".
 
     The label of an action block is the title of the action. In Japanese, where the verb comes last, the label
@@ -72,21 +76,21 @@ def label(placed: PlacedBlock, block: Block) -> str:
     if block.robot is not None and block.robot.kind == "action":
         return block.robot.title
     pieces = _PLACEHOLDER.split(block.text)  # words, argument, words, argument, …, words
-    found, is_verb_last = "", bool(_JAPANESE_CHARACTER.search(block.text))
+    label_text, is_verb_last = "", bool(_JAPANESE_CHARACTER.search(block.text))
     for number, piece in enumerate(pieces):
         argument = block.argument(piece) if number % 2 else None
         if isinstance(argument, (ValueInput, StatementInput)):
             if is_verb_last:
-                found += "…"
-            elif found.strip():
+                label_text += "…"
+            elif label_text.strip():
                 break
         elif isinstance(argument, ChoiceField) and argument.name != "ROBOT":
-            found += _field_text(argument, placed)
+            label_text += _field_text(argument, placed_block)
         elif argument is None:
-            found += piece
+            label_text += piece
     if is_verb_last:
-        return "".join(found.split()) or label_of_type(block.type)
-    return " ".join(found.split()) or label_of_type(block.type)
+        return "".join(label_text.split()) or label_of_type(block.type)
+    return " ".join(label_text.split()) or label_of_type(block.type)
 
 
 def label_of_type(block_type: str) -> str:
@@ -97,31 +101,31 @@ def label_of_type(block_type: str) -> str:
     return block_type.partition("_")[2].replace("_", " ") or block_type
 
 
-def label_of_unknown(placed: PlacedBlock) -> str:
+def label_of_unknown(placed_block: PlacedBlock) -> str:
     """Return the label of a block without description; the editor shows the same text on the grey block."""
-    if placed.type.startswith("robot_"):
-        return label_of_type(placed.type)
-    words = re.sub(r"[_\s]+", " ", placed.type).strip()
+    if placed_block.type.startswith("robot_"):
+        return label_of_type(placed_block.type)
+    type_text = re.sub(r"[_\s]+", " ", placed_block.type).strip()
     values = [
         str(each)
-        for each in placed.fields.values()
+        for each in placed_block.fields.values()
         if isinstance(each, (str, int, float)) and not isinstance(each, bool)
     ]
-    return " ".join([words, *values])[:_MAX_LENGTH]
+    return " ".join([type_text, *values])[:_MAX_LENGTH]
 
 
-def _field_text(argument: Field, placed: PlacedBlock) -> str:
+def _field_text(argument: Field, placed_block: PlacedBlock) -> str:
     try:
-        value = argument.read(placed.fields.get(argument.name))
+        value = argument.read(placed_block.fields.get(argument.name))
     except FieldError:
-        return str(placed.fields.get(argument.name))
+        return str(placed_block.fields.get(argument.name))
     if isinstance(argument, ChoiceField):
         return argument.option_text(value)
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _variable_id(argument: VariableField, placed: PlacedBlock) -> str:
+def _variable_id(argument: VariableField, placed_block: PlacedBlock) -> str:
     try:
-        return str(argument.read(placed.fields.get(argument.name)))
+        return str(argument.read(placed_block.fields.get(argument.name)))
     except FieldError:
         return ""

@@ -55,13 +55,13 @@ class Category:
     parent: str = ""  # category that includes these blocks, under their title
     make_groups: Callable[[Robot, Sequence[Robot]], tuple[Group, ...]] | None = None
 
-    def translated(self, say: Translate) -> Category:
+    def translated(self, translate: Translate) -> Category:
         """Return the category with translated texts; see `Block.translated`."""
-        button = None if self.button is None else (say(None, self.button[0]), self.button[1])
+        button = None if self.button is None else (translate(None, self.button[0]), self.button[1])
         return replace(
             self,
-            title=say("category", self.title),
+            title=translate("category", self.title),
             button=button,
-            headings={block: say("heading", words) for block, words in self.headings.items()},
-            blocks=tuple(block.translated(say) for block in self.blocks),
+            headings={block: translate("heading", heading) for block, heading in self.headings.items()},
+            blocks=tuple(block.translated(translate) for block in self.blocks),
         )

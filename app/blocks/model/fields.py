@@ -52,7 +52,7 @@ class Argument:
         """
         return {}
 
-    def translated(self, say: Translate) -> Argument:  # noqa: ARG002 (most have no words)
+    def translated(self, translate: Translate) -> Argument:  # noqa: ARG002 (most have no words)
         """Return the argument with translated texts and initial values; name and values are unchanged."""
         return self
 
@@ -88,10 +88,10 @@ class ValueInput(Argument):
         """Return True if the slot exists on a block with these saved field values; see `only_if`."""
         return self.only_if is None or str(fields.get(self.only_if[0], self.only_if[1])) == self.only_if[1]
 
-    def translated(self, say: Translate) -> Argument:
+    def translated(self, translate: Translate) -> Argument:
         """Return the slot with its initial content translated."""
-        variable = None if self.variable is None else say("variable", self.variable)
-        default = say("example", self.default) if isinstance(self.default, str) else self.default
+        variable = None if self.variable is None else translate("variable", self.variable)
+        default = translate("example", self.default) if isinstance(self.default, str) else self.default
         return replace(self, variable=variable, default=default)
 
     def initial_inputs(self) -> dict[str, object]:
@@ -170,9 +170,9 @@ class TextField(Field):
         """Return the definition of Blockly's text field."""
         return {"type": "field_input", "name": self.name, "text": self.value}
 
-    def translated(self, say: Translate) -> Argument:
+    def translated(self, translate: Translate) -> Argument:
         """Return the field with its initial text translated."""
-        return replace(self, value=say("example", self.value))
+        return replace(self, value=translate("example", self.value))
 
     def read(self, saved: object) -> object:
         """Return the saved value as text."""
@@ -199,7 +199,7 @@ class ChoiceField(Field):
         entry: dict[str, object] = {
             "type": "field_choice",
             "name": self.name,
-            "options": [[words, _option_key(value)] for words, value in self.options],
+            "options": [[option_text, _option_key(value)] for option_text, value in self.options],
         }
         if self.source is not None:
             entry["source"] = self.source
@@ -216,15 +216,18 @@ class ChoiceField(Field):
             return "" if saved is None else str(saved)
         raise FieldError(_("has no option “{saved}”").format(saved=saved))
 
-    def translated(self, say: Translate) -> Argument:
+    def translated(self, translate: Translate) -> Argument:
         """Return the field with translated options; names of robots are not translated."""
         if self.source is not None:
             return self
-        return replace(self, options=tuple((say("choice", words), value) for words, value in self.options))
+        return replace(
+            self,
+            options=tuple((translate("choice", option_text), value) for option_text, value in self.options),
+        )
 
     def option_text(self, value: object) -> str:
         """Return the text of the option with this value; the value as text if there is no such option."""
-        return next((words for words, option in self.options if option == value), str(value))
+        return next((text for text, option in self.options if option == value), str(value))
 
 
 @dataclass(frozen=True)
@@ -263,9 +266,9 @@ class BroadcastField(Field):
         """Return the definition of Studio's drop-down field with the broadcast names of the behaviour."""
         return {"type": "field_broadcast", "name": self.name, "value": self.value}
 
-    def translated(self, say: Translate) -> Argument:
+    def translated(self, translate: Translate) -> Argument:
         """Return the field with its initial name translated."""
-        return replace(self, value=say("example", self.value))
+        return replace(self, value=translate("example", self.value))
 
     def read(self, saved: object) -> object:
         """Return the name on one line, without surrounding white space.
@@ -327,9 +330,9 @@ class VariableField(Field):
         """Return the definition of Blockly's variable field."""
         return {"type": "field_variable", "name": self.name, "variable": self.value}
 
-    def translated(self, say: Translate) -> Argument:
+    def translated(self, translate: Translate) -> Argument:
         """Return the field with the initial name translated."""
-        return replace(self, value=say("variable", self.value))
+        return replace(self, value=translate("variable", self.value))
 
     def read(self, saved: object) -> object:
         """Return the id of the variable; older files contain its name instead.

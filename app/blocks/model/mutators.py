@@ -28,13 +28,13 @@ class Items(Argument):
     def initial_inputs(self) -> dict[str, object]:
         """Return a shadow text block for each of the initial texts, by name of the slot."""
         return {
-            f"{self.name}{number}": {"shadow": {"type": "values_text", "fields": {"TEXT": words}}}
-            for number, words in enumerate(self.texts)
+            f"{self.name}{number}": {"shadow": {"type": "values_text", "fields": {"TEXT": text}}}
+            for number, text in enumerate(self.texts)
         }
 
-    def translated(self, say: Translate) -> Argument:
+    def translated(self, translate: Translate) -> Argument:
         """Return the argument with its initial texts translated."""
-        return replace(self, texts=tuple(say("example", words) for words in self.texts))
+        return replace(self, texts=tuple(translate("example", text) for text in self.texts))
 
     def to_blockly(self) -> dict[str, object]:
         """Return the definition of an empty input, at which the editor's mutator inserts the slots."""
@@ -48,8 +48,8 @@ class Items(Argument):
         """
         count = extra.get("items")
         sound = isinstance(count, int) and not isinstance(count, bool)
-        many = min(max(int(count), 0), MAX_ITEMS) if sound and isinstance(count, int) else self.count
-        return tuple(ValueInput(f"{self.name}{number}") for number in range(many))
+        slot_count = min(max(int(count), 0), MAX_ITEMS) if sound and isinstance(count, int) else self.count
+        return tuple(ValueInput(f"{self.name}{number}") for number in range(slot_count))
 
 
 @dataclass(frozen=True)
@@ -67,16 +67,16 @@ class ListInput(ValueInput):
     def initial_inputs(self) -> dict[str, object]:
         """Return a list block with the initial texts. Not a shadow block, so that its slots accept values."""
         items = Items("ITEM", len(self.texts), self.texts)
-        held = {
+        list_block = {
             "type": "lists_create",
             "extraState": {"items": items.count},
             "inputs": items.initial_inputs(),
         }
-        return {self.name: {"block": held}}
+        return {self.name: {"block": list_block}}
 
-    def translated(self, say: Translate) -> Argument:
+    def translated(self, translate: Translate) -> Argument:
         """Return the argument with the initial texts translated."""
-        return replace(self, texts=tuple(say("example", words) for words in self.texts))
+        return replace(self, texts=tuple(translate("example", text) for text in self.texts))
 
 
 @dataclass(frozen=True)
@@ -99,17 +99,17 @@ class Branches:
             extra: Saved ``extraState`` of the block.
             has_else: Default for the "else" branch.
         """
-        count, told = extra.get("elseIfs"), extra.get("else")
+        count, saved_has_else = extra.get("elseIfs"), extra.get("else")
         sound = isinstance(count, int) and not isinstance(count, bool)
-        many = min(max(int(count), 0), MAX_ELSE_IFS) if sound and isinstance(count, int) else 0
-        return cls(many, told if isinstance(told, bool) else has_else)
+        else_if_count = min(max(int(count), 0), MAX_ELSE_IFS) if sound and isinstance(count, int) else 0
+        return cls(else_if_count, saved_has_else if isinstance(saved_has_else, bool) else has_else)
 
     def arguments(self) -> tuple[Argument, ...]:
         """Return the slots of these branches in order."""
-        found: list[Argument] = []
+        slots: list[Argument] = []
         for number in range(1, self.else_ifs + 1):
-            found += [ValueInput(f"CONDITION{number}", "Boolean"), StatementInput(f"BODY{number}")]
-        return (*found, StatementInput("ELSE")) if self.has_else else tuple(found)
+            slots += [ValueInput(f"CONDITION{number}", "Boolean"), StatementInput(f"BODY{number}")]
+        return (*slots, StatementInput("ELSE")) if self.has_else else tuple(slots)
 
 
 @dataclass(frozen=True)
@@ -132,12 +132,12 @@ def inputs_of(extra: Mapping[str, object]) -> tuple[FunctionInput, ...]:
         extra: Saved ``extraState`` of the block.
     """
     saved = extra.get("inputs")
-    found: dict[str, FunctionInput] = {}
-    for each in saved if isinstance(saved, list) else ():
-        if isinstance(each, Mapping) and isinstance(each.get("id"), str) and each["id"]:
-            name = str(each.get("name") or "input")[:MAX_NAME_LENGTH]
-            found.setdefault(str(each["id"]), FunctionInput(str(each["id"]), name))
-    return tuple(found.values())[:MAX_INPUTS]
+    inputs_by_id: dict[str, FunctionInput] = {}
+    for saved_input in saved if isinstance(saved, list) else ():
+        if isinstance(saved_input, Mapping) and isinstance(saved_input.get("id"), str) and saved_input["id"]:
+            name = str(saved_input.get("name") or "input")[:MAX_NAME_LENGTH]
+            inputs_by_id.setdefault(str(saved_input["id"]), FunctionInput(str(saved_input["id"]), name))
+    return tuple(inputs_by_id.values())[:MAX_INPUTS]
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class InputField(VariableField):
         return {"type": "field_function_input", "name": self.name}
 
 
-def function_name(placed: PlacedBlock) -> str:
+def function_name(placed_block: PlacedBlock) -> str:
     """Return the name of the function that a block defines or calls; "function" if it has no name."""
-    saved = placed.fields.get("NAME", placed.extra_state.get("name"))
+    saved = placed_block.fields.get("NAME", placed_block.extra_state.get("name"))
     return " ".join(str(saved or "function").split())[:MAX_NAME_LENGTH] or "function"

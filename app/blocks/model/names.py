@@ -26,36 +26,38 @@ class UniqueTexts:
 
     def make_unique(self, text: str) -> str:
         """Return the text, or the text with the first unused number if it is not unique."""
-        made, number = text, self._next.get(text, 2)
-        while made in self._taken:
-            made, number = f"{text}{self._before_number}{number}", number + 1
+        candidate, number = text, self._next.get(text, 2)
+        while candidate in self._taken:
+            candidate, number = f"{text}{self._before_number}{number}", number + 1
         self._next[text] = number
-        self._taken.add(made)
-        return made
+        self._taken.add(candidate)
+        return candidate
 
 
 class PythonNames:
     """Generator of unique Python names that are neither keywords nor names of builtins.
 
     Args:
-        taken: Names that must not be returned.
+        reserved_names: Names that must not be returned.
     """
 
-    def __init__(self, taken: frozenset[str]) -> None:
-        self._unique = UniqueTexts("_", {*taken, *keyword.kwlist, *keyword.softkwlist, *dir(builtins)})
+    def __init__(self, reserved_names: frozenset[str]) -> None:
+        self._unique = UniqueTexts(
+            "_", {*reserved_names, *keyword.kwlist, *keyword.softkwlist, *dir(builtins)}
+        )
 
-    def new_name(self, words: str, otherwise: str) -> str:
+    def new_name(self, text: str, otherwise: str) -> str:
         """Return a new name derived from a text, such as ``when_started_2``.
 
         Args:
-            words: Text.
+            text: Text.
             otherwise: Name to use if the text contains no valid character, and prefix if it starts with a
                 digit.
         """
         # Python normalizes names to NFKC: different names must stay different.
-        plain = _NON_WORD_CHARACTERS.sub("_", unicodedata.normalize("NFKC", words)).strip("_")[:60]
-        if not plain.isidentifier():
-            longer = f"{otherwise}_{plain}"
-            plain = longer if plain and longer.isidentifier() else otherwise
-        plain = unicodedata.normalize("NFKC", plain)
-        return self._unique.make_unique(plain.lower() if plain.isascii() else plain)
+        python_name = _NON_WORD_CHARACTERS.sub("_", unicodedata.normalize("NFKC", text)).strip("_")[:60]
+        if not python_name.isidentifier():
+            longer = f"{otherwise}_{python_name}"
+            python_name = longer if python_name and longer.isidentifier() else otherwise
+        python_name = unicodedata.normalize("NFKC", python_name)
+        return self._unique.make_unique(python_name.lower() if python_name.isascii() else python_name)

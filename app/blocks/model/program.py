@@ -98,10 +98,10 @@ class Program:
 
     def to_json(self) -> dict[str, object]:
         """Return the parts of the program that the program's process needs, as a JSON object."""
-        kept = asdict(self)
+        program_json = asdict(self)
         for name in ("source", "lines", "problems", "absent", "actions"):
-            del kept[name]
-        return kept
+            del program_json[name]
+        return program_json
 
     @classmethod
     def from_json(cls, saved: Mapping[str, object]) -> Program:

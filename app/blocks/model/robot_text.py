@@ -34,9 +34,9 @@ class BlockTemplate:
 
     def __init__(self, text: str, parameters: Sequence[str]) -> None:
         self.arguments: dict[str, str] = {}
-        taken = set(_RESERVED)
+        used_names = set(_RESERVED)
         for name in parameters:
-            self.arguments[name] = _argument_name(name, taken)
+            self.arguments[name] = _argument_name(name, used_names)
         self.shown: frozenset[str] = frozenset(
             name for name in _PLACEHOLDER.findall(text) if name in self.arguments
         )
@@ -54,17 +54,17 @@ class BlockTemplate:
         return f"%{name}"
 
 
-def block_type_of(model: str, verb: str, name: str, *, plain: bool = False) -> str:
+def block_type_of(model: str, verb: str, name: str, *, without_verb: bool = False) -> str:
     """Return the type of a robot block, such as ``robot_pepper_do_say``.
 
     Args:
         model: Model of the robot.
         verb: "do", "get" or "when".
         name: Name of the action, sensor or event.
-        plain: True to omit the verb, for blocks of no particular action, sensor or event:
+        without_verb: True to omit the verb, for blocks of no particular action, sensor or event:
             ``robot_pepper_changes``.
     """
-    middle = "" if plain else f"{verb}_"
+    middle = "" if without_verb else f"{verb}_"
     return f"robot_{_type_part(model)}_{middle}{_type_part(name)}"
 
 
@@ -121,25 +121,25 @@ def about(parameter: Parameter) -> str:
     """Format the limits and the unit of a parameter, such as "from 0 to 100 %"; "" if there are none."""
     unit = f" {display_unit(parameter.unit)}" if parameter.unit else ""
     low = None if parameter.minimum is None else format_number(parameter.minimum)
-    high = None if parameter.maximum is None else format_number(parameter.maximum)
-    if low is not None and high is not None:
-        return _("from {low} to {high_and_unit}").format(low=low, high_and_unit=f"{high}{unit}")
+    upper = None if parameter.maximum is None else format_number(parameter.maximum)
+    if low is not None and upper is not None:
+        return _("from {low} to {high_and_unit}").format(low=low, high_and_unit=f"{upper}{unit}")
     if low is not None:
         return _("at least {number_and_unit}").format(number_and_unit=f"{low}{unit}")
-    if high is not None:
-        return _("at most {number_and_unit}").format(number_and_unit=f"{high}{unit}")
+    if upper is not None:
+        return _("at most {number_and_unit}").format(number_and_unit=f"{upper}{unit}")
     return pgettext("of a number", "in {unit}").format(unit=unit.strip()) if unit else ""
 
 
-def _argument_name(name: str, taken: set[str]) -> str:
-    plain = re.sub(r"[^A-Z0-9_]", "_", name.upper())
-    if not plain[:1].isalpha():
-        plain = f"P_{plain}"
-    made, number = plain, 2
-    while made in taken:
-        made, number = f"{plain}_{number}", number + 1
-    taken.add(made)
-    return made
+def _argument_name(name: str, used_names: set[str]) -> str:
+    base_name = re.sub(r"[^A-Z0-9_]", "_", name.upper())
+    if not base_name[:1].isalpha():
+        base_name = f"P_{base_name}"
+    candidate, number = base_name, 2
+    while candidate in used_names:
+        candidate, number = f"{base_name}_{number}", number + 1
+    used_names.add(candidate)
+    return candidate
 
 
 def _type_part(name: str) -> str:

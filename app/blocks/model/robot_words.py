@@ -23,8 +23,8 @@ class _Ability(NamedTuple):
     search_words: str
 
 
-def _make_ability(names: str, words: str) -> _Ability:
-    return _Ability(frozenset(names.split()), words)
+def _make_ability(names: str, search_words: str) -> _Ability:
+    return _Ability(frozenset(names.split()), search_words)
 
 
 # Translators: other words that people may type to find a block that does this, with commas between.
@@ -307,10 +307,10 @@ def action_search_words(names: Iterable[str], uses: Iterable[str] = ()) -> Searc
         uses: Resources of the action, used if the names aren't recognized.
     """
     parts = _name_parts(names)
-    found = _matching_abilities(_ACTION_ABILITIES, parts) or [
+    abilities = _matching_abilities(_ACTION_ABILITIES, parts) or [
         _ACTION_ABILITIES[_ABILITY_OF_RESOURCE[part]] for part in uses if part in _ABILITY_OF_RESOURCE
     ]
-    return _collect_search_words(parts, found)
+    return _collect_search_words(parts, abilities)
 
 
 def sensor_search_words(names: Iterable[str]) -> SearchWords:
@@ -333,17 +333,17 @@ def bilingual_search_words(english: str) -> SearchWords:
 
 
 def _name_parts(names: Iterable[str]) -> tuple[str, ...]:
-    found = (part.lower() for name in names for part in _NAME_PART.findall(name.rpartition(":")[2]))
-    return tuple(dict.fromkeys(found))
+    name_parts = (part.lower() for name in names for part in _NAME_PART.findall(name.rpartition(":")[2]))
+    return tuple(dict.fromkeys(name_parts))
 
 
 def _matching_abilities(abilities: Mapping[str, _Ability], parts: Iterable[str]) -> list[_Ability]:
-    known = frozenset(parts)
-    return [ability for ability in abilities.values() if ability.names & known]
+    unique_parts = frozenset(parts)
+    return [ability for ability in abilities.values() if ability.names & unique_parts]
 
 
 def _collect_search_words(parts: Iterable[str], abilities: Iterable[_Ability]) -> SearchWords:
     lists = [bilingual_search_words(ability.search_words) for ability in abilities]
-    words = ", ".join(each.words for each in lists)
+    translated_words = ", ".join(each.words for each in lists)
     english = ", ".join([*(each.english for each in lists if each.english), " ".join(parts)])
-    return SearchWords(words, english)
+    return SearchWords(translated_words, english)

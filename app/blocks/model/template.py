@@ -64,8 +64,8 @@ def statements(
     filled: list[ast.stmt] = []
     filler = _PlaceholderFiller(expressions, bodies or {}, keywords or {})
     for statement in _parse_template(text).body:
-        made = filler.visit(_copy_node(statement))
-        filled.extend(made if isinstance(made, list) else [made])
+        result = filler.visit(_copy_node(statement))
+        filled.extend(result if isinstance(result, list) else [result])
     return filled
 
 

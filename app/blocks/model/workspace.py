@@ -63,14 +63,14 @@ class Workspace:
 
     def all_blocks(self) -> list[PlacedBlock]:
         """Return all blocks of all scripts, including shadow blocks."""
-        found: list[PlacedBlock] = []
+        blocks: list[PlacedBlock] = []
         waiting = [block for script in self.scripts for block in script]
         while waiting:
             block = waiting.pop()
-            found.append(block)
+            blocks.append(block)
             for inner in block.inputs.values():
                 waiting.extend(inner)
-        return found
+        return blocks
 
 
 def saved_blocks(saved: Mapping[str, object]) -> Iterator[dict[str, object]]:
@@ -164,10 +164,10 @@ def _has_breakpoint(saved: Mapping[str, object]) -> bool:
     if not isinstance(data, str) or '"pause"' not in data:
         return False
     try:
-        told = json.loads(data)
+        decoded = json.loads(data)
     except (ValueError, RecursionError):
         return False
-    return isinstance(told, Mapping) and told.get("pause") is True
+    return isinstance(decoded, Mapping) and decoded.get("pause") is True
 
 
 def is_enabled(saved: Mapping[str, object]) -> bool:

@@ -19,9 +19,9 @@ class Delivery:
         done: True after the script has run, or when it will not run for this broadcast.
     """
 
-    def __init__(self, over: Callable[[], None]) -> None:
+    def __init__(self, on_end: Callable[[], None]) -> None:
         self.done = False
-        self._on_end = over
+        self._on_end = on_end
 
     def finish(self) -> None:
         """Mark the delivery as done: the script has run, or a newer delivery replaced this one."""
@@ -50,16 +50,16 @@ class Receiver:
         self.runs_in = scheduler.current_script()
         while True:
             scheduler.wait_for(lambda: self.waiting is not None, idle=True)
-            taken: Delivery | None = None
+            delivery: Delivery | None = None
             try:
                 with suppress(EndScript):
                     scheduler.start_run()
                     # Read after getting the turn: the broadcast may have been sent again meanwhile.
-                    taken, self.waiting = self.waiting, None
+                    delivery, self.waiting = self.waiting, None
                     self.script()
             finally:
-                if taken is not None:
-                    taken.finish()
+                if delivery is not None:
+                    delivery.finish()
             scheduler.finish_run()
             scheduler.wake_scripts()
 
@@ -69,12 +69,14 @@ class Broadcasts:
 
     Args:
         scheduler: Scheduler of the program.
-        began: Called when a delivery starts.
-        over: Called when a delivery is done.
+        on_begin: Called when a delivery starts.
+        on_end: Called when a delivery is done.
     """
 
-    def __init__(self, scheduler: Scheduler, began: Callable[[], None], over: Callable[[], None]) -> None:
-        self._scheduler, self._on_begin, self._on_end = scheduler, began, over
+    def __init__(
+        self, scheduler: Scheduler, on_begin: Callable[[], None], on_end: Callable[[], None]
+    ) -> None:
+        self._scheduler, self._on_begin, self._on_end = scheduler, on_begin, on_end
         self.receivers: list[Receiver] = []
 
     def send(self, name: str) -> tuple[Delivery, ...]:

@@ -141,17 +141,20 @@ class Run:
             raise TypeError("a start needs a program and robots")
         self._program = Program.from_json(program)
         self._breakpoints = frozenset(self._program.breakpoints)
-        everybody = tuple(map(parse, robots))
+        all_robots = tuple(map(parse, robots))
         self._robots: tuple[Robot, ...] = tuple(
-            robot for robot in everybody if robot.name in self._program.robots
+            robot for robot in all_robots if robot.name in self._program.robots
         )
         self._owners = _parse_string_map(order.get("owners"))
-        self._guard = PublishGuard(guarded_topics(everybody), self._program.moves)
+        self._guard = PublishGuard(guarded_topics(all_robots), self._program.moves)
         self._id = str(order.get("id") or f"program-{uuid.uuid4().hex[:8]}")
         self._master = None if order.get("master") is None else str(order["master"])
         self._out = out
         self._runtime = Runtime(
-            out.print, labels=self._program.labels, readings=self._program.readings, asked=self._send_question
+            out.print,
+            labels=self._program.labels,
+            readings=self._program.readings,
+            on_question=self._send_question,
         )
         self._network: Network | None = None
         self._variables = VariableWatch({}, ())
@@ -192,9 +195,9 @@ class Run:
 
     def answer(self, order: Mapping[str, object]) -> None:
         """Pass the user's answer to the open question; command "answer"."""
-        question, words = order.get("question"), order.get("text")
-        if isinstance(question, int) and isinstance(words, str):
-            self._runtime.questions.set_answer(question, words)
+        question, reply_text = order.get("question"), order.get("text")
+        if isinstance(question, int) and isinstance(reply_text, str):
+            self._runtime.questions.set_answer(question, reply_text)
 
     def set_pace(self, order: Mapping[str, object]) -> None:
         """Set the delay before each block; command "pace"."""
@@ -300,32 +303,34 @@ class Run:
 
     def _report_until_finished(self) -> None:
         runtime, saying, before = self._runtime, self._runtime.status_text, None
-        looks = itertools.count()
+        sample_counter = itertools.count()
         while not runtime.finished.wait(SAMPLE_INTERVAL_S):
-            if next(looks) % VARIABLES_PERIOD_SAMPLES == 0:
+            if next(sample_counter) % VARIABLES_PERIOD_SAMPLES == 0:
                 self._send_variables()
             now = runtime.scheduler.snapshot()
-            words, warning = saying.text(now.blocks), saying.warning(now.blocks)
+            status_text, warning = saying.text(now.blocks), saying.warning(now.blocks)
             self._out.send_printed()
             self._send_replacements()
-            if (now, words, warning) == before:
+            if (now, status_text, warning) == before:
                 continue
-            before = (now, words, warning)
+            before = (now, status_text, warning)
             if now.is_paused:
                 reading = saying.block_text(now.next_block)
                 self._out.send(
                     "paused", block=now.next_block, blocks=now.blocks, says=reading, warning=warning
                 )
             else:
-                self._out.send("running", blocks=now.blocks, says=words)
+                self._out.send("running", blocks=now.blocks, says=status_text)
 
     def _send_replacements(self) -> None:
-        for each in self._runtime.replacements.take_new():
-            self._out.send("warning", block=each.block, sentence=each.message, count=each.count)
+        for replacement in self._runtime.replacements.take_new():
+            self._out.send(
+                "warning", block=replacement.block, sentence=replacement.message, count=replacement.count
+            )
 
 
-def _parse_string_map(told: object) -> dict[str, str]:
-    return {str(key): str(value) for key, value in told.items()} if isinstance(told, Mapping) else {}
+def _parse_string_map(decoded: object) -> dict[str, str]:
+    return {str(key): str(value) for key, value in decoded.items()} if isinstance(decoded, Mapping) else {}
 
 
 def read_commands(stream: TextIO) -> Iterator[Mapping[str, object]]:
@@ -369,7 +374,7 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
 
 def _run_commands(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
     obeyed = run.commands()
-    told: dict[str, Callable[[Mapping[str, object]], None]] = {
+    order_handlers: dict[str, Callable[[Mapping[str, object]], None]] = {
         "pace": run.set_pace,
         "robots": run.update_robots,
         "variable": run.set_variable,
@@ -377,12 +382,12 @@ def _run_commands(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
         "answer": run.answer,
     }
     for order in incoming:
-        take = told.get(str(order.get("do")))
-        if take is not None:
-            take(order)
-        do = obeyed.get(str(order.get("do")))
-        if do is not None:
-            do()
+        order_handler = order_handlers.get(str(order.get("do")))
+        if order_handler is not None:
+            order_handler(order)
+        command = obeyed.get(str(order.get("do")))
+        if command is not None:
+            command()
     run.stop()  # the runner has exited or closed the pipe
 
 

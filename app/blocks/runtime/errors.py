@@ -25,8 +25,8 @@ class BehaviourError(AppError):
         unknown: True if the error is caused by a value that is not known yet.
     """
 
-    def __init__(self, sentence: str, block: str | None = None, *, unknown: bool = False) -> None:
-        super().__init__(sentence)
+    def __init__(self, message: str, block: str | None = None, *, unknown: bool = False) -> None:
+        super().__init__(message)
         self.block = block
         self.unknown = unknown
 
@@ -69,6 +69,8 @@ def type_name(value: object) -> str:
     return _(_TYPE_NAMES.get(type(value).__name__, _OTHER_TYPE_NAME))
 
 
-def _type_names_in(sentence: str) -> str:
-    words = [word for quoted, word in _TYPE_NAMES.items() if f"'{quoted}'" in sentence]
-    return format_list([_(word) for word in dict.fromkeys(words)]) or _("these values")
+def _type_names_in(message: str) -> str:
+    display_names = [display_name for quoted, display_name in _TYPE_NAMES.items() if f"'{quoted}'" in message]
+    return format_list([_(display_name) for display_name in dict.fromkeys(display_names)]) or _(
+        "these values"
+    )

@@ -93,61 +93,72 @@ def find_robots(
     node: GraphNode,
     timeout_s: float,
     *,
-    wanted: Sequence[str] = (),
-    known: Sequence[Robot] = (),
+    expected: Sequence[str] = (),
+    previous: Sequence[Robot] = (),
     clock: Callable[[], float] = time.monotonic,
     wait: Callable[[float], object] | None = None,
 ) -> FoundRobots:
     """Find the robots in the graph. If several programs announce a name, the first one is used.
 
-    Robots of RIZE don't announce themselves: those in `known` are found if their command topic has a
+    Robots of RIZE don't announce themselves: those in `previous` are found if their command topic has a
     subscriber.
 
     Args:
         node: Node that is used to read the graph and to subscribe to descriptions.
         timeout_s: Maximum wait in seconds.
-        wanted: Names of robots to wait for; if empty, the currently connected robots are returned.
-        known: Descriptions of robots that were connected before.
+        expected: Names of robots to wait for; if empty, the currently connected robots are returned.
+        previous: Descriptions of robots that were connected before.
         clock: Monotonic clock in seconds.
         wait: Sleeps for a number of seconds.
     """
     wait = wait or threading.Event().wait
     until = clock() + timeout_s
-    found: dict[str, Robot] = {}
-    asked: dict[str, _DescriptionTopic] = {}
+    rize_robots: dict[str, Robot] = {}
+    description_topics: dict[str, _DescriptionTopic] = {}
     senders = Senders()
     try:
         while True:
             view = node.graph()
-            for robot in known:
+            for robot in previous:
                 info = view.topics.get(robot.topics.command)
                 if robot.dialect == RIZE and info is not None and info.subscribers:
-                    found.setdefault(robot.name, robot)
-            _update_topics(node, view, asked)
-            senders.update(view, asked)
-            for topic, each in asked.items():
-                _read_descriptions(each, topic, senders)
-            there = found | {each.robot.name: each.robot for each in asked.values() if each.robot is not None}
-            heard = sum(each.robot is not None or bool(each.error) for each in asked.values())
-            missing = set(wanted) - there.keys() if wanted else heard < len(asked)
+                    rize_robots.setdefault(robot.name, robot)
+            _update_topics(node, view, description_topics)
+            senders.update(view, description_topics)
+            for topic, description_topic in description_topics.items():
+                _read_descriptions(description_topic, topic, senders)
+            connected = rize_robots | {
+                description_topic.robot.name: description_topic.robot
+                for description_topic in description_topics.values()
+                if description_topic.robot is not None
+            }
+            received_count = sum(
+                description_topic.robot is not None or bool(description_topic.error)
+                for description_topic in description_topics.values()
+            )
+            missing = (
+                set(expected) - connected.keys() if expected else received_count < len(description_topics)
+            )
             if not missing or clock() >= until:
-                return _result(there, asked)
+                return _result(connected, description_topics)
             wait(POLL_INTERVAL_S)
     finally:
-        for each in asked.values():
-            each.subscription.close()
+        for description_topic in description_topics.values():
+            description_topic.subscription.close()
 
 
-def _update_topics(node: GraphNode, view: GraphView, asked: dict[str, _DescriptionTopic]) -> None:
+def _update_topics(
+    node: GraphNode, view: GraphView, description_topics: dict[str, _DescriptionTopic]
+) -> None:
     for topic, info in view.topics.items():
         nodes = publisher_nodes(view, topic) if info.msg_type == DESCRIPTION_TYPE else ()
-        if not nodes or (topic not in asked and len(asked) >= MAX_ROBOTS):
+        if not nodes or (topic not in description_topics and len(description_topics) >= MAX_ROBOTS):
             continue
-        if topic not in asked:
-            asked[topic] = _DescriptionTopic(
+        if topic not in description_topics:
+            description_topics[topic] = _DescriptionTopic(
                 node.new_sub(topic, DESCRIPTION_TYPE), identity_of(view, nodes[0])
             )
-        each = asked[topic]
+        each = description_topics[topic]
         if each.owner.node_id not in nodes:
             each.owner, each.robot, each.read = identity_of(view, nodes[0]), None, None
         each.duplicates = tuple(
@@ -155,27 +166,35 @@ def _update_topics(node: GraphNode, view: GraphView, asked: dict[str, _Descripti
         )
 
 
-def _read_descriptions(each: _DescriptionTopic, topic: str, senders: Senders) -> None:
-    message = each.subscription.receive(POLL_INTERVAL_S if each.robot is None else 0.0)
+def _read_descriptions(description_topic: _DescriptionTopic, topic: str, senders: Senders) -> None:
+    message = description_topic.subscription.receive(
+        POLL_INTERVAL_S if description_topic.robot is None else 0.0
+    )
     while message is not None:
-        each.messages = [*each.messages[1 - MAX_STORED_DESCRIPTIONS :], message]
-        message = each.subscription.receive(0.0)
-    its_own = (told for told in reversed(each.messages) if senders.node_of(told) == each.owner.node_id)
+        description_topic.messages = [*description_topic.messages[1 - MAX_STORED_DESCRIPTIONS :], message]
+        message = description_topic.subscription.receive(0.0)
+    its_own = (
+        announcement
+        for announcement in reversed(description_topic.messages)
+        if senders.node_of(announcement) == description_topic.owner.node_id
+    )
     newest = next(its_own, None)
-    if newest is None or newest is each.read:
+    if newest is None or newest is description_topic.read:
         return
-    each.read, each.error = newest, ""
+    description_topic.read, description_topic.error = newest, ""
     try:
         robot = parse_announcement(newest)
     except (NepError, DescriptionError) as error:
-        each.error = f"{topic}: {error}"  # the previous description stays valid
+        description_topic.error = f"{topic}: {error}"  # the previous description stays valid
         return
-    each.error = description_topic_problem(robot, topic) or ""
-    each.robot = None if each.error else robot
+    description_topic.error = description_topic_problem(robot, topic) or ""
+    description_topic.robot = None if description_topic.error else robot
 
 
-def _result(there: Mapping[str, Robot], asked: Mapping[str, _DescriptionTopic]) -> FoundRobots:
-    claims = [f"{each.error}." for each in asked.values() if each.error]
+def _result(
+    connected: Mapping[str, Robot], description_topics: Mapping[str, _DescriptionTopic]
+) -> FoundRobots:
+    claims = [f"{each.error}." for each in description_topics.values() if each.error]
     claims += [
         _(
             "{count} programs announce themselves as {robot}. Using the first one, {first}; ignoring "
@@ -186,19 +205,19 @@ def _result(there: Mapping[str, Robot], asked: Mapping[str, _DescriptionTopic]) 
             first=each.owner.display_name,
             others=format_list(list(each.duplicates)),
         )
-        for each in asked.values()
+        for each in description_topics.values()
         if each.duplicates and each.robot is not None
     ]
     robots = {}
-    for name in sorted(there):
-        claim = topic_conflict(there[name], there.values())
+    for name in sorted(connected):
+        claim = topic_conflict(connected[name], connected.values())
         if claim is None:
-            robots[name] = there[name]
+            robots[name] = connected[name]
         else:
             claims.append(_("{claim}; {robot} is ignored.").format(claim=claim, robot=name))
     owners = {
         each.robot.name: each.owner
-        for each in asked.values()
+        for each in description_topics.values()
         if each.robot is not None and each.robot.name in robots
     }
     return FoundRobots(tuple(robots.values()), owners, tuple(claims))

@@ -63,9 +63,9 @@ class Motions:
         motion = _Motion(robot, call.action, dict(input), frozenset(action.uses), self._script_id())
         with self._lock:
             self._motions = {
-                key: known
-                for key, known in self._motions.items()
-                if known.robot.name != robot.name or not known.uses & motion.uses
+                key: existing
+                for key, existing in self._motions.items()
+                if existing.robot.name != robot.name or not existing.uses & motion.uses
             }
             if action.repeat_s is not None:
                 self._unanswered[call.id] = motion

@@ -332,8 +332,8 @@ class Network:
 
     def _stop_nodes(self, robot: Robot) -> set[str]:
         # The robot's own node, and others that answer its commands, must answer a stop.
-        heard = set(subscriber_nodes(self._view, robot.topics.command))
-        others = heard & set(publisher_nodes(self._view, robot.topics.reply))
+        command_subscribers = set(subscriber_nodes(self._view, robot.topics.command))
+        others = command_subscribers & set(publisher_nodes(self._view, robot.topics.reply))
         owner = self._owners.get(robot.name)
         return {owner or "", *others}
 
@@ -341,10 +341,10 @@ class Network:
 
     def _topic(self, robot: str, name: str) -> str:
         described = self._robots[robot]
-        found = described.sensor(name) or described.event(name)
-        if found is None:
+        sensor_or_event = described.sensor(name) or described.event(name)
+        if sensor_or_event is None:
             raise KeyError(name)
-        return found.topic
+        return sensor_or_event.topic
 
     def _get_publisher(self, topic: str, msg_type: str = "json") -> ProgramPublisher:
         with self._lock:
@@ -397,13 +397,13 @@ class Network:
         # If the robot's own program publishes the topic, only its messages count; a camera may be another
         # program.
         robot = self._robot_of.get(message.topic)
-        own = self._owners.get(robot) if robot is not None else None
-        if own is None or own not in publisher_nodes(self._view, message.topic):
+        owner = self._owners.get(robot) if robot is not None else None
+        if owner is None or owner not in publisher_nodes(self._view, message.topic):
             return True
         node = self._senders.node_of(message)
         if node is None:
             self._request_lookup()
-        return node == own
+        return node == owner
 
     def _receive_messages(self, messages: Sequence[Message]) -> None:
         for message in messages:
@@ -451,30 +451,30 @@ class Network:
 
     def _apply_reply(self, topic: str, payload: Mapping[str, object], node: str) -> None:
         # Answers to a stop count from all nodes that must answer, others from the robot's own node only.
-        answer = payload if "state" in payload and "op" in payload else rize.from_reply(payload)
-        if answer is None:
+        reply = payload if "state" in payload and "op" in payload else rize.from_reply(payload)
+        if reply is None:
             return
-        if answer.get("op") == "stop":
-            self._record_stop_reply(topic, answer, node)
+        if reply.get("op") == "stop":
+            self._record_stop_reply(topic, reply, node)
         if not any(self._is_own_reply(robot, topic, node) for robot in self._robots.values()):
             return
         self._record_heartbeat(topic)
-        if answer.get("op") == "stop":
+        if reply.get("op") == "stop":
             return
-        call = self._calls.get(bounded_str(answer.get("id")))
+        call = self._calls.get(bounded_str(reply.get("id")))
         # The answer to a cancel has the command's id, but only the command's own answer ends it.
-        if call is None or call.done or answer.get("op") not in (None, "invoke"):
+        if call is None or call.done or reply.get("op") not in (None, "invoke"):
             return
-        state = bounded_str(answer.get("state"))
+        state = bounded_str(reply.get("state"))
         if self._robots[call.robot].topics.reply != topic or state not in REPLY_STATES:
             return  # another robot's answer, or an invalid state
-        output = answer.get("output")
+        output = reply.get("output")
         call.output = output if isinstance(output, Mapping) else {}
-        call.error = safe_error_text(answer.get("error"))
-        feedback = answer.get("feedback")
+        call.error = safe_error_text(reply.get("error"))
+        feedback = reply.get("feedback")
         call.feedback = feedback if isinstance(feedback, Mapping) and feedback else call.feedback
         call.has_started = call.has_started or state == "running"
-        waits_for = answer.get("waits_for")
+        waits_for = reply.get("waits_for")
         call.waits_for = tuple(map(bounded_str, waits_for)) if isinstance(waits_for, list) else call.waits_for
         call.state = state
         if call.state in FINAL_STATES:
@@ -492,26 +492,28 @@ class Network:
             if self._robots[call.robot].topics.reply == topic:
                 call.last_reply_s = now
 
-    def _record_stop_reply(self, topic: str, answer: Mapping[str, object], node: str) -> None:
-        if answer.get("state") not in ("succeeded", "failed"):
+    def _record_stop_reply(self, topic: str, reply: Mapping[str, object], node: str) -> None:
+        if reply.get("state") not in ("succeeded", "failed"):
             return
-        id = bounded_str(answer.get("id"))
+        id = bounded_str(reply.get("id"))
         robots = [robot.name for robot in self._robots.values() if robot.topics.reply == topic]
-        own = [robot.name for robot in self._robots.values() if self._is_own_reply(robot, topic, node)]
+        sender_robots = [
+            robot.name for robot in self._robots.values() if self._is_own_reply(robot, topic, node)
+        ]
         with self._arrived:
-            ours = id in self._own_stops  # also for duplicate answers
+            is_own_stop = id in self._own_stops  # also for duplicate answers
             name, waiting = self._stops.get(id, ("", set()))
             if name in robots and node in waiting:
-                if answer["state"] == "failed":
-                    self._stop_errors[name] = stop_error_text(name, answer.get("error"))
+                if reply["state"] == "failed":
+                    self._stop_errors[name] = stop_error_text(name, reply.get("error"))
                 else:
                     waiting.discard(node)
                     self._stop_errors.pop(name, None)
                 if not waiting:
                     del self._stops[id]
             self._arrived.notify_all()
-        if not ours and not self._ending:
-            for name in own:
+        if not is_own_stop and not self._ending:
+            for name in sender_robots:
                 self._stopped_outside(name)
 
     def _make_command(

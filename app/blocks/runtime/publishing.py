@@ -49,10 +49,10 @@ class PublishGuard:
         """Raise BehaviourError if a message on a topic would move a robot that the program may not move."""
         names = [name for name in self._moving.robots_on(topic) if name not in self._allowed]
         if names:
-            who = format_list(names)
+            robot_names = format_list(names)
             raise BehaviourError(
                 _(
                     "Can't publish on {topic}: this would move {who} without permission. Stop the behaviour "
                     "and run it again to allow it."
-                ).format(topic=topic, who=who)
+                ).format(topic=topic, who=robot_names)
             )

@@ -49,11 +49,12 @@ class Questions:
 
     Args:
         scheduler: Scheduler of the program.
-        asked: Called with the question to show, or None; without this callback, questions can't be asked.
+        on_question: Called with the question to show, or None; without this callback, questions can't be
+            asked.
     """
 
-    def __init__(self, scheduler: Scheduler, asked: QuestionCallback | None) -> None:
-        self._scheduler, self._asked = scheduler, asked
+    def __init__(self, scheduler: Scheduler, on_question: QuestionCallback | None) -> None:
+        self._scheduler, self._asked = scheduler, on_question
         self._lock = threading.Lock()
         self._ids = itertools.count(1)
         self._waiting: list[ProgramQuestion] = []
@@ -71,7 +72,7 @@ class Questions:
             )
         self.answer = parse_answer(self._wait_for_answer(text(words)))
 
-    def ask_with_choices(self, words: object, choices: object) -> None:
+    def ask_with_choices(self, question_text: object, choices: object) -> None:
         """Ask a question with a button for each item of a list, and wait until `answer` is the selected item.
 
         The answer is an empty text if the user presses Esc.
@@ -84,12 +85,12 @@ class Questions:
                 _("Can't ask the question: the behaviour runs outside Studio. Run it in Studio.")
             )
         offered = choices_by_label(choices)
-        chosen = self._wait_for_answer(text(words), tuple(offered))
-        value = offered.get(chosen, "")
+        chosen_label = self._wait_for_answer(text(question_text), tuple(offered))
+        value = offered.get(chosen_label, "")
         self.answer = parse_answer(value) if isinstance(value, str) else value
 
-    def _wait_for_answer(self, words: str, choices: tuple[str, ...] = ()) -> str:
-        question = ProgramQuestion(next(self._ids), words[:MAX_QUESTION_LENGTH], choices=choices)
+    def _wait_for_answer(self, question_text: str, choices: tuple[str, ...] = ()) -> str:
+        question = ProgramQuestion(next(self._ids), question_text[:MAX_QUESTION_LENGTH], choices=choices)
         self._update_queue(self._waiting.append, question)
         try:
             self._scheduler.wait_until(lambda: question.answer is not None, None)
@@ -97,17 +98,17 @@ class Questions:
             self._update_queue(self._waiting.remove, question)
         return question.answer or ""
 
-    def set_answer(self, id: int, words: str) -> None:
+    def set_answer(self, id: int, answer: str) -> None:
         """Store the user's answer to a question; ignored if the question is no longer open.
 
         Args:
             id: Id of the question.
-            words: Answer.
+            answer: Answer.
         """
         with self._lock:
             for question in self._waiting:
                 if question.id == id:
-                    question.answer = words[:MAX_ANSWER_LENGTH]
+                    question.answer = answer[:MAX_ANSWER_LENGTH]
 
     def _update_queue(self, change: Callable[[ProgramQuestion], None], question: ProgramQuestion) -> None:
         with self._lock:
@@ -129,28 +130,28 @@ def choices_by_label(choices: object) -> dict[str, object]:
                 value=type_name(choices)
             )
         )
-    found: dict[str, object] = {}
+    values_by_label: dict[str, object] = {}
     for item in choices:
-        if words := " ".join(text(item).split())[:MAX_CHOICE_LENGTH]:
-            found.setdefault(words, item)
-        if len(found) > MAX_CHOICES:
+        if choice_label := " ".join(text(item).split())[:MAX_CHOICE_LENGTH]:
+            values_by_label.setdefault(choice_label, item)
+        if len(values_by_label) > MAX_CHOICES:
             raise BehaviourError(
                 _("A question can have at most {most} choices; this list has {count}.").format(
                     most=MAX_CHOICES, count=len(choices)
                 )
             )
-    if not found:
+    if not values_by_label:
         raise BehaviourError(_("The list of choices is empty."))
-    return found
+    return values_by_label
 
 
-def parse_answer(words: str) -> str | int | float:
+def parse_answer(answer: str) -> str | int | float:
     """Convert an answer to a number if it is one; other texts are returned unchanged.
 
     "007" and numbers with more than 15 digits remain texts.
     """
-    plain = words.strip()
-    if not _NUMBER.fullmatch(plain):
-        return words
-    found = float(plain.replace(",", "."))
-    return int(found) if found.is_integer() else found
+    stripped = answer.strip()
+    if not _NUMBER.fullmatch(stripped):
+        return answer
+    parsed = float(stripped.replace(",", "."))
+    return int(parsed) if parsed.is_integer() else parsed

@@ -57,13 +57,13 @@ class StatusText:
         self._told: dict[str | None, str] = {}
         self._warned: dict[str | None, str] = {}
 
-    def set_text(self, sentence: str) -> None:
+    def set_text(self, status: str) -> None:
         """Set the activity of a robot at the current block of the calling script; "" removes it."""
-        _set_or_remove(self._told, self._block(), sentence)
+        _set_or_remove(self._told, self._block(), status)
 
-    def set_warning(self, sentence: str) -> None:
+    def set_warning(self, warning: str) -> None:
         """Set a warning at the current block of the calling script; "" removes it."""
-        _set_or_remove(self._warned, self._block(), sentence)
+        _set_or_remove(self._warned, self._block(), warning)
 
     def text(self, blocks: Sequence[str]) -> str:
         """Return the text for the run bar: the activity of a robot at these blocks, or the first block."""
@@ -78,15 +78,15 @@ class StatusText:
         return self._readings.get(block or "", "")
 
 
-def _set_or_remove(sentences: dict[str | None, str], block: str | None, sentence: str) -> None:
-    if sentence:
-        sentences[block] = sentence
+def _set_or_remove(texts: dict[str | None, str], block: str | None, status: str) -> None:
+    if status:
+        texts[block] = status
     else:
-        sentences.pop(block, None)
+        texts.pop(block, None)
 
 
-def _first_text(sentences: Mapping[str | None, str], blocks: Sequence[str]) -> str:
-    return next((sentences[block] for block in blocks if block in sentences), "")
+def _first_text(texts: Mapping[str | None, str], blocks: Sequence[str]) -> str:
+    return next((texts[block] for block in blocks if block in texts), "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,20 +151,20 @@ class Replacements:
         winner = next((each for each in later if _replaces(each, loser)), None)
         if winner is None or winner.script == loser.script:
             return
-        words = _("“{action}” was replaced by “{other}”")
+        template = _("“{action}” was replaced by “{other}”")
         if names_robot:
-            words = _("{robot}: “{action}” was replaced by “{other}”")
-        said = words.format(robot=call.robot, action=loser.action.title, other=winner.action.title)
+            template = _("{robot}: “{action}” was replaced by “{other}”")
+        message = template.format(robot=call.robot, action=loser.action.title, other=winner.action.title)
         pair = (loser.block, winner.block or winner.action.name)
         with self._lock:
             count = self._counts[pair] = self._counts.get(pair, 0) + 1
-            self._news[pair] = Replacement(loser.block, said, count)
+            self._news[pair] = Replacement(loser.block, message, count)
 
     def take_new(self) -> tuple[Replacement, ...]:
         """Return the replacements since the last call; repeated ones are combined with their count."""
         with self._lock:
-            news, self._news = tuple(self._news.values()), {}
-        return news
+            new_replacements, self._news = tuple(self._news.values()), {}
+        return new_replacements
 
 
 def _replaces(winner: _Command, loser: _Command) -> bool:
@@ -269,8 +269,8 @@ class RobotHandle:
         if link.sensor(self._name, sensor) is None:
             # Sensors publish several times a second: the first value may be in flight.
             scheduler.wait_for(lambda: link.sensor(self._name, sensor) is not None, FIRST_VALUE_TIMEOUT_S)
-        told = link.sensor(self._name, sensor)
-        return told if field is None else values.part(told, field)
+        value = link.sensor(self._name, sensor)
+        return value if field is None else values.part(value, field)
 
     def on(self, event: str, /, **filters: object) -> Decorator:
         """Return a decorator for scripts that run at each event with this name.
@@ -295,34 +295,38 @@ class RobotHandle:
         """
         return self._runtime.on_pass(self._name, sensor, side, limit)
 
-    def _invoke(self, name: str, given: Mapping[str, object]) -> RobotCall:
+    def _invoke(self, name: str, arguments: Mapping[str, object]) -> RobotCall:
         robot = self._runtime.robot_description(self._name)
         action = robot.action(name)
         if action is None:
             raise BehaviourError(_("{name} can't “{name_2}”.").format(name=self._name, name_2=name))
-        input = {key: _convert_input(action, key, value) for key, value in given.items()}
-        wrong = action.check(action.complete(input))
-        if wrong:
-            raise BehaviourError(_("{name} can't do this: {wrong}.").format(name=self._name, wrong=wrong[0]))
-        words = activity_text(robot, action, input)
-        self._runtime.status_text.set_text(words)
+        input = {key: _convert_input(action, key, value) for key, value in arguments.items()}
+        problems = action.check(action.complete(input))
+        if problems:
+            raise BehaviourError(
+                _("{name} can't do this: {wrong}.").format(name=self._name, wrong=problems[0])
+            )
+        activity = activity_text(robot, action, input)
+        self._runtime.status_text.set_text(activity)
         try:
-            call = self._run_action(robot, action, action.complete(input), words)
+            call = self._run_action(robot, action, action.complete(input), activity)
         finally:
             self._runtime.status_text.set_text("")
         if call.state == "failed":
-            why = call.error or _("“{action}” failed").format(action=action.title)
+            reason = call.error or _("“{action}” failed").format(action=action.title)
             raise BehaviourError(
-                _with_full_stop(_("{robot}: {what_it_said}").format(robot=self._name, what_it_said=why))
+                _with_full_stop(_("{robot}: {what_it_said}").format(robot=self._name, what_it_said=reason))
             )
         return call
 
-    def _run_action(self, robot: Robot, action: Action, input: Mapping[str, object], words: str) -> RobotCall:
+    def _run_action(
+        self, robot: Robot, action: Action, input: Mapping[str, object], activity: str
+    ) -> RobotCall:
         while True:
             call = self._runtime.link().invoke(self._name, action.name, input)
             self._runtime.replacements.record_command(call, action, self._runtime.scheduler.block())
             try:
-                self._wait_for_reply(robot, action, call, words)
+                self._wait_for_reply(robot, action, call, activity)
             except EndScript:  # the program continues, but the robot must stop
                 self._runtime.link().cancel(call)
                 raise
@@ -339,15 +343,15 @@ class RobotHandle:
     def _wait_while_paused(self, action: Action, unknown: bool) -> None:
         names = {"robot": self._name, "action": action.title}
         saying = self._runtime.status_text
-        ahead = _("{robot} doesn't report how much of “{action}” is left; Resume skips it")
-        saying.set_warning(ahead.format(**names) if unknown else "")
+        pause_warning = _("{robot} doesn't report how much of “{action}” is left; Resume skips it")
+        saying.set_warning(pause_warning.format(**names) if unknown else "")
         self._runtime.scheduler.wait_while_paused()
         saying.set_warning("")
         if unknown:
-            done = _("{robot} doesn't report how much of “{action}” is left, so it was skipped")
-            self._runtime.write(done.format(**names))
+            skipped_message = _("{robot} doesn't report how much of “{action}” is left, so it was skipped")
+            self._runtime.write(skipped_message.format(**names))
 
-    def _wait_for_reply(self, robot: Robot, action: Action, call: RobotCall, words: str) -> None:
+    def _wait_for_reply(self, robot: Robot, action: Action, call: RobotCall, activity: str) -> None:
         scheduler = self._runtime.scheduler
         if robot.dialect == "native" and not scheduler.wait_for(
             lambda: call.state != "sent", FIRST_REPLY_TIMEOUT_S
@@ -358,8 +362,8 @@ class RobotHandle:
         can_hold = action.cancellable and robot.dialect == "native"
         limit = action.timeout_s or DEFAULT_TIMEOUT_S
         until = time.monotonic() + limit + TIMEOUT_MARGIN_S
-        waits = bool(call.waits_for) and call.state == "accepted"
-        if waits:
+        is_waiting = bool(call.waits_for) and call.state == "accepted"
+        if is_waiting:
             self._runtime.status_text.set_text(_waiting_text(robot, call))
 
         def ready() -> bool:
@@ -368,18 +372,18 @@ class RobotHandle:
         while not scheduler.wait_for(
             ready, min(COMMAND_CHECK_INTERVAL_S, max(0.0, until - time.monotonic()))
         ):
-            if waits:  # the time limit starts with the action
+            if is_waiting:  # the time limit starts with the action
                 until = time.monotonic() + limit + TIMEOUT_MARGIN_S
-                waits = not call.has_started
-                self._runtime.status_text.set_text(_waiting_text(robot, call) if waits else words)
-            said = self._silence_error(robot, call)
-            if said is None and time.monotonic() >= until:
-                said = _("{name} didn't finish “{title}” within {limit:g} s.").format(
+                is_waiting = not call.has_started
+                self._runtime.status_text.set_text(_waiting_text(robot, call) if is_waiting else activity)
+            error_text = self._silence_error(robot, call)
+            if error_text is None and time.monotonic() >= until:
+                error_text = _("{name} didn't finish “{title}” within {limit:g} s.").format(
                     name=self._name, title=action.title, limit=limit
                 )
-            if said is not None:
+            if error_text is not None:
                 self._runtime.link().cancel(call)
-                raise BehaviourError(said)
+                raise BehaviourError(error_text)
         if not call.done:
             self._cancel_for_pause(call)
 
@@ -401,9 +405,9 @@ class RobotHandle:
 
 
 def _waiting_text(robot: Robot, call: RobotCall) -> str:
-    found = [(robot.action(name), name) for name in dict.fromkeys(call.waits_for)]
+    actions = [(robot.action(name), name) for name in dict.fromkeys(call.waits_for)]
     titles = [
-        _("“{name}”").format(name=action.title if action is not None else name) for action, name in found
+        _("“{name}”").format(name=action.title if action is not None else name) for action, name in actions
     ]
     return _("{robot} is waiting for {actions}").format(robot=robot.name, actions=format_list(titles))
 
@@ -453,8 +457,8 @@ def _convert_to_kind(parameter: Parameter, value: object) -> object:
     return value
 
 
-def _with_full_stop(words: str) -> str:
-    return words if words.endswith((".", "!", "?", "”")) else f"{words}."
+def _with_full_stop(sentence: str) -> str:
+    return sentence if sentence.endswith((".", "!", "?", "”")) else f"{sentence}."
 
 
 def _check_hint(robot: Robot) -> str:
@@ -482,10 +486,10 @@ def remaining_input(action: Action, input: Mapping[str, object], call: RobotCall
     name = remainder_parameter(action, input)
     if name is None:
         return dict(input)
-    left, whole = _float_or_zero(call.feedback.get(REMAINING_FIELD)), _float_or_zero(input[name])
-    if abs(left) <= abs(whole) / 1000:
+    remaining, total = _float_or_zero(call.feedback.get(REMAINING_FIELD)), _float_or_zero(input[name])
+    if abs(remaining) <= abs(total) / 1000:
         return None
-    return {**input, name: math.copysign(min(abs(left), abs(whole)), whole)}
+    return {**input, name: math.copysign(min(abs(remaining), abs(total)), total)}
 
 
 def is_remainder_unknown(action: Action, input: Mapping[str, object], call: RobotCall) -> bool:

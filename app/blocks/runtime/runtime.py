@@ -100,7 +100,7 @@ class Runtime:
         printed: Called with each line that the program writes.
         labels: Labels of blocks by id.
         readings: Blocks as text by id.
-        asked: Called with the question to show, or None; without this callback, questions raise
+        on_question: Called with the question to show, or None; without this callback, questions raise
             BehaviourError.
     """
 
@@ -110,7 +110,7 @@ class Runtime:
         *,
         labels: Mapping[str, str] | None = None,
         readings: Mapping[str, str] | None = None,
-        asked: QuestionCallback | None = None,
+        on_question: QuestionCallback | None = None,
     ) -> None:
         self._printed = printed
         self._labels = labels or {}
@@ -126,7 +126,7 @@ class Runtime:
         self.status_text = StatusText(self.scheduler.block, readings or {})
         self.replacements = Replacements()
         self._calls = CallStack(self.scheduler)
-        self.questions = Questions(self.scheduler, asked)
+        self.questions = Questions(self.scheduler, on_question)
         self._broadcasts = Broadcasts(self.scheduler, self._add_running, self._remove_running)
         self.finished = threading.Event()
         self.error: BehaviourError | None = None
@@ -169,11 +169,11 @@ class Runtime:
                 receiver.name, self._with_error_reporting(partial(receiver.serve, self.scheduler))
             )
         for script in self._starts:
-            body = self._with_error_reporting(partial(self._run_once, script), over=self._remove_running)
+            body = self._with_error_reporting(partial(self._run_once, script), on_end=self._remove_running)
             self.scheduler.start(script.__name__, body, idle=False)
         for hat, script in self._hats:
             body = self._with_error_reporting(
-                partial(self._run_for_events, hat, script), over=self._remove_running
+                partial(self._run_for_events, hat, script), on_end=self._remove_running
             )
             self.scheduler.start(script.__name__, body)
 
@@ -198,7 +198,7 @@ class Runtime:
                 hat.dropped = 0
 
     def _with_error_reporting(
-        self, body: Callable[[], None], over: Callable[[], None] = lambda: None
+        self, body: Callable[[], None], on_end: Callable[[], None] = lambda: None
     ) -> Callable[[], None]:
         def run() -> None:
             try:
@@ -207,7 +207,7 @@ class Runtime:
                 block = self.scheduler.block()
                 self._fail(explain(error, self._labels.get(block or "", ""), block))
             finally:
-                over()
+                on_end()
 
         return run
 
@@ -295,9 +295,9 @@ class Runtime:
         name = self._labels.get(block, "")
         return self.value(block, lambda: self._calls.run(block, name, call))
 
-    def fail(self, sentence: str) -> object:
+    def fail(self, message: str) -> object:
         """Raise BehaviourError with this message, for a block that can't run."""
-        raise BehaviourError(sentence)
+        raise BehaviourError(message)
 
     def wait(self, seconds: object) -> None:
         """Wait for a number of seconds, not counting pauses of the program."""
@@ -468,7 +468,7 @@ class Runtime:
         self, title: str, prepare: Callable[[ScriptTrigger, ProgramLink], None], waiting: int
     ) -> Decorator:
         def decorate(script: Script) -> Script:
-            hat = ScriptTrigger(title, most=waiting)
+            hat = ScriptTrigger(title, max_waiting=waiting)
             self._hats.append((hat, script))
             self._subscriptions.append(lambda link: prepare(hat, link))
             return script

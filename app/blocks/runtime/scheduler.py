@@ -220,8 +220,8 @@ class Scheduler:
             slice_s = remaining if condition is None else POLL_INTERVAL_S
             if remaining is not None and slice_s is not None:
                 slice_s = min(slice_s, remaining)
-            used = self._wait_slice(script, slice_s)
-            remaining = None if remaining is None else remaining - used
+            elapsed_s = self._wait_slice(script, slice_s)
+            remaining = None if remaining is None else remaining - elapsed_s
         return True
 
     def _wait_slice(self, script: Script, seconds: float | None) -> float:
@@ -246,10 +246,10 @@ class Scheduler:
             script.busy = not idle
             self._release_turn_locked(script)
             while not self._has_ended(script) and not ready():
-                left = None if until is None else until - self._clock()
-                if left is not None and left <= 0:
+                remaining_s = None if until is None else until - self._clock()
+                if remaining_s is not None and remaining_s <= 0:
                     break
-                script.wake.wait(left)
+                script.wake.wait(remaining_s)
             script.busy = False
             self._raise_if_ended(script)
             if not idle:
@@ -345,32 +345,32 @@ class Scheduler:
         with self._lock:
             active = [script for script in self._scripts if not script.idle]
             blocks = tuple(dict.fromkeys(script.block for script in active if script.block))
-            still = self._owner is None and self._stepping is None and not any(s.busy for s in active)
+            is_idle = self._owner is None and self._stepping is None and not any(s.busy for s in active)
             first = next((script.block for script in self._parked if script.block), None)
             following = first or next((script.block for script in active if script.frozen), None)
-            return Snapshot(blocks, following, self._paused and still and not self._resuming)
+            return Snapshot(blocks, following, self._paused and is_idle and not self._resuming)
 
     # ---- the turn; call with the lock held
 
     def _wait_locked(
         self, script: Script, limit_s: Callable[[], float | None], *, step_ends: bool = False
     ) -> float:
-        used = 0.0
+        elapsed_s = 0.0
         script.frozen = True
         self._release_turn_locked(script)
         while not self._has_ended(script) and not (step_ends and self._stepping is script):
-            most = limit_s()
-            if most is not None and used >= most:
+            max_wait_s = limit_s()
+            if max_wait_s is not None and elapsed_s >= max_wait_s:
                 break
             if self._paused and self._stepping is not script:
                 script.wake.wait()
                 continue
-            began = self._clock()
-            script.wake.wait(None if most is None else most - used)
-            used += self._clock() - began
+            started_s = self._clock()
+            script.wake.wait(None if max_wait_s is None else max_wait_s - elapsed_s)
+            elapsed_s += self._clock() - started_s
         script.frozen = False
         self._acquire_turn_locked(script)
-        return used
+        return elapsed_s
 
     def _current_script(self) -> Script:
         script = getattr(self._local, "script", None)

@@ -20,14 +20,16 @@ class ScriptTrigger:
 
     Args:
         title: Title of the event block.
-        most: Maximum number of queued events.
+        max_waiting: Maximum number of queued events.
         condition: Condition; None for a queue of events.
     """
 
-    def __init__(self, title: str, *, most: int = 1, condition: Callable[[], bool] | None = None) -> None:
+    def __init__(
+        self, title: str, *, max_waiting: int = 1, condition: Callable[[], bool] | None = None
+    ) -> None:
         self.title = title
         self.dropped = 0
-        self._waiting: deque[tuple[object, ...]] = deque(maxlen=most)
+        self._waiting: deque[tuple[object, ...]] = deque(maxlen=max_waiting)
         self._condition = condition
         self._was_true: bool | None = None
 
@@ -121,18 +123,18 @@ def event_matches(
         source: Thing Description of the robot.
     """
     fields: Mapping[str, object] = data if isinstance(data, Mapping) else {}
-    for name, wanted in filters.items():
-        if not _values_match(wanted, fields.get(name)):
+    for name, expected in filters.items():
+        if not _values_match(expected, fields.get(name)):
             return False
     if event is None or not _has_level(event.name, source):
         return True
     return all(fields.get(field.name) is not False for field in event.fields if field.kind == "boolean")
 
 
-def _values_match(wanted: object, told: object) -> bool:
-    if isinstance(wanted, str) and isinstance(told, str):
-        return wanted.strip().casefold() == told.strip().casefold()
-    return wanted == told
+def _values_match(expected: object, actual: object) -> bool:
+    if isinstance(expected, str) and isinstance(actual, str):
+        return expected.strip().casefold() == actual.strip().casefold()
+    return expected == actual
 
 
 def _has_level(name: str, source: Mapping[str, object]) -> bool:

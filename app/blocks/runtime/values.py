@@ -47,10 +47,12 @@ def _to_json_safe(value: object, around: tuple[int, ...]) -> object:
         return value
     if id(value) in around:
         return "…"
-    inside = (*around, id(value))
+    ancestors = (*around, id(value))
     if isinstance(value, Mapping):
-        return {str(_to_json_safe(key, inside)): _to_json_safe(each, inside) for key, each in value.items()}
-    return [_to_json_safe(each, inside) for each in value]
+        return {
+            str(_to_json_safe(key, ancestors)): _to_json_safe(each, ancestors) for key, each in value.items()
+        }
+    return [_to_json_safe(each, ancestors) for each in value]
 
 
 def is_known(value: object) -> bool:
@@ -75,17 +77,17 @@ def length(value: object) -> int:
     return len(grapheme_clusters(text(value)))
 
 
-def grapheme_clusters(words: str) -> Sequence[str]:
+def grapheme_clusters(string: str) -> Sequence[str]:
     """Split a text into grapheme clusters: accents and skin tones belong to the previous character."""
-    if words.isascii():
-        return words
-    found: list[str] = []
-    for character in words:
-        if found and _is_combining(found[-1], character):
-            found[-1] += character
+    if string.isascii():
+        return string
+    clusters: list[str] = []
+    for character in string:
+        if clusters and _is_combining(clusters[-1], character):
+            clusters[-1] += character
         else:
-            found.append(character)
-    return found
+            clusters.append(character)
+    return clusters
 
 
 def _is_combining(before: str, character: str) -> bool:
@@ -98,26 +100,26 @@ def _is_combining(before: str, character: str) -> bool:
     return unicodedata.category(character) in ("Mn", "Me", "Mc")
 
 
-def number(value: object, what: str) -> int | float:
+def number(value: object, label: str) -> int | float:
     """Return a value if it is a finite number.
 
     Args:
         value: Value to check.
-        what: Start of the error message: name of the block, marked for translation.
+        label: Start of the error message: name of the block, marked for translation.
 
     Raises:
         BehaviourError: The value is unknown or not a finite number.
     """
     if value is None:
         raise BehaviourError(
-            _("{what} can't run: one of its values isn't known yet.").format(what=_(what)), unknown=True
+            _("{what} can't run: one of its values isn't known yet.").format(what=_(label)), unknown=True
         )
     if not isinstance(value, (int, float)):
         raise BehaviourError(
-            _("{what} needs a number, not {value}.").format(what=_(what), value=type_name(value))
+            _("{what} needs a number, not {value}.").format(what=_(label), value=type_name(value))
         )
     if not math.isfinite(value):
-        raise BehaviourError(_("{what} needs a finite number.").format(what=_(what)))
+        raise BehaviourError(_("{what} needs a finite number.").format(what=_(label)))
     return value
 
 
@@ -159,8 +161,8 @@ def part(message: object, path: str) -> object:
         message: Payload of the message.
         path: Field path; "" for the whole message. The path ``value`` of a plain value is the value itself.
     """
-    found = _value_at(message, path)
-    return list(found) if isinstance(found, list) else found
+    value = _value_at(message, path)
+    return list(value) if isinstance(value, list) else value
 
 
 def _value_at(message: object, path: str) -> object:
@@ -170,10 +172,10 @@ def _value_at(message: object, path: str) -> object:
         return message[path]
     if path == "value" and not isinstance(message, (Mapping, list, tuple)):
         return message
-    found = message
+    value = message
     for name in path.split("."):
-        found = _member(found, name)
-    return found
+        value = _member(value, name)
+    return value
 
 
 def _member(value: object, name: str) -> object:

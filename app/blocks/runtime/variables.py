@@ -56,20 +56,20 @@ class VariableValue:
         }
 
     @classmethod
-    def from_json(cls, told: object) -> VariableValue | None:
+    def from_json(cls, decoded: object) -> VariableValue | None:
         """Create a value from the result of `to_json`; return None if the argument is not an object.
 
         Texts are truncated to their limits.
         """
-        if not isinstance(told, Mapping):
+        if not isinstance(decoded, Mapping):
             return None
-        items, length = told.get("items"), told.get("length")
-        kind = str(told.get("kind"))
-        known = kind in ("number", "text", "boolean", "list", "unknown", "other")
+        items, length = decoded.get("items"), decoded.get("length")
+        kind = str(decoded.get("kind"))
+        is_known = kind in ("number", "text", "boolean", "list", "unknown", "other")
         return cls(
-            str(told.get("id"))[:MAX_TEXT_LENGTH],
-            cast("ValueKind", kind) if known else "other",
-            str(told.get("text", ""))[: MAX_TEXT_LENGTH + 1],
+            str(decoded.get("id"))[:MAX_TEXT_LENGTH],
+            cast("ValueKind", kind) if is_known else "other",
+            str(decoded.get("text", ""))[: MAX_TEXT_LENGTH + 1],
             tuple(str(each)[: MAX_ITEM_LENGTH + 1] for each in items[:MAX_ITEMS])
             if isinstance(items, list)
             else (),
@@ -96,7 +96,7 @@ class VariableWatch:
 
         The first call returns all variables.
         """
-        found, characters = [], 0
+        changed, characters = [], 0
         for python, variable in self._variables.items():
             if characters > MAX_TOTAL_CHARACTERS:
                 break
@@ -104,15 +104,15 @@ class VariableWatch:
             if python in self._told and self._is_unchanged(python, value):
                 continue
             try:
-                told = display_value(variable.id, value)
+                displayed = display_value(variable.id, value)
             except RuntimeError:
                 continue  # a script is changing the value; the next read gets it
             self._seen[python] = _comparable(value)
-            if told != self._told.get(python):
-                self._told[python] = told
-                found.append(told)
-                characters += len(told.text) + sum(map(len, told.items))
-        return found
+            if displayed != self._told.get(python):
+                self._told[python] = displayed
+                changed.append(displayed)
+                characters += len(displayed.text) + sum(map(len, displayed.items))
+        return changed
 
     def set_value(self, python: str, value: str | float | bool) -> None:
         """Set a variable of the program.
@@ -125,10 +125,14 @@ class VariableWatch:
             self._names[python] = value
 
     def _is_unchanged(self, python: str, value: object) -> bool:
-        seen = self._seen.get(python)
+        last_seen = self._seen.get(python)
         if isinstance(value, list):
-            return isinstance(seen, tuple) and seen == _comparable(value) and all(map(_is_plain, seen[1]))
-        return seen is value and _is_plain(value)
+            return (
+                isinstance(last_seen, tuple)
+                and last_seen == _comparable(value)
+                and all(map(_is_plain, last_seen[1]))
+            )
+        return last_seen is value and _is_plain(value)
 
 
 def _comparable(value: object) -> object:
@@ -169,28 +173,28 @@ def short_text(value: object) -> str:
     return limited_text(value, MAX_TEXT_LENGTH)
 
 
-def limited_text(value: object, most: int) -> str:
+def limited_text(value: object, max_length: int) -> str:
     """Format a value as text of limited length; parts of the value that exceed the length aren't read.
 
     Args:
         value: Value.
-        most: Maximum number of characters.
+        max_length: Maximum number of characters.
     """
     if isinstance(value, str):
-        return _truncate(value[: most + 1], most)
+        return _truncate(value[: max_length + 1], max_length)
     if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > _MAX_PRINTED_BITS:
         about = round(value.bit_length() * 0.30103)
         return _("a number with about {count} digits").format(count=about)
     if isinstance(value, (list, tuple, Mapping)):
         parts: list[str] = []
-        left = most
+        remaining = max_length
         for part in _text_parts(value, 0):
             parts.append(part)
-            left -= len(part)
-            if left < 0:
+            remaining -= len(part)
+            if remaining < 0:
                 break
-        return _truncate("".join(parts), most)
-    return _truncate(values.text(value), most)
+        return _truncate("".join(parts), max_length)
+    return _truncate(values.text(value), max_length)
 
 
 def _text_parts(value: object, depth: int) -> Iterator[str]:
@@ -207,15 +211,15 @@ def _bracketed_parts(begin: str, end: str, parts: Iterator[tuple[str, object]], 
         yield _ELLIPSIS
         return
     yield begin
-    for place, (name, each) in enumerate(parts):
-        yield (", " if place else "") + name[:MAX_ITEM_LENGTH]
-        if place >= MAX_ITEMS:
+    for index, (name, value) in enumerate(parts):
+        yield (", " if index else "") + name[:MAX_ITEM_LENGTH]
+        if index >= MAX_ITEMS:
             yield _ELLIPSIS
             break
-        yield from _text_parts(each, depth + 1)
+        yield from _text_parts(value, depth + 1)
     yield end
 
 
-def _truncate(text: str, most: int) -> str:
+def _truncate(text: str, max_length: int) -> str:
     text = text.replace("\n", " ")
-    return text if len(text) <= most else text[: most - 1] + _ELLIPSIS
+    return text if len(text) <= max_length else text[: max_length - 1] + _ELLIPSIS

@@ -29,14 +29,14 @@ class Catalogue:
         self.absent: Mapping[str, Robot] = {
             robot.name: robot for robot in absent if robot.name not in self.connected
         }
-        known = (*self.connected.values(), *self.absent.values())
+        robots_with_absent = (*self.connected.values(), *self.absent.values())
         self.blocks: dict[str, Block] = {}
         for category in categories():
             for block in category.blocks:
                 self.blocks[block.type] = block
-        for robot in known:
+        for robot in robots_with_absent:
             for category in categories():
-                for block in category.make_blocks(robot, known) if category.make_blocks else ():
+                for block in category.make_blocks(robot, robots_with_absent) if category.make_blocks else ():
                     self.blocks.setdefault(block.type, block)
 
 
@@ -53,8 +53,8 @@ def _translated_categories(_language: str) -> tuple[Category, ...]:
 @lru_cache(maxsize=1)
 def english_categories() -> tuple[Category, ...]:
     """Return all categories in the order of the toolbox, in English."""
-    found = discover("app.blocks.categories", "CATEGORY", Category)
-    return tuple(sorted(found.values(), key=lambda category: (category.order, category.name)))
+    discovered = discover("app.blocks.categories", "CATEGORY", Category)
+    return tuple(sorted(discovered.values(), key=lambda category: (category.order, category.name)))
 
 
 def is_translatable(english: str) -> bool:

@@ -42,12 +42,12 @@ def editor_definitions(
 
 def _toolbox(catalogue: Catalogue) -> dict[str, object]:
     contents: list[Mapping[str, object]] = [{"kind": "blocksHeading", "name": _("Blocks")}]
-    known = (*catalogue.connected.values(), *catalogue.absent.values())
+    all_robots = (*catalogue.connected.values(), *catalogue.absent.values())
     groups = {
         robot.name: [
             group
             for category in categories()
-            for group in (category.make_groups(robot, known) if category.make_groups else ())
+            for group in (category.make_groups(robot, all_robots) if category.make_groups else ())
         ]
         for robot in catalogue.connected.values()
     }
@@ -66,8 +66,8 @@ def _heading(robot: Robot, *, connected: bool) -> dict[str, object]:
 def _category(category: Category, groups: Mapping[str, Sequence[Group]]) -> dict[str, object]:
     contents: list[Mapping[str, object]] = []
     if category.button is not None:
-        words, key = category.button
-        contents.append({"kind": "button", "text": words, "callbackkey": key})
+        button_text, key = category.button
+        contents.append({"kind": "button", "text": button_text, "callbackkey": key})
     parts = [each for each in categories() if category.name in (each.name, each.parent)]
     for part in parts:
         if part is not category:
@@ -75,8 +75,8 @@ def _category(category: Category, groups: Mapping[str, Sequence[Group]]) -> dict
         contents += _category_contents(part)
     if any(block.shape == "hat" for block in category.blocks):
         contents += _robot_hats(groups)
-    made = _entry(category.name, category.title, category.style, category.icon, contents)
-    return made | {"dynamic": category.dynamic} if category.dynamic else made
+    entry = _entry(category.name, category.title, category.style, category.icon, contents)
+    return entry | {"dynamic": category.dynamic} if category.dynamic else entry
 
 
 def _category_contents(category: Category) -> Iterator[Mapping[str, object]]:
@@ -89,8 +89,10 @@ def _category_contents(category: Category) -> Iterator[Mapping[str, object]]:
 
 def _robot_hats(groups: Mapping[str, Sequence[Group]]) -> list[Mapping[str, object]]:
     contents: list[Mapping[str, object]] = []
-    for robot, its in groups.items():
-        hats = [_block(entry) for group in its for entry in group.entries if entry.block.shape == "hat"]
+    for robot, robot_groups in groups.items():
+        hats = [
+            _block(entry) for group in robot_groups for entry in group.entries if entry.block.shape == "hat"
+        ]
         if hats:
             contents += [{"kind": "label", "text": robot}, *hats]
     return contents
@@ -99,8 +101,8 @@ def _robot_hats(groups: Mapping[str, Sequence[Group]]) -> list[Mapping[str, obje
 def _group(robot: Robot, group: Group) -> dict[str, object]:
     contents = [_block(entry) for entry in group.entries]
     title = translate("category", group.title)
-    made = _entry(f"{robot.name}: {group.title}", title, group.style, group.icon, contents)
-    return made | {"robot": robot.name}
+    definition = _entry(f"{robot.name}: {group.title}", title, group.style, group.icon, contents)
+    return definition | {"robot": robot.name}
 
 
 def _block(entry: ToolboxEntry) -> Mapping[str, object]:

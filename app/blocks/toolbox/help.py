@@ -145,9 +145,9 @@ def help_of(block: Block) -> dict[str, object]:
     (search words in both languages) and ``choices`` (options of the drop-downs).
     """
     gaps = [
-        [slot_name(block, argument), words]
+        [slot_name(block, argument), accepted_values]
         for argument in block.arguments
-        if (words := _argument_text(block, argument))
+        if (accepted_values := _argument_text(block, argument))
     ]
     return {
         "title": title(block),
@@ -163,8 +163,8 @@ def help_of(block: Block) -> dict[str, object]:
 
 
 def _example(block: Block) -> str:
-    told = EXAMPLES.get(block.type)
-    return _(told) if told else _("For example: {block}.").format(block=_block_with_defaults(block))
+    example = EXAMPLES.get(block.type)
+    return _(example) if example else _("For example: {block}.").format(block=_block_with_defaults(block))
 
 
 def title(block: Block) -> str:
@@ -184,18 +184,22 @@ def name(block: Block) -> str:
 
     The robot slot and a unit after the last slot are left out. Returns "" if the block contains no words.
     """
-    words = [part.strip() for part in _PLACEHOLDER.split(block.text.removeprefix("%ROBOT "))[::2]]
-    if len(words) > 1 and len(words[-1]) <= _MAX_UNIT_LENGTH:
-        words[-1] = ""
-    told = re.sub(r"\s*…[\s…]*", " … ", "…".join(words)).strip().removesuffix(" …")
-    return told if sum(letter.isalpha() for letter in told) >= _MAX_UNIT_LENGTH - 1 and told != "…" else ""
+    text_parts = [part.strip() for part in _PLACEHOLDER.split(block.text.removeprefix("%ROBOT "))[::2]]
+    if len(text_parts) > 1 and len(text_parts[-1]) <= _MAX_UNIT_LENGTH:
+        text_parts[-1] = ""
+    block_name = re.sub(r"\s*…[\s…]*", " … ", "…".join(text_parts)).strip().removesuffix(" …")
+    return (
+        block_name
+        if sum(letter.isalpha() for letter in block_name) >= _MAX_UNIT_LENGTH - 1 and block_name != "…"
+        else ""
+    )
 
 
 def slot_name(block: Block, argument: Argument) -> str:
     """Return the display name of a slot or field."""
-    told = block.about.get(argument.name)
-    if told:
-        return told[0]
+    gap_texts = block.about.get(argument.name)
+    if gap_texts:
+        return gap_texts[0]
     return translate("gap", english_slot_name(argument))
 
 
@@ -205,11 +209,11 @@ def english_slot_name(argument: Argument) -> str:
 
 
 def _argument_text(block: Block, argument: Argument) -> str:
-    words = _kind_text(argument)
-    told = block.about.get(argument.name)
-    if words and told and told[1]:
-        return _("{kind}, {more}").format(kind=words, more=told[1])
-    return words
+    kind_text = _kind_text(argument)
+    gap_texts = block.about.get(argument.name)
+    if kind_text and gap_texts and gap_texts[1]:
+        return _("{kind}, {more}").format(kind=kind_text, more=gap_texts[1])
+    return kind_text
 
 
 def _kind_text(argument: Argument) -> str:
@@ -221,9 +225,9 @@ def _kind_text(argument: Argument) -> str:
         return _choice_text(argument)
     if isinstance(argument, NumberField):
         return _number_text(argument)
-    for kind, words in _FIELD_TEXTS.items():
+    for kind, field_text in _FIELD_TEXTS.items():
         if isinstance(argument, kind):
-            return _(words)
+            return _(field_text)
     return ""
 
 
@@ -241,16 +245,16 @@ _FIELD_TEXTS: Mapping[type[Argument], str] = {
 
 
 def _value_text(gap: ValueInput) -> str:
-    words = _(_TYPE_TEXTS.get(gap.check or "", _ANY_TYPE_TEXT))
+    value_text = _(_TYPE_TEXTS.get(gap.check or "", _ANY_TYPE_TEXT))
     if isinstance(gap.default, (int, float)) and not isinstance(gap.default, bool):
-        words = _("{kind}; {value} by default").format(kind=words, value=f"{gap.default:g}")
+        value_text = _("{kind}; {value} by default").format(kind=value_text, value=f"{gap.default:g}")
     if gap.only_if is None:
-        return words
-    return _("{kind}; used only if you choose an item by its number").format(kind=words)
+        return value_text
+    return _("{kind}; used only if you choose an item by its number").format(kind=value_text)
 
 
 def _choice_text(field: ChoiceField) -> str:
-    names = [f"“{words}”" for words, _value in field.options]
+    names = [f"“{option_text}”" for option_text, _value in field.options]
     if len(names) > _MAX_CHOICES:
         few = ", ".join(names[: _MAX_CHOICES - 1])
         return _("one of {count} choices: {few} and others").format(count=len(names), few=few)
@@ -259,7 +263,7 @@ def _choice_text(field: ChoiceField) -> str:
 
 def _choice_texts(block: Block) -> list[str]:
     fields = [each for each in block.arguments if isinstance(each, ChoiceField) and each.name != "ROBOT"]
-    return [words for field in fields for words, _value in field.options]
+    return [option_text for field in fields for option_text, _value in field.options]
 
 
 def _number_text(field: NumberField) -> str:
@@ -278,6 +282,6 @@ def _block_with_defaults(block: Block) -> str:
 
 def _blocks_for_text(block: Block) -> dict[str, Block]:
     number = Block("values_number", "%NUMBER", "value", "", "", "", "", (NumberField("NUMBER"),))
-    words = Block("values_text", "%TEXT", "value", "", "", "", "", (TextField("TEXT"),))
+    text_block = Block("values_text", "%TEXT", "value", "", "", "", "", (TextField("TEXT"),))
     variable = Block("variables_get", "%VAR", "value", "", "", "", "", (VariableField("VAR"),))
-    return {each.type: each for each in (number, words, variable, block)}
+    return {each.type: each for each in (number, text_block, variable, block)}

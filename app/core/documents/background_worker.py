@@ -29,10 +29,10 @@ class BackgroundWorker(Generic[T]):
         self._thread: threading.Thread | None = None
         self._closed = False
 
-    def submit(self, owner: str, work: Callable[[], T]) -> None:
+    def submit(self, owner: str, job: Callable[[], T]) -> None:
         """Queue a job for an owner; a pending job of the same owner is discarded."""
         with self._changed:
-            self._pending[owner] = work
+            self._pending[owner] = job
             if self._thread is None and not self._closed:
                 self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
                 start_deep(self._thread)
@@ -82,9 +82,9 @@ class BackgroundWorker(Generic[T]):
                 if self._closed:
                     return
                 owner = self._current_owner = next(iter(self._pending))
-                work = self._pending.pop(owner)
+                job = self._pending.pop(owner)
             try:
-                result = work()
+                result = job()
             except Exception as error:  # noqa: BLE001  raised in the thread that takes the result
                 with self._changed:
                     self._done.pop(owner, None)

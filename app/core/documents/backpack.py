@@ -112,8 +112,8 @@ class Backpack:
         # Newer than all existing stacks, even if the clock was set back.
         newest = max([self._clock(), *(item.at + len(blocks) * _MIN_TIME_STEP_S for item in self.items[:1])])
         items = [
-            BackpackStack(uuid4().hex, newest - place * _MIN_TIME_STEP_S, each)
-            for place, each in enumerate(blocks)
+            BackpackStack(uuid4().hex, newest - index * _MIN_TIME_STEP_S, each)
+            for index, each in enumerate(blocks)
         ]
         self.restore(items)
         return items
@@ -128,14 +128,14 @@ class Backpack:
 
     def remove(self, ids: Sequence[str]) -> list[BackpackStack]:
         """Remove the stacks with these ids; return the removed stacks. Raises BackpackError."""
-        gone: list[BackpackStack] = []
+        removed: list[BackpackStack] = []
 
-        def filter_stacks(found: tuple[BackpackStack, ...]) -> tuple[BackpackStack, ...]:
-            gone.extend(item for item in found if item.id in ids)
-            return tuple(item for item in found if item.id not in ids)
+        def filter_stacks(stacks: tuple[BackpackStack, ...]) -> tuple[BackpackStack, ...]:
+            removed.extend(item for item in stacks if item.id in ids)
+            return tuple(item for item in stacks if item.id not in ids)
 
         self._update_items(filter_stacks)
-        return gone
+        return removed
 
     def empty(self) -> list[BackpackStack]:
         """Remove and return all stacks that this version can read. Raises BackpackError."""
@@ -145,30 +145,30 @@ class Backpack:
 
     def _update_items(self, change: Callable[[tuple[BackpackStack, ...]], tuple[BackpackStack, ...]]) -> None:
         with locked(self.path):
-            found = self._read()
-            now = _Content(_sort_newest_first(change(found.items)), found.unknown_entries)
-            if _ids(now) != _ids(found):
-                self._write(now, grows=len(now.items) > len(found.items))
+            content = self._read()
+            now = _Content(_sort_newest_first(change(content.items)), content.unknown_entries)
+            if _ids(now) != _ids(content):
+                self._write(now, grows=len(now.items) > len(content.items))
             self._apply(now)
 
-    def _apply(self, found: _Content) -> None:
-        if _ids(found) != _ids(self._known):
+    def _apply(self, content: _Content) -> None:
+        if _ids(content) != _ids(self._known):
             self.revision += 1
-        self._known = found
+        self._known = content
         self._stamp = _stamp(self.path)
 
-    def _write(self, found: _Content, *, grows: bool) -> None:
-        if grows and len(found.items) > MAX_STACKS:
+    def _write(self, content: _Content, *, grows: bool) -> None:
+        if grows and len(content.items) > MAX_STACKS:
             raise BackpackError(
                 _("the backpack can hold at most {most} stacks; remove something first").format(
                     most=MAX_STACKS
                 )
             )
-        whole = {
+        document = {
             "backpack": VERSION,
-            "items": [*(item.to_json() for item in found.items), *found.unknown_entries],
+            "items": [*(item.to_json() for item in content.items), *content.unknown_entries],
         }
-        data = deep_json.dumps(whole, ascii=True).encode()
+        data = deep_json.dumps(document, ascii=True).encode()
         if grows and len(data) > MAX_BYTES:
             raise BackpackError(
                 _("the backpack can hold at most {most} MB; remove something first").format(
@@ -197,14 +197,14 @@ class Backpack:
                 )
             ) from error
         try:
-            whole = deep_json.loads(data)
+            document = deep_json.loads(data)
         except (ValueError, RecursionError):
             return self._rename_damaged_file()
-        if isinstance(whole, dict) and _is_newer(whole.get("backpack")):
+        if isinstance(document, dict) and _is_newer(document.get("backpack")):
             return self._switch_to_own_file()
-        if not isinstance(whole, dict) or whole.get("backpack") != VERSION:
+        if not isinstance(document, dict) or document.get("backpack") != VERSION:
             return self._rename_damaged_file()
-        entries = whole.get("items")
+        entries = document.get("items")
         if not isinstance(entries, list):
             return self._rename_damaged_file()
         parsed = [(entry, _parse_stack(entry)) for entry in entries]
@@ -236,13 +236,13 @@ class Backpack:
 
     def _rename_damaged_file(self) -> _Content:
         # The damaged file is kept under another name.
-        place = self.path.with_name(f"{self.path.stem}.damaged.json")
-        again = 2
-        while place.exists():
-            place = self.path.with_name(f"{self.path.stem}.damaged-{again}.json")
-            again += 1
+        path = self.path.with_name(f"{self.path.stem}.damaged.json")
+        attempt = 2
+        while path.exists():
+            path = self.path.with_name(f"{self.path.stem}.damaged-{attempt}.json")
+            attempt += 1
         try:
-            replace_file(self.path, place)
+            replace_file(self.path, path)
         except OSError as error:
             raise BackpackError(
                 _("can't read the backpack from '{path}': {reason}").format(
@@ -251,15 +251,15 @@ class Backpack:
             ) from error
         self._report_once(
             _("the backpack is damaged, so a new one was created; the old one is in '{path}'").format(
-                path=place
+                path=path
             )
         )
         return _Content()
 
-    def _report_once(self, sentence: str) -> None:
+    def _report_once(self, problem: str) -> None:
         # Once: a persistent problem is not repeated at each read.
-        if sentence != self._reported:
-            self._problem = self._reported = sentence
+        if problem != self._reported:
+            self._problem = self._reported = problem
 
 
 def _is_newer(version: object) -> bool:
@@ -270,20 +270,25 @@ def _sort_newest_first(items: Iterable[BackpackStack]) -> tuple[BackpackStack, .
     return tuple(sorted(items, key=lambda item: (-item.at, item.id)))
 
 
-def _ids(found: _Content) -> list[str]:
+def _ids(content: _Content) -> list[str]:
     # Identifies the content: a stack in the backpack never changes.
-    return [item.id for item in found.items]
+    return [item.id for item in content.items]
 
 
 def _parse_stack(entry: object) -> BackpackStack | None:
     if not isinstance(entry, Mapping):
         return None
-    id, at, block = entry.get("id"), entry.get("at"), entry.get("block")
-    if not isinstance(id, str) or not id or not isinstance(at, int | float) or not math.isfinite(at):
+    id, added_s, block = entry.get("id"), entry.get("at"), entry.get("block")
+    if (
+        not isinstance(id, str)
+        or not id
+        or not isinstance(added_s, int | float)
+        or not math.isfinite(added_s)
+    ):
         return None
     if not isinstance(block, Mapping) or not isinstance(block.get("type"), str):
         return None
-    return BackpackStack(id, float(at), block)
+    return BackpackStack(id, float(added_s), block)
 
 
 def _stamp(path: Path) -> Stamp | None:

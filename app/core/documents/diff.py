@@ -30,12 +30,12 @@ class Difference:
     """True if the same blocks are arranged differently."""
 
 
-def difference(then: Workspace, now: Workspace) -> Difference:
+def difference(earlier: Workspace, now: Workspace) -> Difference:
     """Return the difference between an earlier and the current state, comparing blocks by id.
 
     Numbers and texts in the slots of a block count as part of that block.
     """
-    old, new = (dict(_blocks(workspace)) for workspace in (then, now))
+    old, new = (dict(_blocks(workspace)) for workspace in (earlier, now))
     stayed = old.keys() & new.keys()
     result = Difference(
         len(old),
@@ -43,14 +43,14 @@ def difference(then: Workspace, now: Workspace) -> Difference:
         removed=len(old.keys() - new.keys()),
         changed=sum(old[id] != new[id] for id in stayed),
     )
-    if result != Difference(len(old)) or _are_equal(then, now):
+    if result != Difference(len(old)) or _are_equal(earlier, now):
         return result
     return Difference(len(old), is_rearranged=True)
 
 
-def _are_equal(then: Workspace, now: Workspace) -> bool:
+def _are_equal(earlier: Workspace, now: Workspace) -> bool:
     try:
-        return deep_json.are_equal(then, now)
+        return deep_json.are_equal(earlier, now)
     except RecursionError:
         return False
 
@@ -63,13 +63,14 @@ def _blocks(workspace: Workspace) -> Iterator[tuple[str, object]]:
 
 
 def _content(block: PlacedBlock) -> object:
-    inside = {
-        name: [_content(inner) for inner in held if inner.shadow] for name, held in block.inputs.items()
+    shadow_contents = {
+        name: [_content(inner) for inner in inner_blocks if inner.shadow]
+        for name, inner_blocks in block.inputs.items()
     }
     return (
         block.type,
         dict(block.fields),
         block.enabled,
         dict(block.extra_state),
-        {k: v for k, v in inside.items() if v},
+        {k: v for k, v in shadow_contents.items() if v},
     )

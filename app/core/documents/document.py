@@ -160,8 +160,8 @@ class Document:
         The behaviour stays unsaved: its content is written to a new journal before the old journal is
         deleted.
         """
-        found = BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots, unsaved.unknown_fields)
-        self._replace(found, unsaved.path)
+        recovered = BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots, unsaved.unknown_fields)
+        self._replace(recovered, unsaved.path)
         now = stamp_of(unsaved.path) if unsaved.path is not None else None
         if now is not None and now[0] <= unsaved.edited_s * 1e9:
             self._stamp = now  # the file was not changed after that work
@@ -194,20 +194,20 @@ class Document:
 
         If DocumentError is raised, nothing is changed.
         """
-        wanted = name.strip()
-        problem = name_problem(wanted, self.path)
+        new_name = name.strip()
+        problem = name_problem(new_name, self.path)
         if problem:
             raise DocumentError(self.path, problem)
-        new = renamed_path(self.path, wanted) if self.path is not None else None
+        new = renamed_path(self.path, new_name) if self.path is not None else None
         if self.path is not None and new is not None and new != self.path:
             changed = self.is_changed_externally
             rename_file(self.path, new)
             rename_versions(self.path, new)
             self.path = new
             self._stamp = self._stamp if changed else stamp_of(new)
-        elif self.path is not None and wanted != self.name:
+        elif self.path is not None and new_name != self.name:
             self.dirty = True  # in Studio's own folder the name is in the file
-        self.name = wanted
+        self.name = new_name
         self._compiled = self._compiling_key = None  # a program contains the name
         if self.dirty:
             self._write_journal()
@@ -234,11 +234,11 @@ class Document:
         Returns:
             False if no block uses the missing robot.
         """
-        known = next((each for each in self._known_robots() if each.name == missing), None)
-        if known is None or not blocks_of(self.workspace, missing):
+        missing_robot = next((each for each in self._known_robots() if each.name == missing), None)
+        if missing_robot is None or not blocks_of(self.workspace, missing):
             return False
         workspace = deep_json.run_deep(
-            lambda: with_robot_replaced(self.workspace, missing, known.model, robot)
+            lambda: with_robot_replaced(self.workspace, missing, missing_robot.model, robot)
         )
         self.apply_edit(workspace)
         self.fixes += 1
@@ -323,16 +323,16 @@ class Document:
     @property
     def absent_robots(self) -> tuple[Robot, ...]:
         """Robots that the behaviour uses and that are not connected."""
-        there = {robot.name for robot in self._connected}
-        return tuple(robot for robot in self._known_robots() if robot.name not in there)
+        connected_names = {robot.name for robot in self._connected}
+        return tuple(robot for robot in self._known_robots() if robot.name not in connected_names)
 
     def program(self) -> Program:
         """Return the compiled program of the behaviour, cached until the next edit."""
         key = self._key()
         if self._compiled is None or self._compiled[0] != key:
-            began = self._timer()
+            started_s = self._timer()
             self._compiled = (key, self._compile_job()())
-            self._compile_s = self._timer() - began
+            self._compile_s = self._timer() - started_s
         return self._compiled[1]
 
     def compile_trial(self, stack: Stack) -> Program | None:
@@ -356,9 +356,9 @@ class Document:
             return self._compiled[1]
         if self.compiler is None:
             return self.program()
-        done = self.compiler.pop_result(self.key)
-        if done is not None:
-            self._compiled, self._compile_s = (done.key, done.program), done.compile_s
+        compiled = self.compiler.pop_result(self.key)
+        if compiled is not None:
+            self._compiled, self._compile_s = (compiled.key, compiled.program), compiled.compile_s
         if self._compiling_key != key:
             if self._is_quick_to_compile():
                 return self.program()
@@ -391,12 +391,12 @@ class Document:
 
     # -- private ---------------------------------------------------------------------------------------------
 
-    def _replace(self, found: BehaviourFile, path: Path | None) -> None:
+    def _replace(self, behaviour_file: BehaviourFile, path: Path | None) -> None:
         self._discard_journal()
         self._journal = self._make_journal()
-        self.name = name_of(path, found.name) if path is not None else found.name
-        self.path, self.workspace = path, found.workspace
-        self.robots, self.others = dict(found.robots), found.unknown_fields
+        self.name = name_of(path, behaviour_file.name) if path is not None else behaviour_file.name
+        self.path, self.workspace = path, behaviour_file.workspace
+        self.robots, self.others = dict(behaviour_file.robots), behaviour_file.unknown_fields
         self._compile_s = self._compiling_key = None
         self.dirty = False
         self.saved_at = self._stamp = None
@@ -405,11 +405,11 @@ class Document:
 
     def _write_journal(self) -> None:
         name, path, robots = self.name, self.path, dict(self.robots)
-        work = partial(_write_entry, self._journal, name, path, self._json, robots, self.others)
+        write_job = partial(_write_entry, self._journal, name, path, self._json, robots, self.others)
         if self.journal_writer is not None:
-            self.journal_writer.submit(self._journal.name, work)
+            self.journal_writer.submit(self._journal.name, write_job)
         else:
-            self._apply_journal_result(work)
+            self._apply_journal_result(write_job)
 
     def _apply_journal_result(self, written: Callable[[], bool | None]) -> None:
         # Applies the result of writing the journal; None means not finished.
@@ -447,9 +447,9 @@ class Document:
     def _known_robots(self) -> list[Robot]:
         before, self._read = self._read, {}
         for name, description in self.robots.items():
-            known = before.get(name)
-            is_known = known is not None and _are_equal(known[0], description)
-            self._read[name] = known if known and is_known else (description, _parse_robot(description))
+            previous = before.get(name)
+            is_known = previous is not None and _are_equal(previous[0], description)
+            self._read[name] = previous if previous and is_known else (description, _parse_robot(description))
         return [robot for _description, robot in self._read.values() if robot is not None]
 
 
@@ -457,21 +457,23 @@ def _write_entry(
     journal: Journal,
     name: str,
     path: Path | None,
-    told: WorkspaceJson,
+    workspace_json: WorkspaceJson,
     robots: Descriptions,
     others: Mapping[str, object],
 ) -> bool:
-    journal.write(name, path, told.text, robots, others)
+    journal.write(name, path, workspace_json.text, robots, others)
     return True
 
 
 def _compile_timed(key: Key, compiling: Callable[[], Program], timer: Callable[[], float]) -> CompiledProgram:
-    began = timer()
-    return CompiledProgram(key, compiling(), timer() - began)
+    started_s = timer()
+    return CompiledProgram(key, compiling(), timer() - started_s)
 
 
-def _compile(told: WorkspaceJson, robots: Sequence[Robot], absent: Sequence[Robot], name: str) -> Program:
-    return compile_behaviour(told.blocks, robots, absent=absent, name=name)
+def _compile(
+    workspace_json: WorkspaceJson, robots: Sequence[Robot], absent: Sequence[Robot], name: str
+) -> Program:
+    return compile_behaviour(workspace_json.blocks, robots, absent=absent, name=name)
 
 
 def _are_equal(one: Mapping[str, object], other: Mapping[str, object]) -> bool:
@@ -493,5 +495,5 @@ def read(path: Path) -> tuple[str, Workspace, Descriptions]:
 
     Raises DocumentError with advice for the user.
     """
-    found = read_file(path)
-    return found.name, found.workspace, found.robots
+    behaviour_file = read_file(path)
+    return behaviour_file.name, behaviour_file.workspace, behaviour_file.robots

@@ -67,27 +67,27 @@ def example_block_ids() -> frozenset[str]:
     )
 
 
-def _translate_value(value: object, say: TranslateText, label: Callable[[str], str]) -> object:
+def _translate_value(value: object, translate_text: TranslateText, label: Callable[[str], str]) -> object:
     # A part of the blocks in Blockly's format.
     if isinstance(value, list):
-        return [_translate_value(each, say, label) for each in value]
+        return [_translate_value(each, translate_text, label) for each in value]
     if not isinstance(value, Mapping):
         return value
-    result = {key: _translate_value(each, say, label) for key, each in value.items()}
+    result = {key: _translate_value(each, translate_text, label) for key, each in value.items()}
     kind, fields = result.get("type"), result.get("fields")
     if kind == "values_text" and isinstance(fields, dict) and _has_letters(fields.get("TEXT")):
-        fields["TEXT"] = say(TEXT, str(fields["TEXT"]))
+        fields["TEXT"] = translate_text(TEXT, str(fields["TEXT"]))
     if str(kind).startswith("functions_define") and isinstance(fields, dict):
         fields["NAME"] = label(str(fields["NAME"]))
     for note in _nested_dicts(result.get("workspaceComments")):
-        note["text"] = say(NOTE, str(note.get("text", "")))
+        note["text"] = translate_text(NOTE, str(note.get("text", "")))
     for variable in _nested_dicts(result.get("variables")):
         variable["name"] = label(str(variable["name"]))
     state = result.get("extraState")
     if isinstance(state, dict):
-        for named in (state, *_nested_dicts(state.get("inputs"))):
-            if "name" in named:
-                named["name"] = label(str(named["name"]))
+        for named_entry in (state, *_nested_dicts(state.get("inputs"))):
+            if "name" in named_entry:
+                named_entry["name"] = label(str(named_entry["name"]))
     return result
 
 

@@ -56,11 +56,11 @@ def read_file(path: Path, name: str = "") -> BehaviourFile:
     try:
         data = read_regular_file(path)
     except OSError as error:
-        words = _("can't read {file} ({reason})")
-        raise DocumentError(path, words.format(file=name, reason=error.strerror or error)) from error
+        message = _("can't read {file} ({reason})")
+        raise DocumentError(path, message.format(file=name, reason=error.strerror or error)) from error
     except ValueError as error:  # characters that no file name can have here
-        words = _("can't read {file} (file names like this aren't allowed here)")
-        raise DocumentError(path, words.format(file=name)) from error
+        message = _("can't read {file} (file names like this aren't allowed here)")
+        raise DocumentError(path, message.format(file=name)) from error
     return parse_file(data, path, name)
 
 
@@ -91,9 +91,9 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
         raise DocumentError(path, _("{file} has no blocks").format(file=name), _(OPEN_EARLIER_ADVICE))
     described = {str(name): td for name, td in robots.items() if isinstance(td, dict)}
     others = {name: value for name, value in content.items() if name not in KNOWN_FIELDS}
-    called = content.get("name")
+    saved_name = content.get("name")
     return BehaviourFile(
-        called if isinstance(called, str) and called else path.stem, workspace, described, others
+        saved_name if isinstance(saved_name, str) and saved_name else path.stem, workspace, described, others
     )
 
 
@@ -121,23 +121,23 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
     try:
         data = encode_file(behaviour)
         if len(data) > MAX_BYTES:
-            size, most = len(data) / 1e6, MAX_BYTES / 1e6
+            size, limit_mb = len(data) / 1e6, MAX_BYTES / 1e6
             template = _("{file} would be {size} MB").format(file=path.name, size=number(size, ".1f"))
-            advice = _("the limit is {most} MB; use smaller images").format(most=number(most, ".0f"))
+            advice = _("the limit is {most} MB; use smaller images").format(most=number(limit_mb, ".0f"))
             raise DocumentError(path, template, advice)
         write_atomically(path, data)
     except RecursionError as error:
-        words = _("can't write {file}: {reason}").format(file=path.name, reason=_(TOO_DEEP_MESSAGE))
-        raise DocumentError(path, words, _(SPLIT_ADVICE)) from error
+        message = _("can't write {file}: {reason}").format(file=path.name, reason=_(TOO_DEEP_MESSAGE))
+        raise DocumentError(path, message, _(SPLIT_ADVICE)) from error
     except OSError as error:
         reason = error.strerror or str(error)
-        words = _("can't write {file} ({reason})").format(file=path.name, reason=reason)
+        message = _("can't write {file} ({reason})").format(file=path.name, reason=reason)
         advice = (
             _("free some space or choose another folder")
             if error.errno in DISK_FULL_ERRNOS
             else _("save it in another folder")
         )
-        raise DocumentError(path, words, advice) from error
+        raise DocumentError(path, message, advice) from error
 
 
 def file_type_hint() -> str:

@@ -41,17 +41,19 @@ def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[Fold
     Hidden entries are omitted. Raises OSError.
     """
     entries = []
-    with os.scandir(folder) as found:
-        for each in found:
-            if each.name.startswith("."):
+    with os.scandir(folder) as dir_entries:
+        for dir_entry in dir_entries:
+            if dir_entry.name.startswith("."):
                 continue
             try:
-                facts = each.stat()
+                file_stat = dir_entry.stat()
             except OSError:
                 continue  # a broken link, or deleted meanwhile
-            is_folder = stat.S_ISDIR(facts.st_mode)
-            if is_folder or each.name.lower().endswith(endings):
-                entries.append(FolderEntry(Path(each.path), is_folder, facts.st_mtime, facts.st_size))
+            is_folder = stat.S_ISDIR(file_stat.st_mode)
+            if is_folder or dir_entry.name.lower().endswith(endings):
+                entries.append(
+                    FolderEntry(Path(dir_entry.path), is_folder, file_stat.st_mtime, file_stat.st_size)
+                )
             if len(entries) == MAX_ENTRIES:
                 break
     return tuple(entries)
@@ -59,9 +61,9 @@ def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[Fold
 
 def name_problem(name: str) -> str:
     """Return the reason why a file or folder can't have this name; "" if the name is valid."""
-    bad = INVALID_CHARACTERS.search(name)
-    if bad:
-        return _("A name can't contain “{sign}”.").format(sign=bad[0])
+    invalid = INVALID_CHARACTERS.search(name)
+    if invalid:
+        return _("A name can't contain “{sign}”.").format(sign=invalid[0])
     if name.startswith("."):
         return _("A name that begins with a full stop hides the file.")
     if RESERVED_NAMES.fullmatch(name) or name.endswith((".", " ")):

@@ -89,8 +89,8 @@ class Journal:
             "robots": robots,
             "others": dict(others or {}),
         }
-        whole = f'{json.dumps(entry, ensure_ascii=False)[:-1]}, "workspace": {text}}}'
-        data = whole.encode("utf-8", "surrogatepass")
+        document = f'{json.dumps(entry, ensure_ascii=False)[:-1]}, "workspace": {text}}}'
+        data = document.encode("utf-8", "surrogatepass")
         write_atomically(self._file, data, durable=False, private=True)
 
     def discard(self) -> None:
@@ -106,19 +106,19 @@ def unsaved_work(folder: Path | None = None) -> list[UnsavedWork]:
     """Return the unsaved work of crashed sessions, newest first. Unreadable journals are left unchanged."""
     folder = folder if folder is not None else home() / "journal"
     make_private(folder, "*.json")
-    found = [_read(file) for file in folder.glob("*.json")] if folder.is_dir() else []
-    return sorted((entry for entry in found if entry is not None), key=lambda entry: -entry.edited_s)
+    entries = [_read(file) for file in folder.glob("*.json")] if folder.is_dir() else []
+    return sorted((entry for entry in entries if entry is not None), key=lambda entry: -entry.edited_s)
 
 
 def newer_work_names(folder: Path | None = None) -> list[str]:
     """Return the names of unsaved work in journals of a newer Studio, which are left unchanged."""
     folder = folder if folder is not None else home() / "journal"
-    found = []
+    names = []
     for file in folder.glob("*.json") if folder.is_dir() else ():
         entry = _read_entry(file)
         if entry is not None and _format_version(entry) > FORMAT_VERSION:
-            found.append(str(entry.get("name") or file.name))
-    return sorted(found)
+            names.append(str(entry.get("name") or file.name))
+    return sorted(names)
 
 
 def _read_entry(file: Path) -> dict[str, object] | None:
@@ -134,8 +134,8 @@ def _read_entry(file: Path) -> dict[str, object] | None:
 
 def _format_version(entry: Mapping[str, object]) -> int:
     # 1 for journals from before there were versions.
-    found = entry.get("format", 1)
-    return found if isinstance(found, int) else 1
+    version = entry.get("format", 1)
+    return version if isinstance(version, int) else 1
 
 
 def _read(file: Path) -> UnsavedWork | None:

@@ -64,9 +64,9 @@ class Documents:
 
     def open(self, path: Path) -> Document:
         """Open a file in a new tab, or switch to its tab. If DocumentError is raised, nothing has changed."""
-        there = self.find_by_path(path)
-        if there is not None:
-            return self._make_current(there)
+        open_document = self.find_by_path(path)
+        if open_document is not None:
+            return self._make_current(open_document)
         return self._open_with(lambda document: document.open(path))
 
     def open_example(self, path: Path) -> Document:
@@ -93,16 +93,16 @@ class Documents:
 
     def recover(self, unsaved: UnsavedWork) -> Document:
         """Restore unsaved work into the tab of its file, or into a new tab."""
-        there = self.find_by_path(unsaved.path) if unsaved.path is not None else None
-        if there is None or there.dirty:
+        open_document = self.find_by_path(unsaved.path) if unsaved.path is not None else None
+        if open_document is None or open_document.dirty:
             return self._open_with(lambda document: document.recover(unsaved))
-        there.recover(unsaved)
-        return self._make_current(there)
+        open_document.recover(unsaved)
+        return self._make_current(open_document)
 
     def find_by_path(self, path: Path) -> Document | None:
         """Return the open behaviour whose file is ``path``, or None."""
-        wanted = path.resolve()
-        return next((each for each in self._open if each.path and each.path.resolve() == wanted), None)
+        resolved = path.resolve()
+        return next((each for each in self._open if each.path and each.path.resolve() == resolved), None)
 
     def find_by_key(self, key: str) -> Document | None:
         """Return the open behaviour with this key, or None."""
@@ -124,11 +124,11 @@ class Documents:
         """Return the behaviour ``step`` tabs to the right of the current one, wrapping around at the ends."""
         return self._open[(self._open.index(self.current) + step) % len(self._open)]
 
-    def move(self, document: Document, place: int) -> None:
+    def move(self, document: Document, index: int) -> None:
         """Move a tab to an index, counted from 0."""
-        if document in self._open and self._open.index(document) != place:
+        if document in self._open and self._open.index(document) != index:
             self._open.remove(document)
-            self._open.insert(max(0, place), document)
+            self._open.insert(max(0, index), document)
             self.revision += 1
 
     def close(self, document: Document) -> None:
@@ -138,7 +138,7 @@ class Documents:
         """
         if document not in self._open:
             return
-        place = self._open.index(document)
+        index = self._open.index(document)
         if document.path is not None:
             self._closed = [*(each for each in self._closed if each != document.path), document.path]
             del self._closed[:-MAX_CLOSED_TABS]
@@ -148,7 +148,7 @@ class Documents:
         if not self._open:
             self._open.append(self._new_document())
         if document is self.current:
-            self.current = self._open[min(place, len(self._open) - 1)]
+            self.current = self._open[min(index, len(self._open) - 1)]
         self.revision += 1
 
     def reopen(self) -> Document | None:
@@ -225,60 +225,63 @@ class Documents:
             for each in self._open
             if not each.is_blank
         ]
-        shown = [each for each in self._open if not each.is_blank]
-        return {"tabs": tabs, "current": shown.index(self.current) if self.current in shown else 0}
+        saved_documents = [each for each in self._open if not each.is_blank]
+        return {
+            "tabs": tabs,
+            "current": saved_documents.index(self.current) if self.current in saved_documents else 0,
+        }
 
     def restore_tabs(
-        self, kept: Mapping[str, object], left: Iterable[UnsavedWork], *, ended_well: bool
+        self, tabs_state: Mapping[str, object], unsaved_work: Iterable[UnsavedWork], *, ended_well: bool
     ) -> set[Path]:
         """Restore the tabs of the last session; return the paths of the journals that were restored.
 
         Args:
-            kept: Result of `kept` in the last session.
-            left: Unsaved work found at the start.
+            tabs_state: Result of `tabs_state` in the last session.
+            unsaved_work: Unsaved work found at the start.
             ended_well: True if the last session ended normally; then unsaved work is restored without
                 asking.
         """
-        tabs, current = kept.get("tabs"), kept.get("current")
-        unsaved = {each.journal.name: each for each in left} if ended_well else {}
-        taken: set[Path] = set()
+        tabs, current = tabs_state.get("tabs"), tabs_state.get("current")
+        unsaved = {each.journal.name: each for each in unsaved_work} if ended_well else {}
+        restored: set[Path] = set()
         opened: dict[int, Document] = {}
         for number, tab in enumerate(tabs if isinstance(tabs, list) else ()):
             if not isinstance(tab, Mapping):
                 continue
-            found = unsaved.get(str(tab.get("journal")))
-            document = self._restore_tab(tab.get("path"), found)
+            entry = unsaved.get(str(tab.get("journal")))
+            document = self._restore_tab(tab.get("path"), entry)
             if document is not None:
                 opened[number] = document
-            if found is not None:
-                taken.add(found.journal)
+            if entry is not None:
+                restored.add(entry.journal)
         if isinstance(current, int) and current in opened:
             self.show(opened[current])
-        return taken
+        return restored
 
-    def arrange_tabs(self, kept: Mapping[str, object], recovered: Mapping[str, Document]) -> None:
+    def arrange_tabs(self, tabs_state: Mapping[str, object], recovered: Mapping[str, Document]) -> None:
         """Move recovered work to the positions of its tabs, and show the tab that was current.
 
         Tabs opened since the start are moved to the end.
 
         Args:
-            kept: Result of `kept` in the last session.
+            tabs_state: Result of `tabs_state` in the last session.
             recovered: Recovered documents by journal name.
         """
-        tabs, current = kept.get("tabs"), kept.get("current")
-        found: dict[int, Document] = {}
+        tabs, current = tabs_state.get("tabs"), tabs_state.get("current")
+        documents_by_tab: dict[int, Document] = {}
         for number, tab in enumerate(tabs if isinstance(tabs, list) else ()):
             if isinstance(tab, Mapping):
                 path = tab.get("path")
                 document = recovered.get(str(tab.get("journal")))
                 if document is None and isinstance(path, str):
                     document = self.find_by_path(Path(path))
-                if document is not None and document not in found.values():
-                    found[number] = document
-        placed = list(found.values())
-        self._open = [*placed, *(each for each in self._open if each not in placed)]
-        if isinstance(current, int) and current in found:
-            self.current = found[current]
+                if document is not None and document not in documents_by_tab.values():
+                    documents_by_tab[number] = document
+        ordered = list(documents_by_tab.values())
+        self._open = [*ordered, *(each for each in self._open if each not in ordered)]
+        if isinstance(current, int) and current in documents_by_tab:
+            self.current = documents_by_tab[current]
         self.revision += 1
 
     def _restore_tab(self, path: object, unsaved: UnsavedWork | None) -> Document | None:
@@ -308,9 +311,9 @@ class Documents:
         fill(document)
         return self._insert(document)
 
-    def _insert(self, made: Document) -> Document:
-        self._open.insert(self._open.index(self.current) + 1, made)
-        return self._make_current(made)
+    def _insert(self, document: Document) -> Document:
+        self._open.insert(self._open.index(self.current) + 1, document)
+        return self._make_current(document)
 
     def _make_current(self, document: Document) -> Document:
         self.current = document
@@ -322,10 +325,10 @@ class Documents:
         document.name = self._free_name(document.name, besides=document)
         return document
 
-    def _free_name(self, wanted: str, besides: Document | None = None) -> str:
+    def _free_name(self, base_name: str, besides: Document | None = None) -> str:
         names = {each.name.casefold() for each in self._open if each is not besides}
-        number, name = 2, wanted
+        number, name = 2, base_name
         while name.casefold() in names:
-            name = f"{wanted} {number}"
+            name = f"{base_name} {number}"
             number += 1
         return name

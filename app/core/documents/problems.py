@@ -73,29 +73,31 @@ def problem_lines(
         virtual_models: Models that are available as virtual robots.
         absent: Ids of the disabled blocks (`Program.absent`).
     """
-    found: list[ProblemLine] = []
-    place: dict[str, int] = {}
+    lines: list[ProblemLine] = []
+    line_indexes: dict[str, int] = {}
     grey = block_counts_by_robot(workspace, absent)
-    known = {robot.name: robot for robot in missing}
-    asked = block_types_by_robot(workspace)
-    types = {robot.name: block_types_of(robot) for robot in connected} if known else {}
+    missing_by_name = {robot.name: robot for robot in missing}
+    types_by_robot = block_types_by_robot(workspace)
+    types = {robot.name: block_types_of(robot) for robot in connected} if missing_by_name else {}
     for problem in problems:
         name = _missing_robot(problem)
         if name is None:
-            own = (Fix(problem.fix, problem.fix_action),) if problem.fix and problem.fix_action else ()
-            found.append(ProblemLine(problem, own))
-        elif name not in place:
-            place[name] = len(found)
-            robot = known.get(name)
+            problem_fixes = (
+                (Fix(problem.fix, problem.fix_action),) if problem.fix and problem.fix_action else ()
+            )
+            lines.append(ProblemLine(problem, problem_fixes))
+        elif name not in line_indexes:
+            line_indexes[name] = len(lines)
+            robot = missing_by_name.get(name)
             able: list[Robot] = []
             if robot is not None:
-                blocks = asked.get(name, frozenset())
+                blocks = types_by_robot.get(name, frozenset())
                 able = [
                     each for each in connected if supports_blocks(blocks, robot.model, each, types[each.name])
                 ]
             fixes = robot_fixes(name, robot, able, virtual_models)
-            found.append(ProblemLine(problem, fixes, max(1, grey.get(name, 0))))
-    return tuple(_with_block_count(each) for each in found)
+            lines.append(ProblemLine(problem, fixes, max(1, grey.get(name, 0))))
+    return tuple(_with_block_count(each) for each in lines)
 
 
 def robot_fixes(
@@ -140,5 +142,5 @@ def _with_block_count(line: ProblemLine) -> ProblemLine:
         return line
     name = _missing_robot(line.problem) or ""
     subject = ngettext("{count} block", "{count} blocks", line.block_count).format(count=line.block_count)
-    sentence = _("{robot} isn't connected, so {block} will be skipped.").format(robot=name, block=subject)
-    return replace(line, problem=replace(line.problem, subject=subject, message=sentence, icon="bot"))
+    message = _("{robot} isn't connected, so {block} will be skipped.").format(robot=name, block=subject)
+    return replace(line, problem=replace(line.problem, subject=subject, message=message, icon="bot"))

@@ -37,25 +37,25 @@ def name_problem(name: str, path: Path | None) -> str:
         name: Proposed name.
         path: File of the behaviour, or None.
     """
-    wanted = name.strip()
-    if not wanted:
+    new_name = name.strip()
+    if not new_name:
         return _("A behaviour needs a name.")
     if path is None:
         return ""
-    for letter in wanted:
+    for letter in new_name:
         if letter in INVALID_CHARACTERS or not letter.isprintable():
-            shown = letter if letter.isprintable() else " "
-            return _("A file name can't contain {sign}.").format(sign=f"“{shown}”")
-    if wanted.endswith(".") or wanted.startswith("."):
+            displayed = letter if letter.isprintable() else " "
+            return _("A file name can't contain {sign}.").format(sign=f"“{displayed}”")
+    if new_name.endswith(".") or new_name.startswith("."):
         return _("A file name can't begin or end with a full stop.")
-    if wanted.partition(".")[0].lower() in RESERVED_NAMES:
-        return _("Windows reserves the name “{name}”.").format(name=wanted)
-    if len(wanted.encode("utf-8", "surrogatepass")) > MAX_NAME_BYTES:
+    if new_name.partition(".")[0].lower() in RESERVED_NAMES:
+        return _("Windows reserves the name “{name}”.").format(name=new_name)
+    if len(new_name.encode("utf-8", "surrogatepass")) > MAX_NAME_BYTES:
         return _("The name is too long for a file.")
-    new = renamed_path(path, wanted)
+    new = renamed_path(path, new_name)
     if new != path and os.path.lexists(new) and not _is_same_file(new, path):
         return _("A file named “{name}” already exists in {folder}.").format(
-            name=wanted, folder=path.parent.name or path.parent
+            name=new_name, folder=path.parent.name or path.parent
         )
     return ""
 
@@ -70,20 +70,20 @@ def rename_file(old: Path, new: Path) -> None:
     try:
         if not old.is_file():
             raise FileNotFoundError(2, _("the file no longer exists"), str(old))
-        taken = not _is_same_file(new, old)
-        if taken:
+        is_reserved = not _is_same_file(new, old)
+        if is_reserved:
             os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
         try:
             replace_file(old, new)
         except OSError:
-            if taken:
+            if is_reserved:
                 new.unlink(missing_ok=True)
             raise
     except OSError as error:
-        words = _("can't rename {file} ({reason})")
+        template = _("can't rename {file} ({reason})")
         reason = error.strerror or str(error)
         raise DocumentError(
-            old, words.format(file=old.name, reason=reason), _("save it in another folder")
+            old, template.format(file=old.name, reason=reason), _("save it in another folder")
         ) from error
 
 

@@ -24,25 +24,27 @@ class SavedTabs:
         self._last_session: dict[str, object] = {}
         self._kept_revision = -1
 
-    def restore(self, left: Sequence[UnsavedWork]) -> list[UnsavedWork]:
+    def restore(self, unsaved_work: Sequence[UnsavedWork]) -> list[UnsavedWork]:
         """Restore the tabs of the last session, and start saving changes.
 
         Args:
-            left: Unsaved work of crashed sessions.
+            unsaved_work: Unsaved work of crashed sessions.
 
         Returns:
             Unsaved work that was not restored, because the user must be asked first.
         """
         self.active = True
-        kept: dict[str, object] = self._settings.get(SETTING_KEY, {})
-        self._last_session = kept
-        taken = self._documents.restore_tabs(kept, left, ended_well=kept.get("ended_well") is True)
+        tabs_state: dict[str, object] = self._settings.get(SETTING_KEY, {})
+        self._last_session = tabs_state
+        restored = self._documents.restore_tabs(
+            tabs_state, unsaved_work, ended_well=tabs_state.get("ended_well") is True
+        )
         self.save()
-        return [each for each in left if each.journal not in taken]
+        return [each for each in unsaved_work if each.journal not in restored]
 
-    def recover(self, left: Sequence[UnsavedWork]) -> None:
+    def recover(self, unsaved_work: Sequence[UnsavedWork]) -> None:
         """Restore unsaved work into its tabs, and show the tab that was current."""
-        newest_last = sorted(left, key=lambda each: each.edited_s)
+        newest_last = sorted(unsaved_work, key=lambda each: each.edited_s)
         recovered = {each.journal.name: self._documents.recover(each) for each in newest_last}
         self._documents.arrange_tabs(self._last_session, recovered)
         self.save()

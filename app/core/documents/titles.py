@@ -10,33 +10,33 @@ from app.core.storage.settings import RecentFile, closed_tabs_folder
 from nep.i18n import _
 
 
-def name_of(path: Path, inside: str) -> str:
+def name_of(path: Path, stored_name: str) -> str:
     """Return the display name of a behaviour file.
 
     This is the file name. In Studio's folder of behaviours that were closed without saving, where file
-    names are generated, it is ``inside``.
+    names are generated, it is ``stored_name``.
 
     Args:
         path: Path of the file.
-        inside: Name stored in the file.
+        stored_name: Name stored in the file.
     """
-    return inside if path.parent == closed_tabs_folder() else path.stem
+    return stored_name if path.parent == closed_tabs_folder() else path.stem
 
 
-def unique_titles(named: Sequence[tuple[str, Path | None]]) -> list[str]:
+def unique_titles(named_paths: Sequence[tuple[str, Path | None]]) -> list[str]:
     """Return a unique title for each pair of name and file.
 
     A title is the name, preceded by as many parent folders as necessary.
     """
     alike: dict[str, set[Path]] = {}
-    for name, path in named:
+    for name, path in named_paths:
         if path is not None:
             alike.setdefault(name.casefold(), set()).add(path)
     counts: dict[str, int] = {}
-    for name, _path in named:
+    for name, _path in named_paths:
         counts[name.casefold()] = counts.get(name.casefold(), 0) + 1
     titles = []
-    for name, path in named:
+    for name, path in named_paths:
         title = name
         if path is not None and counts[name.casefold()] > 1:
             folder = _distinguishing_folder(path, alike[name.casefold()] - {path})

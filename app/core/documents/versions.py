@@ -80,28 +80,28 @@ def save_version(
         folder: Folder of the versions; default: ``earlier`` in Studio's data folder.
         clock: Returns the time in seconds since 1970.
     """
-    where = _versions_folder(folder)
+    versions_folder = _versions_folder(folder)
     if not path.is_file() or not path.stat().st_size:
         return None
     try:
         data, written = read_regular_file(path), path.stat()
-        newest = next(iter(versions_of(path, where)), None)
+        newest = next(iter(versions_of(path, versions_folder)), None)
         if (
             newest is not None
             and newest.copy.stat().st_size == len(data)
             and read_regular_file(newest.copy) == data
         ):
             return SavedVersion(path, newest.copy)
-        copy = free_path(where, f"{path.stem}, before", clock(), f" {_path_hash(path)}")
+        copy = free_path(versions_folder, f"{path.stem}, before", clock(), f" {_path_hash(path)}")
         write_atomically(copy, data, private=True)
         os.utime(copy, ns=(written.st_mtime_ns, written.st_mtime_ns))
     except OSError as error:
         reason = error.strerror or error
-        words = _("{file} wasn't saved: its previous version can't be kept ({reason})")
-        raise DocumentError(path, words.format(file=path.name, reason=reason)) from error
+        template = _("{file} wasn't saved: its previous version can't be kept ({reason})")
+        raise DocumentError(path, template.format(file=path.name, reason=reason)) from error
     with contextlib.suppress(OSError):  # another instance has done this already
-        _prune_versions(where, _path_hash(path))
-        _drop_oldest(where)
+        _prune_versions(versions_folder, _path_hash(path))
+        _drop_oldest(versions_folder)
     return SavedVersion(path, copy)
 
 
@@ -142,12 +142,12 @@ def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
 
 def rename_versions(old: Path, new: Path, folder: Path | None = None) -> None:
     """Assign the versions of a renamed file to its new path. Versions that can't be renamed are skipped."""
-    for each in reversed(versions_of(old, folder)):
+    for version in reversed(versions_of(old, folder)):
         copy = free_path(
-            _versions_folder(folder), f"{new.stem}, before", each.replaced_s, f" {_path_hash(new)}"
+            _versions_folder(folder), f"{new.stem}, before", version.replaced_s, f" {_path_hash(new)}"
         )
         with contextlib.suppress(OSError):
-            replace_file(each.copy, copy)
+            replace_file(version.copy, copy)
 
 
 def free_path(folder: Path, name: str, now_s: float, mark: str = "") -> Path:
@@ -172,14 +172,14 @@ def free_path(folder: Path, name: str, now_s: float, mark: str = "") -> Path:
 def stamp_of(path: Path) -> Stamp | None:
     """Return a value that changes when the file is written; None if the file is missing."""
     try:
-        found = path.stat()
+        file_stat = path.stat()
     except OSError:
         return None
-    return found.st_mtime_ns, found.st_size
+    return file_stat.st_mtime_ns, file_stat.st_size
 
 
-def _versions_folder(chosen: Path | None) -> Path:
-    return chosen if chosen is not None else data_home() / FOLDER_NAME
+def _versions_folder(folder: Path | None) -> Path:
+    return folder if folder is not None else data_home() / FOLDER_NAME
 
 
 def move_old_versions(old: Path | None = None, new: Path | None = None) -> None:
@@ -206,14 +206,14 @@ def _safe_stem(name: str) -> str:
 
 def _path_hash(path: Path) -> str:
     # Differs between files in different folders.
-    where = os.path.normcase(path.resolve())
-    return hashlib.sha256(where.encode("utf-8", "surrogateescape")).hexdigest()[:8]
+    resolved = os.path.normcase(path.resolve())
+    return hashlib.sha256(resolved.encode("utf-8", "surrogateescape")).hexdigest()[:8]
 
 
 def _list_versions(folder: Path) -> list[Version]:
-    found = [_parse_version(copy) for copy in folder.glob(f"*{SUFFIX}")] if folder.is_dir() else []
-    known = [each for each in found if each is not None]
-    return sorted(known, key=lambda each: (each.replaced_s, each.written_s), reverse=True)
+    parsed = [_parse_version(copy) for copy in folder.glob(f"*{SUFFIX}")] if folder.is_dir() else []
+    versions = [each for each in parsed if each is not None]
+    return sorted(versions, key=lambda each: (each.replaced_s, each.written_s), reverse=True)
 
 
 def _parse_version(copy: Path) -> Version | None:
@@ -230,18 +230,18 @@ def _parse_version(copy: Path) -> Version | None:
 
 def _prune_versions(folder: Path, mark: str) -> None:
     # Removes the version that leaves the smallest gap.
-    found = [each for each in _list_versions(folder) if each.path_hash == mark]
-    while len(found) > MAX_COPIES_PER_FILE:
+    versions = [each for each in _list_versions(folder) if each.path_hash == mark]
+    while len(versions) > MAX_COPIES_PER_FILE:
         gaps = {
-            place: found[place - 1].replaced_s - found[place + 1].replaced_s
-            for place in range(MIN_COPIES_PER_FILE, len(found) - 1)
+            index: versions[index - 1].replaced_s - versions[index + 1].replaced_s
+            for index in range(MIN_COPIES_PER_FILE, len(versions) - 1)
         }
-        found.pop(min(gaps, key=lambda place: gaps[place])).copy.unlink(missing_ok=True)
+        versions.pop(min(gaps, key=lambda place: gaps[place])).copy.unlink(missing_ok=True)
 
 
 def _drop_oldest(folder: Path) -> None:
-    left = MAX_BYTES
-    for number, each in enumerate(_list_versions(folder)):
-        left -= each.copy.stat().st_size
-        if number and (number >= MAX_COPIES or left < 0):
-            each.copy.unlink(missing_ok=True)
+    remaining_bytes = MAX_BYTES
+    for number, version in enumerate(_list_versions(folder)):
+        remaining_bytes -= version.copy.stat().st_size
+        if number and (number >= MAX_COPIES or remaining_bytes < 0):
+            version.copy.unlink(missing_ok=True)

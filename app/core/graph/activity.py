@@ -25,16 +25,16 @@ class QuietNodes:
     def __init__(self) -> None:
         self._counted: dict[str, tuple[int, float]] = {}
 
-    def update(self, facts: GraphInput, now: float) -> None:
+    def update(self, graph_input: GraphInput, now: float) -> None:
         """Apply new statistics; ``now`` is monotonic seconds. New nodes count as active."""
-        sums = {entry.key: 0 for entry in facts.nodes if entry.gone_s is None}
+        sums = {entry.key: 0 for entry in graph_input.nodes if entry.gone_s is None}
         unknown = {
             entry.key
-            for entry in facts.nodes
+            for entry in graph_input.nodes
             if (kind := find_kind(entry.network)) is not None and not kind.reports_stats
         }
-        originals = {entry.key for entry in facts.nodes if entry.is_original}
-        for entry, count in _counts(facts):
+        originals = {entry.key for entry in graph_input.nodes if entry.is_original}
+        for entry, count in _counts(graph_input):
             if count is None and entry in originals:
                 unknown.add(entry)
             elif entry in sums:
@@ -43,9 +43,9 @@ class QuietNodes:
         self._counted = {}
         for entry, total in sums.items():
             if entry not in unknown:
-                had = before.get(entry)
-                moved = had is None or had[0] != total
-                self._counted[entry] = total, now if moved or had is None else had[1]
+                previous = before.get(entry)
+                moved = previous is None or previous[0] != total
+                self._counted[entry] = total, now if moved or previous is None else previous[1]
 
     def quiet_keys(self, now: float) -> frozenset[str]:
         """Return the keys of the nodes without a message or call in the last `QUIET_TIMEOUT_S` seconds."""
@@ -60,10 +60,10 @@ class CallRates:
     def __init__(self) -> None:
         self._samples: deque[tuple[float, Mapping[str, int]]] = deque(maxlen=MAX_SAMPLES)
 
-    def update(self, facts: GraphInput, now: float) -> None:
+    def update(self, graph_input: GraphInput, now: float) -> None:
         """Apply the call counts at ``now`` (monotonic seconds); at most one sample per second is stored."""
         if not self._samples or now - self._samples[-1][0] >= 1.0:
-            self._samples.append((now, {name: info.calls for name, info in facts.services.items()}))
+            self._samples.append((now, {name: info.calls for name, info in graph_input.services.items()}))
 
     def rates_hz(self) -> dict[str, float]:
         """Return calls per second by service; services with fewer than two samples are omitted."""
@@ -71,10 +71,10 @@ class CallRates:
             return {}
         last_at, last = self._samples[-1]
         first: dict[str, tuple[float, int]] = {}
-        for at, counts in self._samples:
-            if last_at - at <= CALL_WINDOW_S:
+        for time_s, counts in self._samples:
+            if last_at - time_s <= CALL_WINDOW_S:
                 for name in counts.keys() - first.keys():
-                    first[name] = at, counts[name]
+                    first[name] = time_s, counts[name]
         return {
             name: (calls - first[name][1]) / (last_at - first[name][0])
             for name, calls in last.items()
@@ -82,16 +82,16 @@ class CallRates:
         }
 
 
-def _counts(facts: GraphInput) -> Iterator[tuple[str, int | None]]:
+def _counts(graph_input: GraphInput) -> Iterator[tuple[str, int | None]]:
     # (key of a node, number of messages or calls); None if not counted. Internal topics are skipped.
-    for topic in facts.topics:
+    for topic in graph_input.topics:
         if topic.info is None or topic.name.startswith(INTERNAL_PREFIX):
             continue
         for publisher in topic.info.publishers:
             yield key_of(topic.network, publisher.node_id), publisher.count
         for subscriber in topic.info.subscribers:
             yield key_of(topic.network, subscriber.node_id), subscriber.received
-    for name, service in facts.services.items():
+    for name, service in graph_input.services.items():
         if name.startswith(INTERNAL_PREFIX):
             continue
         for server in service.servers:

@@ -17,20 +17,20 @@ def format_dot(graph: NodeGraph, group_names: Mapping[str, str], label: Callable
     """
     names = {node.key: f"n{number}" for number, node in enumerate(graph.nodes)}
     lines = ["digraph nodes {", "  rankdir=LR;", "  node [shape=box, style=rounded];"]
-    inside: dict[str, list[str]] = {}
+    lines_by_group: dict[str, list[str]] = {}
     for node in graph.nodes:
         style = ', style="rounded,dashed"' if node.is_gone or node.is_quiet else ""
         name = group_names.get(node.key, node.name) if node.kind == "group" else node.name
-        inside.setdefault(node.group, []).append(f"{names[node.key]} [label={quote(name)}{style}];")
-    clusters = [group for group in graph.groups if not group.is_collapsed and group.key in inside]
+        lines_by_group.setdefault(node.group, []).append(f"{names[node.key]} [label={quote(name)}{style}];")
+    clusters = [group for group in graph.groups if not group.is_collapsed and group.key in lines_by_group]
     for number, group in enumerate(clusters):
         lines += [
             f"  subgraph cluster_{number} {{",
             f"    label={quote(group_names.get(group.key, group.name))};",
-            *(f"    {each}" for each in inside.pop(group.key)),
+            *(f"    {each}" for each in lines_by_group.pop(group.key)),
             "  }",
         ]
-    lines += [f"  {each}" for others in inside.values() for each in others]
+    lines += [f"  {each}" for others in lines_by_group.values() for each in others]
     for line in graph.lines:
         style = ", style=dashed" if line.kind == "service" else ""
         text = quote(label(line))
@@ -42,5 +42,5 @@ def format_dot(graph: NodeGraph, group_names: Mapping[str, str], label: Callable
 
 def quote(text: str) -> str:
     r"""Quote a string for DOT: escape quotes and backslashes, and replace line breaks by ``\n``."""
-    kept = text.replace("\\", "\\\\").replace('"', '\\"').replace("\0", "")
-    return '"' + "\\n".join(kept.splitlines() or [""]) + '"'
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\0", "")
+    return '"' + "\\n".join(escaped.splitlines() or [""]) + '"'

@@ -63,9 +63,9 @@ class LayoutSizes:
 
     def scaled(self, share: float) -> LayoutSizes:
         """Return the sizes multiplied by ``share``, for another text size."""
-        wide, high = self.node
+        width, height = self.node
         return LayoutSizes(
-            (wide * share, high * share),
+            (width * share, height * share),
             self.header * share,
             self.side_margin * share,
             self.footer * share,
@@ -95,8 +95,11 @@ class GraphLayout:
 
     def bounds(self, sizes: LayoutSizes) -> Box:
         """Return the bounding rectangle of the layout; its size is 0 if the layout is empty."""
-        boxes = [*self.groups.values(), *(_box_at(place, sizes.node) for place in self.positions.values())]
-        boxes += [(x, y, 0.0, 0.0) for way in self.routes.values() for x, y in way]
+        boxes = [
+            *self.groups.values(),
+            *(_box_at(position, sizes.node) for position in self.positions.values()),
+        ]
+        boxes += [(x, y, 0.0, 0.0) for points in self.routes.values() for x, y in points]
         return _bounding_box(boxes)
 
 
@@ -114,33 +117,43 @@ def arrange(
         sizes: Sizes of boxes and margins.
     """
     sizes = sizes if sizes is not None else LayoutSizes()
-    ways, left_out = _routes_to_draw(graph)
-    known = {} if before is None else {**before.saved_positions, **before.positions}
-    here = {node.key for node in graph.nodes}
-    stay = len(here & known.keys())
+    route_keys, left_out = _routes_to_draw(graph)
+    previous_positions = {} if before is None else {**before.saved_positions, **before.positions}
+    current_keys = {node.key for node in graph.nodes}
+    stay = len(current_keys & previous_positions.keys())
     is_plain = False
-    if not stay or stay < len(here) - stay:
-        places, is_plain = _place_all(graph, ways, sizes)
-        known = {}
+    if not stay or stay < len(current_keys) - stay:
+        positions, is_plain = _place_all(graph, route_keys, sizes)
+        previous_positions = {}
     else:
-        places = _place_new(graph, {key: known[key] for key in here & known.keys()}, sizes)
-    routes = {} if is_plain else _route_lines(places, ways, sizes)
-    kept = {key: place for key, place in known.items() if key not in here}
-    for key in [*kept][: max(0, len(kept) - MAX_SAVED_POSITIONS)]:
-        del kept[key]
-    straight = {way: _straight_route(places[way[1]], places[way[2]], sizes) for way in ways}
-    groups = _group_boxes(graph, places, sizes)
-    return GraphLayout(places, groups, {**straight, **routes}, kept, left_out, is_plain)
+        positions = _place_new(
+            graph, {key: previous_positions[key] for key in current_keys & previous_positions.keys()}, sizes
+        )
+    routes = {} if is_plain else _route_lines(positions, route_keys, sizes)
+    saved_positions = {
+        key: position for key, position in previous_positions.items() if key not in current_keys
+    }
+    for key in [*saved_positions][: max(0, len(saved_positions) - MAX_SAVED_POSITIONS)]:
+        del saved_positions[key]
+    straight = {
+        route_key: _straight_route(positions[route_key[1]], positions[route_key[2]], sizes)
+        for route_key in route_keys
+    }
+    groups = _group_boxes(graph, positions, sizes)
+    return GraphLayout(positions, groups, {**straight, **routes}, saved_positions, left_out, is_plain)
 
 
 def arrange_in_rows(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
     """Arrange all boxes in rows without graphlay, for the case that graphlay failed or took too long."""
-    places = _row_positions(graph, sizes)
-    ways, left_out = _routes_to_draw(graph)
+    positions = _row_positions(graph, sizes)
+    route_keys, left_out = _routes_to_draw(graph)
     return GraphLayout(
-        places,
-        _group_boxes(graph, places, sizes),
-        {way: _straight_route(places[way[1]], places[way[2]], sizes) for way in ways},
+        positions,
+        _group_boxes(graph, positions, sizes),
+        {
+            route_key: _straight_route(positions[route_key[1]], positions[route_key[2]], sizes)
+            for route_key in route_keys
+        },
         {},
         left_out,
         is_fallback=True,
@@ -149,15 +162,15 @@ def arrange_in_rows(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
 
 def _routes_to_draw(graph: NodeGraph) -> tuple[list[RouteKey], int]:
     # Routes of lines with few ends first; and the number of omitted ones.
-    found: list[RouteKey] = []
+    routes: list[RouteKey] = []
     left_out = 0
     for line in sorted(graph.lines, key=_drawing_order):
-        ways = [(line.key, source, target) for source, target in line.pairs()]
-        if len(found) + len(ways) <= MAX_ROUTES:
-            found += ways
+        line_routes = [(line.key, source, target) for source, target in line.pairs()]
+        if len(routes) + len(line_routes) <= MAX_ROUTES:
+            routes += line_routes
         else:
-            left_out += len(ways)
-    return found, left_out
+            left_out += len(line_routes)
+    return routes, left_out
 
 
 def _drawing_order(line: GraphLine) -> tuple[int, tuple[str, ...]]:
@@ -184,62 +197,66 @@ def _graphlay_options(effort: str, gap: float = NODE_GAP) -> dict[str, Any]:
 
 
 def _place_all(
-    graph: NodeGraph, ways: Sequence[RouteKey], sizes: LayoutSizes
+    graph: NodeGraph, route_keys: Sequence[RouteKey], sizes: LayoutSizes
 ) -> tuple[dict[str, Position], bool]:
     # First the nodes within each group, then the groups. Also returns whether the library failed.
-    inside: dict[str, list[str]] = {}
+    keys_by_block: dict[str, list[str]] = {}
     for node in graph.nodes:
-        inside.setdefault(node.group, []).append(node.key)
-    home = {key: block for block, keys in inside.items() for key in keys}
+        keys_by_block.setdefault(node.group, []).append(node.key)
+    home = {key: block for block, keys in keys_by_block.items() for key in keys}
     within: dict[str, list[RouteKey]] = {}
     between: dict[tuple[str, str], int] = {}
     effort = "balanced" if len(home) < MAX_BALANCED_LAYOUT_NODES else "fast"
-    for way in ways:
-        begin, end = home[way[1]], home[way[2]]
+    for route_key in route_keys:
+        begin, end = home[route_key[1]], home[route_key[2]]
         if begin == end:
-            within.setdefault(begin, []).append(way)
+            within.setdefault(begin, []).append(route_key)
         else:
             between[begin, end] = between.get((begin, end), 0) + 1
     try:
         blocks = {
-            block: _place_block(keys, within.get(block, ()), sizes, effort) for block, keys in inside.items()
+            block: _place_block(keys, within.get(block, ()), sizes, effort)
+            for block, keys in keys_by_block.items()
         }
-        boxes = {block: _block_box(graph, block, places, sizes) for block, places in blocks.items()}
+        boxes = {block: _block_box(graph, block, positions, sizes) for block, positions in blocks.items()}
         middles = _place_boxes(boxes, between)
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt | SystemExit):
             raise
         _log.exception("layout library failed; nodes are placed in rows")
         return _row_positions(graph, sizes), True
-    places = {}
-    for block, (left, top, wide, high) in boxes.items():
-        across, down = middles[block][0] - left - wide / 2, middles[block][1] - top - high / 2
+    positions = {}
+    for block, (left, top, width, height) in boxes.items():
+        dx, dy = middles[block][0] - left - width / 2, middles[block][1] - top - height / 2
         for key, (x, y) in blocks[block].items():
-            places[key] = x + across, y + down
-    return places, False
+            positions[key] = x + dx, y + dy
+    return positions, False
 
 
 def _place_block(
-    keys: Sequence[str], ways: Sequence[RouteKey], sizes: LayoutSizes, effort: str
+    keys: Sequence[str], route_keys: Sequence[RouteKey], sizes: LayoutSizes, effort: str
 ) -> dict[str, Position]:
     if len(keys) == 1:
         return {keys[0]: (0.0, 0.0)}
     index = {key: number for number, key in enumerate(keys)}
     layout = graphlay.layout(
-        {"nodes": [_request_box(key, sizes.node) for key in keys], "edges": _request_edges(ways, index)},
+        {
+            "nodes": [_request_box(key, sizes.node) for key in keys],
+            "edges": _request_edges(route_keys, index),
+        },
         options=_graphlay_options(effort),
     )
     return {key: _parse_point(node["center"]) for key, node in zip(keys, layout.nodes, strict=True)}
 
 
-def _block_box(graph: NodeGraph, block: str, places: Mapping[str, Position], sizes: LayoutSizes) -> Box:
+def _block_box(graph: NodeGraph, block: str, positions: Mapping[str, Position], sizes: LayoutSizes) -> Box:
     # Bounding box of a group; of a node without a group the node itself.
     group = next((each for each in graph.groups if each.key == block and not each.is_collapsed), None)
-    box = _bounding_box(_box_at(place, sizes.node) for place in places.values())
+    box = _bounding_box(_box_at(position, sizes.node) for position in positions.values())
     if group is None:
         return box
-    left, top, wide, high = _with_margins(box, block, sizes)
-    return left, top, wide, high + (sizes.footer if group.quiet_count else 0.0)
+    left, top, width, height = _with_margins(box, block, sizes)
+    return left, top, width, height + (sizes.footer if group.quiet_count else 0.0)
 
 
 def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int]) -> dict[str, Position]:
@@ -256,43 +273,43 @@ def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int
         {"nodes": nodes, "edges": edges}, options=_graphlay_options("balanced", GROUP_GAP)
     )
     middles = {block: _parse_point(node["center"]) for block, node in zip(boxes, layout.nodes, strict=True)}
-    wide = layout.bounds["max"]["x"] - layout.bounds["min"]["x"]
-    high = layout.bounds["max"]["y"] - layout.bounds["min"]["y"]
-    return middles if wide <= WIDEST * high or len(boxes) < 4 else _shelf_positions(boxes, middles)
+    width = layout.bounds["max"]["x"] - layout.bounds["min"]["x"]
+    height = layout.bounds["max"]["y"] - layout.bounds["min"]["y"]
+    return middles if width <= WIDEST * height or len(boxes) < 4 else _shelf_positions(boxes, middles)
 
 
 def _shelf_positions(boxes: Mapping[str, Box], middles: Mapping[str, Position]) -> dict[str, Position]:
     # Breaks one long row of groups into several, in the same order.
     area = sum((box[2] + LAYER_GAP) * (box[3] + GROUP_GAP) for box in boxes.values())
     room = max(math.sqrt(area * ASPECT), *(box[2] for box in boxes.values()))
-    found: dict[str, Position] = {}
-    left = top = high = 0.0
+    positions: dict[str, Position] = {}
+    left = top = row_height = 0.0
     for block in sorted(boxes, key=lambda each: (middles[each], each)):
-        _left, _top, wide, tall = boxes[block]
-        if left and left + wide > room:
-            left, top, high = 0.0, top + high + GROUP_GAP, 0.0
-        found[block] = left + wide / 2, top + tall / 2
-        left, high = left + wide + LAYER_GAP, max(high, tall)
-    return found
+        _left, _top, width, tall = boxes[block]
+        if left and left + width > room:
+            left, top, row_height = 0.0, top + row_height + GROUP_GAP, 0.0
+        positions[block] = left + width / 2, top + tall / 2
+        left, row_height = left + width + LAYER_GAP, max(row_height, tall)
+    return positions
 
 
 def _route_lines(
-    places: Mapping[str, Position], ways: Sequence[RouteKey], sizes: LayoutSizes
+    positions: Mapping[str, Position], route_keys: Sequence[RouteKey], sizes: LayoutSizes
 ) -> dict[RouteKey, tuple[Position, ...]]:
     # Routes around the boxes; {} when the library fails: then they are straight.
-    if not ways or len(ways) > MAX_AVOIDING_ROUTES:
+    if not route_keys or len(route_keys) > MAX_AVOIDING_ROUTES:
         return {}
-    index = {key: number for number, key in enumerate(places)}
+    index = {key: number for number, key in enumerate(positions)}
     request = [
-        {**_request_box(key, sizes.node), "position": {"x": x, "y": y}} for key, (x, y) in places.items()
+        {**_request_box(key, sizes.node), "position": {"x": x, "y": y}} for key, (x, y) in positions.items()
     ]
     try:
         layout = graphlay.reroute(
-            {"nodes": request, "edges": _request_edges(ways, index)}, options=_graphlay_options("fast")
+            {"nodes": request, "edges": _request_edges(route_keys, index)}, options=_graphlay_options("fast")
         )
         return {
-            way: tuple(_parse_point(each) for each in edge["points"])
-            for way, edge in zip(ways, layout.edges, strict=True)
+            route_key: tuple(_parse_point(each) for each in edge["points"])
+            for route_key, edge in zip(route_keys, layout.edges, strict=True)
             if len(edge["points"]) > 1
         }
     except BaseException as error:
@@ -303,18 +320,19 @@ def _route_lines(
 
 
 def _request_box(key: str, size: Position) -> dict[str, Any]:
-    wide, high = size
-    return {"size": {"width": wide, "height": high}, "shape": "box", "key": key}
+    width, height = size
+    return {"size": {"width": width, "height": height}, "shape": "box", "key": key}
 
 
-def _request_edges(ways: Sequence[RouteKey], index: Mapping[str, int]) -> list[dict[str, Any]]:
+def _request_edges(route_keys: Sequence[RouteKey], index: Mapping[str, int]) -> list[dict[str, Any]]:
     return [
-        {"source": index[source], "target": index[target], "weight": 1.0} for _line, source, target in ways
+        {"source": index[source], "target": index[target], "weight": 1.0}
+        for _line, source, target in route_keys
     ]
 
 
-def _parse_point(told: Mapping[str, float]) -> Position:
-    return float(told["x"]), float(told["y"])
+def _parse_point(point: Mapping[str, float]) -> Position:
+    return float(point["x"]), float(point["y"])
 
 
 # -- without the library ---------------------------------------------------------------------------------
@@ -322,67 +340,87 @@ def _parse_point(told: Mapping[str, float]) -> Position:
 
 def _row_positions(graph: NodeGraph, sizes: LayoutSizes) -> dict[str, Position]:
     # Each group is a column.
-    wide, high = sizes.node
+    width, height = sizes.node
     columns: dict[str, list[str]] = {}
     for node in graph.nodes:
         columns.setdefault(node.group, []).append(node.key)
-    step = wide + 2 * sizes.side_margin + LAYER_GAP
+    step = width + 2 * sizes.side_margin + LAYER_GAP
     return {
-        key: (column * step, row * (high + NODE_GAP))
+        key: (column * step, row * (height + NODE_GAP))
         for column, keys in enumerate(columns.values())
         for row, key in enumerate(keys)
     }
 
 
-def _place_new(graph: NodeGraph, places: dict[str, Position], sizes: LayoutSizes) -> dict[str, Position]:
+def _place_new(graph: NodeGraph, positions: dict[str, Position], sizes: LayoutSizes) -> dict[str, Position]:
     # Existing nodes keep their positions; new ones are placed next to them.
     neighbours = _neighbours(graph)
     for node in graph.nodes:
-        if node.key in places:
+        if node.key in positions:
             continue
-        mates = [each.key for each in graph.nodes if each.group == node.group and each.key in places]
-        near = [places[key] for key in neighbours.get(node.key, ()) if key in places]
+        mates = [each.key for each in graph.nodes if each.group == node.group and each.key in positions]
+        neighbour_positions = [positions[key] for key in neighbours.get(node.key, ()) if key in positions]
         if mates:
-            places[node.key] = _free_position([places[key] for key in mates], near, places.values(), sizes)
+            positions[node.key] = _free_position(
+                [positions[key] for key in mates], neighbour_positions, positions.values(), sizes
+            )
         else:
-            left, top, wide, _high = _bounding_box(_box_at(place, sizes.node) for place in places.values())
+            left, top, width, _high = _bounding_box(
+                _box_at(position, sizes.node) for position in positions.values()
+            )
             step = sizes.node[0] + 2 * sizes.side_margin + LAYER_GAP
-            places[node.key] = (left + wide + step - sizes.node[0] / 2, top + sizes.node[1] / 2)
-        _push_apart(graph, places, node.group, sizes)
-    return places
+            positions[node.key] = (left + width + step - sizes.node[0] / 2, top + sizes.node[1] / 2)
+        _push_apart(graph, positions, node.group, sizes)
+    return positions
 
 
 def _free_position(
-    mates: Sequence[Position], near: Sequence[Position], taken: Iterable[Position], sizes: LayoutSizes
+    mates: Sequence[Position],
+    neighbour_positions: Sequence[Position],
+    occupied: Iterable[Position],
+    sizes: LayoutSizes,
 ) -> Position:
     # In the columns of the group, nearest to the connected nodes.
-    high = sizes.node[1] + NODE_GAP
-    wide = sizes.node[0]
-    there = list(taken)
-    x_near = sum(x for x, _y in near) / len(near) if near else mates[0][0]
-    y_near = sum(y for _x, y in near) / len(near) if near else max(y for _x, y in mates)
+    row_height = sizes.node[1] + NODE_GAP
+    node_width = sizes.node[0]
+    occupied_positions = list(occupied)
+    x_near = (
+        sum(x for x, _y in neighbour_positions) / len(neighbour_positions)
+        if neighbour_positions
+        else mates[0][0]
+    )
+    y_near = (
+        sum(y for _x, y in neighbour_positions) / len(neighbour_positions)
+        if neighbour_positions
+        else max(y for _x, y in mates)
+    )
     tops = [y for _x, y in mates]
-    rows = [min(tops) + high * step for step in range(int((max(tops) - min(tops)) / high) + 2)]
+    rows = [min(tops) + row_height * step for step in range(int((max(tops) - min(tops)) / row_height) + 2)]
     columns = sorted({x for x, _y in mates})
     free = [
         (x, y)
         for x in columns
         for y in rows
-        if all(abs(x - other) >= wide or abs(y - level) >= high - 1 for other, level in there)
+        if all(
+            abs(x - other) >= node_width or abs(y - level) >= row_height - 1
+            for other, level in occupied_positions
+        )
     ]
     if not free:
-        return columns[0], max(tops) + high
+        return columns[0], max(tops) + row_height
     return min(free, key=lambda at: (abs(at[0] - x_near) + abs(at[1] - y_near), at))
 
 
-def _push_apart(graph: NodeGraph, places: dict[str, Position], grown: str, sizes: LayoutSizes) -> None:
+def _push_apart(graph: NodeGraph, positions: dict[str, Position], grown: str, sizes: LayoutSizes) -> None:
     # Moves whole groups down until none overlaps one that has grown.
     members: dict[str, list[str]] = {}
     for node in graph.nodes:
-        if node.key in places:
+        if node.key in positions:
             members.setdefault(node.group or node.key, []).append(node.key)
     boxes = {
-        key: _bounding_box(_with_margins(_box_at(places[each], sizes.node), key, sizes) for each in keys)
+        key: _bounding_box(
+            _with_margins(_box_at(positions[member_key], sizes.node), key, sizes) for member_key in keys
+        )
         for key, keys in members.items()
     }
     moving = [grown] if grown in boxes else []
@@ -393,39 +431,39 @@ def _push_apart(graph: NodeGraph, places: dict[str, Position], grown: str, sizes
         for key, box in boxes.items():
             if key == upper or not _overlaps(boxes[upper], box):
                 continue
-            down = boxes[upper][1] + boxes[upper][3] + GROUP_GAP - box[1]
-            boxes[key] = (box[0], box[1] + down, box[2], box[3])
-            for each in members[key]:
-                places[each] = (places[each][0], places[each][1] + down)
+            dy = boxes[upper][1] + boxes[upper][3] + GROUP_GAP - box[1]
+            boxes[key] = (box[0], box[1] + dy, box[2], box[3])
+            for member_key in members[key]:
+                positions[member_key] = (positions[member_key][0], positions[member_key][1] + dy)
             moving.append(key)
 
 
 def _neighbours(graph: NodeGraph) -> dict[str, set[str]]:
-    found: dict[str, set[str]] = {}
+    neighbours: dict[str, set[str]] = {}
     for line in graph.lines:
         if len(line.sources) * len(line.targets) > MAX_ROUTES:
             continue
         for source, target in line.pairs():
-            found.setdefault(source, set()).add(target)
-            found.setdefault(target, set()).add(source)
-    return found
+            neighbours.setdefault(source, set()).add(target)
+            neighbours.setdefault(target, set()).add(source)
+    return neighbours
 
 
-def _group_boxes(graph: NodeGraph, places: Mapping[str, Position], sizes: LayoutSizes) -> dict[str, Box]:
+def _group_boxes(graph: NodeGraph, positions: Mapping[str, Position], sizes: LayoutSizes) -> dict[str, Box]:
     # Around the nodes of each expanded group, at least as wide as its name.
-    inside: dict[str, list[Box]] = {}
+    boxes_by_group: dict[str, list[Box]] = {}
     for node in graph.nodes:
-        inside.setdefault(node.group, []).append(_box_at(places[node.key], sizes.node))
+        boxes_by_group.setdefault(node.group, []).append(_box_at(positions[node.key], sizes.node))
     rectangles = {}
     for group in graph.groups:
-        if group.is_collapsed or group.key not in inside:
+        if group.is_collapsed or group.key not in boxes_by_group:
             continue
-        left, top, wide, high = _bounding_box(
-            _with_margins(box, group.key, sizes) for box in inside[group.key]
+        left, top, width, height = _bounding_box(
+            _with_margins(box, group.key, sizes) for box in boxes_by_group[group.key]
         )
         if group.quiet_count:
-            high += sizes.footer
-        rectangles[group.key] = (left, top, wide, high)
+            height += sizes.footer
+        rectangles[group.key] = (left, top, width, height)
     return rectangles
 
 
@@ -433,17 +471,17 @@ def _with_margins(box: Box, group: str, sizes: LayoutSizes) -> Box:
     # With the margins of its group; unchanged without a group.
     if not group:
         return box
-    left, top, wide, high = box
+    left, top, width, height = box
     return (
         left - sizes.side_margin,
         top - sizes.header,
-        wide + 2 * sizes.side_margin,
-        high + sizes.header + sizes.side_margin,
+        width + 2 * sizes.side_margin,
+        height + sizes.header + sizes.side_margin,
     )
 
 
-def _box_at(place: Position, size: Position) -> Box:
-    return place[0] - size[0] / 2, place[1] - size[1] / 2, size[0], size[1]
+def _box_at(position: Position, size: Position) -> Box:
+    return position[0] - size[0] / 2, position[1] - size[1] / 2, size[0], size[1]
 
 
 def _bounding_box(boxes: Iterable[Box]) -> Box:
@@ -467,5 +505,5 @@ def _overlaps(one: Box, other: Box) -> bool:
 def _straight_route(source: Position, target: Position, sizes: LayoutSizes) -> tuple[Position, ...]:
     # From the right edge to the left edge; reversed when the target is to the left.
     half = sizes.node[0] / 2
-    way = half if source[0] <= target[0] else -half
-    return (source[0] + way, source[1]), (target[0] - way, target[1])
+    offset = half if source[0] <= target[0] else -half
+    return (source[0] + offset, source[1]), (target[0] - offset, target[1])

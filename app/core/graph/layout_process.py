@@ -39,9 +39,9 @@ class LayoutProcess:
 
         Returns None if the call failed, was killed, or took longer than `TIMEOUT_S` seconds.
         """
-        bare = replace(graph, nodes=tuple(replace(node, entry=None) for node in graph.nodes))
+        entryless = replace(graph, nodes=tuple(replace(node, entry=None) for node in graph.nodes))
         try:
-            output, _nothing = self._process.communicate(pickle.dumps((bare, before, sizes)), TIMEOUT_S)
+            output, _nothing = self._process.communicate(pickle.dumps((entryless, before, sizes)), TIMEOUT_S)
         except (subprocess.TimeoutExpired, OSError, ValueError):
             self.kill()
             return None

@@ -186,31 +186,31 @@ class NodeGraph:
         return next((line for line in self.lines if topic in line.topics), None)
 
 
-def node_graph(facts: GraphInput, choices: GraphOptions) -> NodeGraph:
+def node_graph(graph_input: GraphInput, choices: GraphOptions) -> NodeGraph:
     """Create the drawing from the state of the networks and the options of the user.
 
     The run time is proportional to the number of nodes and topics.
     """
-    boxes = _boxes(facts, choices)
-    groups = _groups(facts, choices, boxes)
+    boxes = _boxes(graph_input, choices)
+    groups = _groups(graph_input, choices, boxes)
     closed = {group.key for group in groups if group.is_collapsed}
     drawn = [node for node in boxes.values() if node.group not in closed and not _is_hidden(node, choices)]
     drawn += [_collapsed_box(group) for group in groups if group.is_collapsed]
-    shown = {node.key for node in drawn}
+    visible_keys = {node.key for node in drawn}
     box_by_entry = {
         entry: (node.group if node.group in closed else node.key)
         for entry, node in boxes.items()
-        if node.group in closed or node.key in shown
+        if node.group in closed or node.key in visible_keys
     }
-    lines = [*_topic_lines(facts, choices, box_by_entry)]
+    lines = [*_topic_lines(graph_input, choices, box_by_entry)]
     services: list[GraphLine] = []
     if choices.shows_services:
-        services = [*_service_lines(facts, choices, box_by_entry)]
+        services = [*_service_lines(graph_input, choices, box_by_entry)]
     return NodeGraph(
         tuple(drawn),
         tuple(sorted([*lines, *services], key=lambda line: (line.kind, line.topics))),
         groups,
-        sum(entry.gone_s is None for entry in facts.nodes),
+        sum(entry.gone_s is None for entry in graph_input.nodes),
         sum(len(line.topics) for line in lines),
         sum(len(line.topics) for line in services),
         sum(_is_hidden(node, choices) for node in boxes.values()),
@@ -225,20 +225,20 @@ def _is_hidden(node: DrawnNode, choices: GraphOptions) -> bool:
 # -- nodes and their groups ----------------------------------------------------------------------------------
 
 
-def _boxes(facts: GraphInput, choices: GraphOptions) -> dict[str, DrawnNode]:
+def _boxes(graph_input: GraphInput, choices: GraphOptions) -> dict[str, DrawnNode]:
     # By the entry's key; groups are not collapsed yet.
-    pictures = {topic.key for topic in facts.topics if topic.codec == "image"}
+    pictures = {topic.key for topic in graph_input.topics if topic.codec == "image"}
     drawn: dict[str, DrawnNode] = {}
-    taken: Counter[str] = Counter()
-    for entry in sorted(facts.nodes, key=lambda each: (each.since_ns, each.id)):
+    key_counts: Counter[str] = Counter()
+    for entry in sorted(graph_input.nodes, key=lambda each: (each.since_ns, each.id)):
         key = f"{entry.network}|{entry.host}|{entry.name}"
-        taken[key] += 1
-        page = facts.pages.get(entry.name) if _is_page(entry) else None
+        key_counts[key] += 1
+        page = graph_input.pages.get(entry.name) if _is_page(entry) else None
         drawn[entry.key] = DrawnNode(
-            key if taken[key] == 1 else f"{key}|{taken[key]}",
+            key if key_counts[key] == 1 else f"{key}|{key_counts[key]}",
             _name_of(entry) if page is None else page.title,
-            _group_of(entry, facts, choices.group_by),
-            _kind_of(entry, facts),
+            _group_of(entry, graph_input, choices.group_by),
+            _kind_of(entry, graph_input),
             entry,
             entry.key,
             _bridged_network(entry),
@@ -250,7 +250,7 @@ def _boxes(facts: GraphInput, choices: GraphOptions) -> dict[str, DrawnNode]:
     return dict(sorted(drawn.items(), key=lambda item: item[1].key))
 
 
-def _kind_of(entry: NodeEntry, facts: GraphInput) -> NodeKind:
+def _kind_of(entry: NodeEntry, graph_input: GraphInput) -> NodeKind:
     if entry.is_bridge:
         return "bridge"
     if entry.is_original:
@@ -263,7 +263,7 @@ def _kind_of(entry: NodeEntry, facts: GraphInput) -> NodeKind:
         return "studio"
     if entry.name.startswith(UNNAMED_PREFIX):
         return "behaviour"
-    return "robot" if entry.name in facts.robots else "program"
+    return "robot" if entry.name in graph_input.robots else "program"
 
 
 def _is_page(entry: NodeEntry) -> bool:
@@ -278,21 +278,21 @@ def _name_of(entry: NodeEntry) -> str:
 
 def _bridged_network(entry: NodeEntry) -> str:
     # "" when its name does not contain it.
-    _before, found, back_end = entry.name.rpartition(BRIDGE_SEPARATOR)
-    if not entry.is_bridge or not found:
+    _before, separator, back_end = entry.name.rpartition(BRIDGE_SEPARATOR)
+    if not entry.is_bridge or not separator:
         return ""
     kind = find_kind(back_end)
     return kind.product_name if kind is not None else back_end
 
 
-def _group_of(entry: NodeEntry, facts: GraphInput, group_by: GroupBy) -> str:
+def _group_of(entry: NodeEntry, graph_input: GraphInput, group_by: GroupBy) -> str:
     # "host:lab-pc", "network:ros2", "robot:Pepper"; "" for none.
     if group_by == "nothing":
         return ""
     if _is_page(entry):
         return WEB_GROUP
     if group_by == "robot":
-        mine = [name for name in facts.robots if _belongs_to(entry, name)]
+        mine = [name for name in graph_input.robots if _belongs_to(entry, name)]
         return f"robot:{max(mine, key=len)}" if mine else "robot:"
     return f"host:{entry.host}" if entry.host or not entry.network else f"network:{entry.network}"
 
@@ -302,13 +302,13 @@ def _belongs_to(entry: NodeEntry, robot: str) -> bool:
 
 
 def _groups(
-    facts: GraphInput, choices: GraphOptions, boxes: Mapping[str, DrawnNode]
+    graph_input: GraphInput, choices: GraphOptions, boxes: Mapping[str, DrawnNode]
 ) -> tuple[GraphGroup, ...]:
     # Sorted by key. A group whose nodes are all hidden is collapsed, so that it stays visible.
     members: dict[str, list[DrawnNode]] = {}
     for node in boxes.values():
         members.setdefault(node.group, []).append(node)
-    addresses = _addresses(facts)
+    addresses = _addresses(graph_input)
     groups = []
     for key in sorted(members):
         if not key:
@@ -319,7 +319,9 @@ def _groups(
         address = min(counts, key=lambda each: (-counts[each], each)) if counts and key != WEB_GROUP else ""
         closed = choices.is_collapsed(key) or hidden == len(nodes)
         groups.append(
-            GraphGroup(key, _host_of(key), address, _icon_of(key, nodes, facts), len(nodes), hidden, closed)
+            GraphGroup(
+                key, _host_of(key), address, _icon_of(key, nodes, graph_input), len(nodes), hidden, closed
+            )
         )
     return tuple(groups)
 
@@ -328,7 +330,7 @@ def _host_of(group: str) -> str:
     return group.partition(":")[2]
 
 
-def _icon_of(group: str, nodes: Iterable[DrawnNode], facts: GraphInput) -> str:
+def _icon_of(group: str, nodes: Iterable[DrawnNode], graph_input: GraphInput) -> str:
     kind, _colon, name = group.partition(":")
     if kind == "network":
         return "waypoints"
@@ -336,22 +338,22 @@ def _icon_of(group: str, nodes: Iterable[DrawnNode], facts: GraphInput) -> str:
         return "globe"
     if kind == "robot":
         return "bot" if name else "box"
-    return "bot" if name != facts.host and any(node.kind == "robot" for node in nodes) else "monitor"
+    return "bot" if name != graph_input.host and any(node.kind == "robot" for node in nodes) else "monitor"
 
 
-def _addresses(facts: GraphInput) -> dict[str, str]:
+def _addresses(graph_input: GraphInput) -> dict[str, str]:
     # By the key of an entry, where its publishers are reachable from other computers.
-    found: dict[str, str] = {}
-    for topic in facts.topics:
+    addresses: dict[str, str] = {}
+    for topic in graph_input.topics:
         if topic.info is None:
             continue
         for publisher in topic.info.publishers:
             entry = key_of(topic.network, publisher.node_id)
-            if entry not in found:
+            if entry not in addresses:
                 reached = next(filter(None, map(_address_in, publisher.endpoints)), "")
                 if reached:
-                    found[entry] = reached
-    return found
+                    addresses[entry] = reached
+    return addresses
 
 
 def _address_in(endpoint: str) -> str:
@@ -386,10 +388,12 @@ def is_drawn(topic: str, choices: GraphOptions) -> bool:
     return choices.shows_internal or not topic.startswith(INTERNAL_PREFIX)
 
 
-def _topic_lines(facts: GraphInput, choices: GraphOptions, place: Mapping[str, str]) -> Iterator[GraphLine]:
-    patterns = _patterns(facts)
+def _topic_lines(
+    graph_input: GraphInput, choices: GraphOptions, box_by_entry: Mapping[str, str]
+) -> Iterator[GraphLine]:
+    patterns = _patterns(graph_input)
     bundles: dict[_LineEnds, list[str]] = {}
-    for topic in facts.topics:
+    for topic in graph_input.topics:
         info = topic.info
         if info is None or topic.gone_s is not None or not is_drawn(topic.name, choices):
             continue
@@ -400,39 +404,41 @@ def _topic_lines(facts: GraphInput, choices: GraphOptions, place: Mapping[str, s
             if network == topic.network and matches(pattern, topic.name)
         ]
         speakers = (key_of(topic.network, each.node_id) for each in info.publishers)
-        _add_to_bundle(bundles, _ends(speakers, hearers, place), topic.key)
+        _add_to_bundle(bundles, _ends(speakers, hearers, box_by_entry), topic.key)
     yield from _lines_of("topic", bundles)
 
 
-def _service_lines(facts: GraphInput, choices: GraphOptions, place: Mapping[str, str]) -> Iterator[GraphLine]:
+def _service_lines(
+    graph_input: GraphInput, choices: GraphOptions, box_by_entry: Mapping[str, str]
+) -> Iterator[GraphLine]:
     bundles: dict[_LineEnds, list[str]] = {}
-    for name, info in facts.services.items():
+    for name, info in graph_input.services.items():
         if is_drawn(name, choices):
             clients = (each.node_id for each in info.clients)
             servers = (each.node_id for each in info.servers)
-            _add_to_bundle(bundles, _ends(clients, servers, place), name)
+            _add_to_bundle(bundles, _ends(clients, servers, box_by_entry), name)
     yield from _lines_of("service", bundles)
 
 
-def _patterns(facts: GraphInput) -> list[tuple[str, str, str]]:
+def _patterns(graph_input: GraphInput) -> list[tuple[str, str, str]]:
     # (network, pattern, entry) of subscribers of patterns.
     return [
         (entry.network, topic, entry.key)
-        for entry in facts.nodes
+        for entry in graph_input.nodes
         if entry.gone_s is None
         for topic in entry.subscribed_topics
         if is_pattern(topic)
     ]
 
 
-def _ends(sources: Iterable[str], targets: Iterable[str], place: Mapping[str, str]) -> _LineEnds:
+def _ends(sources: Iterable[str], targets: Iterable[str], box_by_entry: Mapping[str, str]) -> _LineEnds:
     # Boxes that are drawn, each once.
-    return _boxes_of(sources, place), _boxes_of(targets, place)
+    return _boxes_of(sources, box_by_entry), _boxes_of(targets, box_by_entry)
 
 
-def _boxes_of(entries: Iterable[str], place: Mapping[str, str]) -> tuple[str, ...]:
-    found = {place[each] for each in entries if each in place}
-    return tuple(found) if len(found) < 2 else tuple(sorted(found))
+def _boxes_of(entries: Iterable[str], box_by_entry: Mapping[str, str]) -> tuple[str, ...]:
+    boxes = {box_by_entry[each] for each in entries if each in box_by_entry}
+    return tuple(boxes) if len(boxes) < 2 else tuple(sorted(boxes))
 
 
 def _add_to_bundle(bundles: dict[_LineEnds, list[str]], ends: _LineEnds, name: str) -> None:

@@ -28,7 +28,7 @@ class GraphSelection:
 
 
 def move_selection(
-    graph: NodeGraph, layout: GraphLayout, chosen: GraphSelection | None, arrow: Arrow
+    graph: NodeGraph, layout: GraphLayout, selection: GraphSelection | None, arrow: Arrow
 ) -> GraphSelection | None:
     """Return the selection after an arrow key was pressed.
 
@@ -36,52 +36,54 @@ def move_selection(
     of the lines. Up and down move to the next line of the same node, or to the node above or below. The
     selection is unchanged if there is nothing in that direction, and None in an empty graph.
     """
-    if chosen is None or not _exists(graph, layout, chosen):
+    if selection is None or not _exists(graph, layout, selection):
         first = min(layout.positions, key=lambda key: (layout.positions[key], key), default=None)
         return GraphSelection("node", first) if first is not None else None
-    if chosen.kind == "node":
-        return _step_from_node(graph, layout, chosen, arrow)
-    return _step_from_line(graph, layout, chosen, arrow)
+    if selection.kind == "node":
+        return _step_from_node(graph, layout, selection, arrow)
+    return _step_from_line(graph, layout, selection, arrow)
 
 
-def _exists(graph: NodeGraph, layout: GraphLayout, chosen: GraphSelection) -> bool:
-    if chosen.kind == "node":
-        return chosen.key in layout.positions
-    return graph.line_of(chosen.key) is not None
+def _exists(graph: NodeGraph, layout: GraphLayout, selection: GraphSelection) -> bool:
+    if selection.kind == "node":
+        return selection.key in layout.positions
+    return graph.line_of(selection.key) is not None
 
 
 def _step_from_node(
-    graph: NodeGraph, layout: GraphLayout, chosen: GraphSelection, arrow: Arrow
+    graph: NodeGraph, layout: GraphLayout, selection: GraphSelection, arrow: Arrow
 ) -> GraphSelection:
     if arrow in {"up", "down"}:
-        return GraphSelection("node", _next_in_column(layout, chosen.key, arrow))
-    lines = _lines_at(graph, layout, chosen.key, outward=arrow == "right")
+        return GraphSelection("node", _next_in_column(layout, selection.key, arrow))
+    lines = _lines_at(graph, layout, selection.key, outward=arrow == "right")
     if not lines:
-        return chosen
-    return GraphSelection("topic", lines[0].topics[0], chosen.key, arrow == "right")
+        return selection
+    return GraphSelection("topic", lines[0].topics[0], selection.key, arrow == "right")
 
 
 def _step_from_line(
-    graph: NodeGraph, layout: GraphLayout, chosen: GraphSelection, arrow: Arrow
+    graph: NodeGraph, layout: GraphLayout, selection: GraphSelection, arrow: Arrow
 ) -> GraphSelection:
-    line = graph.line_of(chosen.key)
+    line = graph.line_of(selection.key)
     if line is None:
-        return chosen
+        return selection
     if arrow in {"left", "right"}:
-        ends = line.targets if arrow == "right" else line.sources
-        near = layout.positions.get(chosen.origin)
-        goes_on = chosen.is_outward is (arrow == "right")
-        if not goes_on and chosen.origin in ends:
-            return GraphSelection("node", chosen.origin)
-        there = [key for key in ends if key in layout.positions and key != chosen.origin]
-        return GraphSelection("node", _nearest(layout, there, near)) if there else chosen
-    ends = line.sources if chosen.is_outward else line.targets
-    origin = chosen.origin if chosen.origin in ends else ends[0]
-    lines = _lines_at(graph, layout, origin, outward=chosen.is_outward)
+        end_keys = line.targets if arrow == "right" else line.sources
+        origin_position = layout.positions.get(selection.origin)
+        goes_on = selection.is_outward is (arrow == "right")
+        if not goes_on and selection.origin in end_keys:
+            return GraphSelection("node", selection.origin)
+        reachable = [key for key in end_keys if key in layout.positions and key != selection.origin]
+        return (
+            GraphSelection("node", _nearest(layout, reachable, origin_position)) if reachable else selection
+        )
+    end_keys = line.sources if selection.is_outward else line.targets
+    origin = selection.origin if selection.origin in end_keys else end_keys[0]
+    lines = _lines_at(graph, layout, origin, outward=selection.is_outward)
     topics = [topic for each in lines for topic in each.topics]
-    at = topics.index(chosen.key) + (1 if arrow == "down" else -1)
-    at = min(max(at, 0), len(topics) - 1)
-    return GraphSelection("topic", topics[at], origin, chosen.is_outward)
+    index = topics.index(selection.key) + (1 if arrow == "down" else -1)
+    index = min(max(index, 0), len(topics) - 1)
+    return GraphSelection("topic", topics[index], origin, selection.is_outward)
 
 
 def _lines_at(graph: NodeGraph, layout: GraphLayout, key: str, *, outward: bool) -> list[GraphLine]:
@@ -95,8 +97,8 @@ def _lines_at(graph: NodeGraph, layout: GraphLayout, key: str, *, outward: bool)
     return sorted(lines, key=height)
 
 
-def _nearest(layout: GraphLayout, keys: list[str], near: Position | None) -> str:
-    x, y = near if near is not None else layout.positions[keys[0]]
+def _nearest(layout: GraphLayout, keys: list[str], reference: Position | None) -> str:
+    x, y = reference if reference is not None else layout.positions[keys[0]]
     return min(
         keys, key=lambda key: (abs(layout.positions[key][0] - x) + abs(layout.positions[key][1] - y), key)
     )
@@ -105,10 +107,10 @@ def _nearest(layout: GraphLayout, keys: list[str], near: Position | None) -> str
 def _next_in_column(layout: GraphLayout, key: str, arrow: Arrow) -> str:
     # Prefers the same column to a small distance; itself when there is none.
     x, y = layout.positions[key]
-    way = 1 if arrow == "down" else -1
+    direction = 1 if arrow == "down" else -1
     others = {
-        other: (abs(at[0] - x) * 3 + (at[1] - y) * way)
-        for other, at in layout.positions.items()
-        if (at[1] - y) * way > 1
+        other: (abs(position[0] - x) * 3 + (position[1] - y) * direction)
+        for other, position in layout.positions.items()
+        if (position[1] - y) * direction > 1
     }
     return min(others, key=lambda other: (others[other], other), default=key)

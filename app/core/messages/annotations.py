@@ -114,13 +114,13 @@ def _circle(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationSha
 
 def _points(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
     kind = _number(item.get("type")) or 0
-    found = (frame.point(value) for value in islice(_items(item.get("points")), frame.left))
-    points, thickness = tuple(point for point in found if point is not None), _thickness(item)
+    parsed_points = (frame.point(value) for value in islice(_items(item.get("points")), frame.left))
+    points, thickness = tuple(point for point in parsed_points if point is not None), _thickness(item)
     outline, fill = _colour(item.get("outline_color")), _colour(item.get("fill_color"))
     each = [_colour(colour) for colour in islice(_items(item.get("outline_colors")), len(points))]
     if kind == POINTS and len(each) == len(points):
-        for at, own in zip(points, each, strict=True):
-            yield AnnotationShape("points", (at,), own, None, thickness)
+        for vertex, point_colour in zip(points, each, strict=True):
+            yield AnnotationShape("points", (vertex,), point_colour, None, thickness)
     elif kind == POINTS:
         yield AnnotationShape("points", points, outline, fill, thickness)
     elif kind == LINE_LOOP and len(points) > 1:
@@ -128,19 +128,23 @@ def _points(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationSha
     elif kind == LINE_STRIP and len(points) > 1:
         yield AnnotationShape("line", points, outline, None, thickness)
     elif kind == LINE_LIST:
-        for place in range(0, len(points) - 1, 2):
-            own = each[place // 2] if place // 2 < len(each) else outline
-            yield AnnotationShape("line", points[place : place + 2], own, None, thickness)
+        for index in range(0, len(points) - 1, 2):
+            point_colour = each[index // 2] if index // 2 < len(each) else outline
+            yield AnnotationShape("line", points[index : index + 2], point_colour, None, thickness)
 
 
 def _text(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
-    at, words, height = frame.point(item.get("position")), item.get("text"), _number(item.get("font_size"))
-    if at is None or not isinstance(words, str) or not words.strip():
+    position, text, height = (
+        frame.point(item.get("position")),
+        item.get("text"),
+        _number(item.get("font_size")),
+    )
+    if position is None or not isinstance(text, str) or not text.strip():
         return
     size = (0.0, (height if height is not None and height > 0 else 12.0) / frame.height)
-    ink, ground = _colour(item.get("text_color")) or YELLOW, _colour(item.get("background_color"))
+    colour, ground = _colour(item.get("text_color")) or YELLOW, _colour(item.get("background_color"))
     yield AnnotationShape(
-        "text", (at,), ink, ground, 1.0, size, shortened(" ".join(words.split()), MAX_TEXT_LENGTH)
+        "text", (position,), colour, ground, 1.0, size, shortened(" ".join(text.split()), MAX_TEXT_LENGTH)
     )
 
 
@@ -153,18 +157,18 @@ def _parse_face(payload: Mapping[str, object]) -> tuple[AnnotationShape, ...] | 
     corner, size = frame.point(face.get("center")), face.get("size")
     if corner is None or not isinstance(size, Mapping):
         return None
-    wide, high = _number(size.get("w")), _number(size.get("h"))
-    if wide is None or high is None or wide <= 0 or high <= 0:
+    width, height = _number(size.get("w")), _number(size.get("h"))
+    if width is None or height is None or width <= 0 or height <= 0:
         return None
     x, y = corner
-    right, low = x + wide / frame.width, y + high / frame.height
+    right, low = x + width / frame.width, y + height / frame.height
     corners = ((x, y), (right, y), (right, low), (x, low))
     return (AnnotationShape("area", corners, YELLOW, None, 2.0, text=_("face")),)
 
 
 def _thickness(item: Mapping[str, object]) -> float:
-    found = _number(item.get("thickness"))
-    return found if found is not None and found > 0 else 1.0
+    thickness = _number(item.get("thickness"))
+    return thickness if thickness is not None and thickness > 0 else 1.0
 
 
 def _colour(value: object) -> Colour | None:

@@ -54,12 +54,12 @@ class MessageHistory:
     def add(self, message: Message) -> None:
         """Append a message; evict the oldest messages beyond the limits."""
         message.latency_s  # noqa: B018  caches the latency at arrival
-        kept = copy(message)
-        kept.decoded = UNDECODED
-        if not isinstance(kept.raw, bytes):
-            kept.raw = bytes(kept.raw)
-        self._kept.append(kept)
-        self.size_bytes += kept.size_bytes
+        stored = copy(message)
+        stored.decoded = UNDECODED
+        if not isinstance(stored.raw, bytes):
+            stored.raw = bytes(stored.raw)
+        self._kept.append(stored)
+        self.size_bytes += stored.size_bytes
         while len(self._kept) > 1 and (
             len(self._kept) > self._most_messages or self.size_bytes > self._most_bytes
         ):

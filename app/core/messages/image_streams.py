@@ -128,13 +128,13 @@ class ImageStream:
         """Set the display style, and decode the current image again, even while it is frozen."""
         self._images.set_look(self, look)
 
-    def set_frozen(self, held: bool) -> None:
+    def set_frozen(self, frozen: bool) -> None:
         """Freeze the current image, or show the newest image again.
 
         Args:
-            held: True to freeze the image.
+            frozen: True to freeze the image.
         """
-        self._images.set_frozen(self, held)
+        self._images.set_frozen(self, frozen)
 
     def count_painted(self) -> None:
         """Count a painted image for `displayed_hz`. The panel calls this once for each image."""
@@ -249,9 +249,9 @@ class Images:
         with self.lock:
             if not stream.is_frozen:
                 stream.pending = None
-            left = [other for other in self._streams.get(stream.topic, []) if other is not stream]
-            if left:
-                self._streams[stream.topic] = left
+            remaining = [other for other in self._streams.get(stream.topic, []) if other is not stream]
+            if remaining:
+                self._streams[stream.topic] = remaining
             else:
                 self._streams.pop(stream.topic, None)
 
@@ -284,11 +284,11 @@ class Images:
                 stream.pending = (picture.message, picture.received_s)
                 self._arrived.notify()
 
-    def set_frozen(self, stream: ImageStream, held: bool) -> None:
+    def set_frozen(self, stream: ImageStream, frozen: bool) -> None:
         """Freeze a stream or show its newest image again; see `ImageStream.set_frozen`."""
         with self.lock:
-            stream.is_frozen = held
-            if held:
+            stream.is_frozen = frozen
+            if frozen:
                 stream.pending = None
 
     def close(self) -> None:
@@ -317,8 +317,8 @@ class Images:
     def decode_pending(self) -> None:
         """Decode the newest pending image of each stream. Called in the decoding thread."""
         with self.lock:
-            work, times = self._take_pending(), self._times
-        for streams, message, arrived_s, size, look in work:
+            pending_work, times = self._take_pending(), self._times
+        for streams, message, arrived_s, size, look in pending_work:
             try:
                 picture, error = reuse_picture(streams[0].picture, message, arrived_s, size, look), None
                 if picture is None:
@@ -335,25 +335,25 @@ class Images:
                     _deliver(stream, message, picture, error)
 
     def _has_pending(self) -> bool:
-        every = (stream for streams in self._streams.values() for stream in streams)
-        return any(stream.pending is not None for stream in every)
+        all_streams = (stream for streams in self._streams.values() for stream in streams)
+        return any(stream.pending is not None for stream in all_streams)
 
     def _take_pending(self) -> list[tuple[list[ImageStream], Message, float, Size | None, PictureLook]]:
-        work = []
+        pending_work = []
         for streams in self._streams.values():
             waiting = [stream for stream in streams if stream.pending is not None]
             if not waiting:
                 continue
             of_message: dict[tuple[int, PictureLook], list[ImageStream]] = {}
             for stream in waiting:  # a held stream decodes its own image again
-                asked = (id(stream.pending[0]), stream.look)  # type: ignore[index]
-                of_message.setdefault(asked, []).append(stream)
+                image_key = (id(stream.pending[0]), stream.look)  # type: ignore[index]
+                of_message.setdefault(image_key, []).append(stream)
             for together in of_message.values():
                 message, arrived_s = together[0].pending  # type: ignore[misc]
-                work.append((together, message, arrived_s, _largest(together), together[0].look))
+                pending_work.append((together, message, arrived_s, _largest(together), together[0].look))
             for stream in waiting:
                 stream.pending = None
-        return work
+        return pending_work
 
 
 def _deliver(stream: ImageStream, message: Message, picture: Picture | None, error: str | None) -> None:
@@ -375,10 +375,10 @@ def _deliver(stream: ImageStream, message: Message, picture: Picture | None, err
 def _largest(streams: Sequence[ImageStream]) -> Size | None:
     # None means full resolution.
     wishes = [stream.requested_size for stream in streams]
-    known = [wish for wish in wishes if wish is not None]
-    if len(known) < len(wishes):
+    sizes = [size for size in wishes if size is not None]
+    if len(sizes) < len(wishes):
         return None
-    return max(wish[0] for wish in known), max(wish[1] for wish in known)
+    return max(size[0] for size in sizes), max(size[1] for size in sizes)
 
 
 def _is_too_small(picture: Picture, size: Size | None) -> bool:

@@ -73,7 +73,7 @@ class JsonIndex:
         ]
         self._kept: dict[int, _LazyContainer] = {}
         self._many: dict[int, tuple[int, Positions, Positions]] = {}
-        self._ends = [places[np.isin(kinds, list(CLOSE))] for places, kinds in self._levels]
+        self._ends = [positions[np.isin(kinds, list(CLOSE))] for positions, kinds in self._levels]
 
     @cached_property
     def root(self) -> object:
@@ -97,19 +97,19 @@ class JsonIndex:
             return self._container(start, level, first)
         text = bytes(self.data[start:end])
         try:
-            found: object = orjson.loads(text)
+            decoded: object = orjson.loads(text)
         except orjson.JSONDecodeError:
             return UnreadableValue(text)
-        return found
+        return decoded
 
     def _container(self, start: int, level: int, first: int) -> _LazyContainer:
         # Cached, so that it is the same object each time, up to `MAX_CACHED_CONTAINERS` containers.
-        found = self._kept.get(start)
-        if found is None:
-            found = (LazyObject if first == OPEN[0] else LazyList)(self, start, level)
+        container = self._kept.get(start)
+        if container is None:
+            container = (LazyObject if first == OPEN[0] else LazyList)(self, start, level)
             if len(self._kept) < MAX_CACHED_CONTAINERS:
-                self._kept[start] = found
-        return found
+                self._kept[start] = container
+        return container
 
     def separators(self, start: int, level: int) -> tuple[int, Positions, Positions]:
         """Return the end, the comma positions and the colon positions of an object or array.
@@ -122,26 +122,26 @@ class JsonIndex:
 
         if start in self._many:
             return self._many[start]
-        places, kinds = self._levels[level]
-        ends = self._ends[level]
-        end = int(ends[np.searchsorted(ends, start)])
-        first, last = np.searchsorted(places, start) + 1, np.searchsorted(places, end)
-        own, kind = places[first:last], kinds[first:last]
-        found = end, own[kind == COMMA], own[kind == COLON]
-        if len(own) > MIN_CACHED_SEPARATORS:  # requested repeatedly, and slow to find
-            self._many[start] = found
-        return found
+        positions, kinds = self._levels[level]
+        end_positions = self._ends[level]
+        end = int(end_positions[np.searchsorted(end_positions, start)])
+        first, last = np.searchsorted(positions, start) + 1, np.searchsorted(positions, end)
+        inner_positions, kind = positions[first:last], kinds[first:last]
+        parts = end, inner_positions[kind == COMMA], inner_positions[kind == COLON]
+        if len(inner_positions) > MIN_CACHED_SEPARATORS:  # requested repeatedly, and slow to find
+            self._many[start] = parts
+        return parts
 
-    def path_to(self, place: int) -> tuple[str | int, ...]:
+    def path_to(self, position: int) -> tuple[str | int, ...]:
         """Return the keys and indices that lead to the value at a position of the text."""
         path: list[str | int] = []
-        here = self.root
-        while isinstance(here, _LazyContainer):
-            row = here.row_at(place)
+        container = self.root
+        while isinstance(container, _LazyContainer):
+            row = container.row_at(position)
             if row is None:
                 break
-            path.append(here.key_at(row))
-            here = here.value_at(row)
+            path.append(container.key_at(row))
+            container = container.value_at(row)
         return tuple(path)
 
 
@@ -167,12 +167,12 @@ class _LazyContainer:
         start = self._start + 1 if row == 0 else int(commas[row - 1]) + 1
         return start, int(commas[row]) if row < len(commas) else end
 
-    def row_at(self, place: int) -> int | None:
+    def row_at(self, position: int) -> int | None:
         # Index of the child at a position of the text.
         end, commas, _colons = self._parts
-        if not self._start < place < end or not self._count:
+        if not self._start < position < end or not self._count:
             return None
-        return int(commas.searchsorted(place))
+        return int(commas.searchsorted(position))
 
     def key_at(self, row: int) -> str | int:
         return row
@@ -216,10 +216,10 @@ class LazyList(_LazyContainer, Sequence[object]):
     def __getitem__(self, row: int | slice) -> object:
         if isinstance(row, slice):
             return [self.value_at(each) for each in range(*row.indices(self._count))]
-        place = row + self._count if row < 0 else row
-        if not 0 <= place < self._count:
+        index = row + self._count if row < 0 else row
+        if not 0 <= index < self._count:
             raise IndexError(row)
-        return self.value_at(place)
+        return self.value_at(index)
 
 
 class LazyObject(_LazyContainer, Mapping[str, object]):
@@ -255,8 +255,8 @@ class LazyObject(_LazyContainer, Mapping[str, object]):
         # Position of a child's colon; its end if there is none.
         start, end = self._bounds(row)
         colons = self._parts[2]
-        at = int(colons.searchsorted(start))
-        return int(colons[at]) if at < len(colons) and colons[at] < end else end
+        index = int(colons.searchsorted(start))
+        return int(colons[index]) if index < len(colons) and colons[index] < end else end
 
     @cached_property
     def _rows(self) -> dict[str, int]:
@@ -273,9 +273,9 @@ def _find_separators(data: memoryview) -> tuple[Positions, NDArray[np.uint8]]:
     # Positions and kinds of all brackets, commas and colons outside of strings.
     import numpy as np  # noqa: PLC0415
 
-    wanted = np.zeros(256, bool)
-    wanted[list(OPEN + CLOSE + bytes((COMMA, COLON)))] = True
-    places, kinds = [], []
+    is_separator = np.zeros(256, bool)
+    is_separator[list(OPEN + CLOSE + bytes((COMMA, COLON)))] = True
+    positions, kinds = [], []
     in_text, escaped = 0, False
     for begin in range(0, len(data), CHUNK_BYTES):
         part = np.frombuffer(data[begin : begin + CHUNK_BYTES], np.uint8)
@@ -284,14 +284,14 @@ def _find_separators(data: memoryview) -> tuple[Positions, NDArray[np.uint8]]:
         if escaped or len(slashes):
             skipped, escaped = _find_escaped(slashes, len(part), escaped)
             quotes[skipped] = False
-        inside = (np.cumsum(quotes, dtype=np.int32) + in_text) & 1
-        found = np.flatnonzero(np.take(wanted, part) & (inside == 0))
-        places.append(found + begin)
-        kinds.append(part[found])
-        in_text = int(inside[-1])
-    if in_text or not places:
+        inside_string = (np.cumsum(quotes, dtype=np.int32) + in_text) & 1
+        indexes = np.flatnonzero(np.take(is_separator, part) & (inside_string == 0))
+        positions.append(indexes + begin)
+        kinds.append(part[indexes])
+        in_text = int(inside_string[-1])
+    if in_text or not positions:
         raise ValueError(_("unterminated string"))
-    return np.concatenate(places), np.concatenate(kinds)
+    return np.concatenate(positions), np.concatenate(kinds)
 
 
 def _find_escaped(slashes: Positions, length: int, first: bool) -> tuple[list[int] | Positions, bool]:
@@ -306,6 +306,6 @@ def _find_escaped(slashes: Positions, length: int, first: bool) -> tuple[list[in
     starts = np.flatnonzero(run)
     within = np.arange(len(slashes)) - np.repeat(starts, np.diff(np.append(starts, len(slashes))))
     counting = slashes[within % 2 == 0] + 1
-    over = bool(counting[-1] == length)
-    found = counting[:-1] if over else counting
-    return (np.append(found, 0) if first else found), over
+    carries_over = bool(counting[-1] == length)
+    escaped_positions = counting[:-1] if carries_over else counting
+    return (np.append(escaped_positions, 0) if first else escaped_positions), carries_over

@@ -16,9 +16,9 @@ class NewestJobWorker(Generic[Job, Result]):
     The first job starts the thread.
     """
 
-    def __init__(self, work: Callable[[Job], Result], name: str) -> None:
+    def __init__(self, process_job: Callable[[Job], Result], name: str) -> None:
         # `work` is called in the thread and must not raise.
-        self._work, self._name = work, name
+        self._work, self._name = process_job, name
         self._wake = threading.Condition()
         self._waiting: list[Job] = []  # at most one
         self._working: list[Job] = []
@@ -44,8 +44,8 @@ class NewestJobWorker(Generic[Job, Result]):
     def pop_result(self) -> Result | None:
         """Return and clear the last result; None if there is none."""
         with self._wake:
-            done, self._done = self._done, []
-        return done[0] if done else None
+            results, self._done = self._done, []
+        return results[0] if results else None
 
     def clear(self) -> None:
         """Discard the pending job, the finished result, and the result of a running job."""
@@ -70,7 +70,7 @@ class NewestJobWorker(Generic[Job, Result]):
                     return
                 mine = self._working = self._waiting
                 self._waiting = []
-            done = self._work(mine[0])
+            result = self._work(mine[0])
             with self._wake:
                 if self._working is mine:  # otherwise it was discarded
-                    self._done, self._working = [done], []
+                    self._done, self._working = [result], []

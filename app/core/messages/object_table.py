@@ -44,12 +44,12 @@ class ObjectRow:
 
     def at(self, column: Steps) -> object:
         """Return the value in a column; `MISSING` if there is none."""
-        here: object = self.value
+        current: object = self.value
         for step in column:
-            if not isinstance(here, Mapping):
+            if not isinstance(current, Mapping):
                 return MISSING
-            here = here.get(step, MISSING)
-        return here
+            current = current.get(step, MISSING)
+        return current
 
 
 def is_list(value: object) -> bool:
@@ -65,23 +65,23 @@ def is_list_of_objects(value: object) -> bool:
     return all(isinstance(each, Mapping) for each in first) and any(first)
 
 
-def lists_of_objects(value: object, most: int = MAX_LISTS) -> list[Steps]:
+def lists_of_objects(value: object, max_paths: int = MAX_LISTS) -> list[Steps]:
     """Return the paths of the arrays of objects in a message, outermost first.
 
-    The path ``()`` is the message itself. At most ``most`` paths are returned.
+    The path ``()`` is the message itself. At most ``max_paths`` paths are returned.
     """
-    found: list[Steps] = []
+    paths: list[Steps] = []
     waiting: deque[tuple[Steps, object]] = deque([((), value)])
     for _each in range(_MAX_SEARCHED_VALUES):
-        if not waiting or len(found) >= most:
+        if not waiting or len(paths) >= max_paths:
             break
-        steps, here = waiting.popleft()
-        if is_list_of_objects(here):
-            found.append(steps)
-        elif isinstance(here, Mapping):
+        steps, current = waiting.popleft()
+        if is_list_of_objects(current):
+            paths.append(steps)
+        elif isinstance(current, Mapping):
             room = max(0, _MAX_SEARCHED_VALUES - len(waiting))
-            waiting.extend(((*steps, str(key)), below) for key, below in islice(here.items(), room))
-    return found
+            waiting.extend(((*steps, str(key)), below) for key, below in islice(current.items(), room))
+    return paths
 
 
 def value_at(value: object, steps: Steps) -> object:
@@ -98,38 +98,38 @@ def value_at(value: object, steps: Steps) -> object:
     return value
 
 
-def rows_of(value: object, most: int = MAX_ROWS) -> list[ObjectRow]:
-    """Return the first ``most`` objects of an array as rows; other elements are skipped."""
+def rows_of(value: object, max_rows: int = MAX_ROWS) -> list[ObjectRow]:
+    """Return the first ``max_rows`` objects of an array as rows; other elements are skipped."""
     if not is_list(value):
         return []
     return [
-        ObjectRow(place, str(place), each)
-        for place, each in enumerate(islice(value, most))  # type: ignore[call-overload]
+        ObjectRow(index, str(index), each)
+        for index, each in enumerate(islice(value, max_rows))  # type: ignore[call-overload]
         if isinstance(each, Mapping)
     ]
 
 
-def query_rows(found: Iterable[tuple[str, object]], most: int = MAX_ROWS) -> list[ObjectRow]:
+def query_rows(matches: Iterable[tuple[str, object]], max_rows: int = MAX_ROWS) -> list[ObjectRow]:
     """Return the objects in a query result as rows, named by their paths.
 
     If the result is a single array of objects, the rows are its elements.
 
     Args:
-        found: Pairs of path and value.
-        most: Maximum number of rows.
+        matches: Pairs of path and value.
+        max_rows: Maximum number of rows.
     """
-    pairs = list(found)
+    pairs = list(matches)
     if len(pairs) == 1 and is_list_of_objects(pairs[0][1]):
-        return rows_of(pairs[0][1], most)
-    every = (
-        ObjectRow(place, str(name), each)
-        for place, (name, each) in enumerate(pairs)
+        return rows_of(pairs[0][1], max_rows)
+    rows = (
+        ObjectRow(index, str(name), each)
+        for index, (name, each) in enumerate(pairs)
         if isinstance(each, Mapping)
     )
-    return list(islice(every, most))
+    return list(islice(rows, max_rows))
 
 
-def columns_of(rows: Sequence[ObjectRow], most: int = MAX_COLUMNS) -> tuple[Steps, ...]:
+def columns_of(rows: Sequence[ObjectRow], max_columns: int = MAX_COLUMNS) -> tuple[Steps, ...]:
     """Return the columns for some rows: the keys of the first rows, in order of appearance.
 
     The keys of small nested objects become separate columns.
@@ -141,8 +141,8 @@ def columns_of(rows: Sequence[ObjectRow], most: int = MAX_COLUMNS) -> tuple[Step
                 columns.update(dict.fromkeys((key, below) for below in value))  # type: ignore[misc]
             else:
                 columns[(key,)] = None  # type: ignore[index]
-            if len(columns) >= most:
-                return tuple(columns)[:most]
+            if len(columns) >= max_columns:
+                return tuple(columns)[:max_columns]
     inner = {column[0] for column in columns if len(column) > 1}
     return tuple(column for column in columns if len(column) > 1 or column[0] not in inner)
 
@@ -191,6 +191,6 @@ def format_table_csv(first: str, columns: Sequence[Steps], rows: Iterable[Object
         columns: Further columns.
         rows: Rows in order.
     """
-    head = [first, *(escape_formula(column_name(column)) for column in columns)]
+    header = [first, *(escape_formula(column_name(column)) for column in columns)]
     lines = ([escape_formula(row.name), *(cell_text(row.at(column)) for column in columns)] for row in rows)
-    return format_csv([head, *lines])
+    return format_csv([header, *lines])

@@ -99,42 +99,55 @@ def decode(
 
     try:
         frame, size = _decode_frame(message, fit)
-        found = _to_bgra(frame, look)
+        converted = _to_bgra(frame, look)
     except NepError as error:
         return None, str(error)
     except (cv2.error, MemoryError) as error:
         return None, _("“{topic}” sends an image that can't be shown: {problem}").format(
             topic=message.topic, problem=_short_message(error)
         )
-    if found is None:
+    if converted is None:
         return None, _("“{topic}” has images of {shape} {dtype}, which can't be shown").format(
             topic=message.topic, shape=frame.shape, dtype=frame.dtype
         )
-    bgra, numbers, scale = found
-    one = numbers is not None
+    bgra, numbers, scale = converted
+    is_grey = numbers is not None
     if (bgra.shape[1], bgra.shape[0]) != size:
         numbers = None
     image = Picture(
-        bgra, *size, message.seq, message.stamp_ns, received_s, message, numbers, look, scale, one
+        bgra, *size, message.seq, message.stamp_ns, received_s, message, numbers, look, scale, is_grey
     )
     return image, None
 
 
 def reuse_picture(
-    shown: Picture | None, message: Message, received_s: float, fit: Size | None, look: PictureLook = PLAIN
+    displayed: Picture | None,
+    message: Message,
+    received_s: float,
+    fit: Size | None,
+    look: PictureLook = PLAIN,
 ) -> Picture | None:
     """Return the shown image for a new message without decoding, if both messages contain equal bytes.
 
     Returns None if the bytes differ, or if another size or style is requested (see `decode`).
     """
-    if shown is None or shown.message is None or shown.message is message or shown.look != look:
+    if (
+        displayed is None
+        or displayed.message is None
+        or displayed.message is message
+        or displayed.look != look
+    ):
         return None
-    of, factor = shown.message, _reduction_factor((shown.width, shown.height), fit)
-    if abs(shown.bgra.shape[0] * factor - shown.height) >= factor:  # rounded up or down
+    displayed_message, factor = displayed.message, _reduction_factor((displayed.width, displayed.height), fit)
+    if abs(displayed.bgra.shape[0] * factor - displayed.height) >= factor:  # rounded up or down
         return None
-    if of.extension != message.extension or not _are_bytes_equal(of.data, message.data):
+    if displayed_message.extension != message.extension or not _are_bytes_equal(
+        displayed_message.data, message.data
+    ):
         return None
-    return replace(shown, seq=message.seq, stamp_ns=message.stamp_ns, received_s=received_s, message=message)
+    return replace(
+        displayed, seq=message.seq, stamp_ns=message.stamp_ns, received_s=received_s, message=message
+    )
 
 
 def _are_bytes_equal(one: memoryview, other: memoryview) -> bool:
@@ -173,8 +186,8 @@ def encode_png(message: Message) -> bytes:
             _("image of {dtype}").format(dtype=frame.dtype),
             _("only integers of 8 or 16 bits are supported"),
         )
-    good, data = cv2.imencode(".png", frame)
-    if not good:
+    succeeded, data = cv2.imencode(".png", frame)
+    if not succeeded:
         raise OSError(_("an image of shape {shape} can't be written as PNG").format(shape=frame.shape))
     return bytes(data.tobytes())
 
@@ -249,10 +262,10 @@ def _to_eight_bits(frame: NDArray[Any]) -> NDArray[np.uint8]:
 
     if frame.dtype == np.uint16:
         return (frame >> 8).astype(np.uint8)
-    known = np.isfinite(frame)
-    values = frame[known]
+    is_finite = np.isfinite(frame)
+    values = frame[is_finite]
     if frame.dtype.kind == "f" and values.size and values.min() >= 0 and values.max() <= 1:
-        return np.asarray(np.where(known, frame, 0) * 255 + 0.5, np.uint8)
+        return np.asarray(np.where(is_finite, frame, 0) * 255 + 0.5, np.uint8)
     if not values.size:
         return np.zeros(frame.shape, np.uint8)
-    return scaled(frame, known, float(values.min()), float(values.max()))
+    return scaled(frame, is_finite, float(values.min()), float(values.max()))

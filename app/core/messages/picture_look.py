@@ -55,8 +55,8 @@ def parse_look(saved: object) -> PictureLook:
     """Parse the result of `PictureLook.to_json`; invalid values become defaults."""
     if not isinstance(saved, Mapping):
         return PLAIN
-    found = {name: _number(saved.get(name)) for name in ("brightness", "contrast", "low", "high")}
-    brightness, contrast, low, high = found.values()
+    saved_numbers = {name: _number(saved.get(name)) for name in ("brightness", "contrast", "low", "high")}
+    brightness, contrast, low, high = saved_numbers.values()
     colours = saved.get("colours")
     look = PictureLook(
         min(max(brightness, -1.0), 1.0) if brightness is not None else 0.0,
@@ -70,10 +70,10 @@ def _number(value: object) -> float | None:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
     try:
-        found = float(value)
+        converted = float(value)
     except OverflowError:
         return None
-    return found if math.isfinite(found) else None
+    return converted if math.isfinite(converted) else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,53 +114,53 @@ def apply_colour_map(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[
     import cv2  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
 
-    known = np.isfinite(numbers)
-    low, high = _value_range(look, numbers[known], is_bytes=numbers.dtype == np.uint8)
+    is_finite = np.isfinite(numbers)
+    low, high = _value_range(look, numbers[is_finite], is_bytes=numbers.dtype == np.uint8)
     colours = _colours(look.colours or ("grey" if numbers.dtype == np.uint8 else DEFAULT_COLOUR_MAP))[
         _tones(look)
     ]
-    shown = cv2.cvtColor(scaled(numbers, known, low, high), cv2.COLOR_GRAY2BGR)
-    bgra = cv2.cvtColor(cv2.LUT(shown, colours[:, ::-1].reshape(256, 1, 3)), cv2.COLOR_BGR2BGRA)
-    if not known.all():
-        bgra[~known] = (0, 0, 0, 255)
+    scaled_image = cv2.cvtColor(scaled(numbers, is_finite, low, high), cv2.COLOR_GRAY2BGR)
+    bgra = cv2.cvtColor(cv2.LUT(scaled_image, colours[:, ::-1].reshape(256, 1, 3)), cv2.COLOR_BGR2BGRA)
+    if not is_finite.all():
+        bgra[~is_finite] = (0, 0, 0, 255)
     return np.asarray(bgra, np.uint8), ColourScale(low, high, colours)
 
 
 def _value_range(look: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> tuple[float, float]:
     # In ascending order.
-    own = (
+    default_range = (
         (0.0, 255.0)
         if is_bytes
         else (float(values.min()), float(values.max()))
         if values.size
         else (0.0, 0.0)
     )
-    low = look.low if look.low is not None else own[0]
-    high = look.high if look.high is not None else own[1]
+    low = look.low if look.low is not None else default_range[0]
+    high = look.high if look.high is not None else default_range[1]
     return (low, high) if low <= high else (low, low) if look.low is not None else (high, high)
 
 
-def scaled(frame: NDArray[Any], known: NDArray[np.bool_], low: float, high: float) -> NDArray[np.uint8]:
+def scaled(frame: NDArray[Any], is_valid: NDArray[np.bool_], low: float, high: float) -> NDArray[np.uint8]:
     """Scale values linearly to the range 0 (``low`` and below) to 255 (``high`` and above).
 
     Args:
         frame: Values.
-        known: False where a value is invalid; the result is 0 there.
+        is_valid: False where a value is invalid; the result is 0 there.
         low: Value that becomes 0.
         high: Value that becomes 255.
     """
     import numpy as np  # noqa: PLC0415
 
-    shown = np.zeros(frame.shape, np.uint8)
+    result = np.zeros(frame.shape, np.uint8)
     span = high / 2 - low / 2  # halves, because the difference of two floats may overflow
     if span <= 0:
-        return shown
+        return result
     # in strips, because double precision takes eight bytes per value
     for start in range(0, len(frame), STRIP_ROWS):
         rows = slice(start, start + STRIP_ROWS)
-        strip = np.where(known[rows], frame[rows], low).astype(np.float64)
-        shown[rows] = np.clip((strip / 2 - low / 2) * (255 / span), 0, 255).astype(np.uint8)
-    return shown
+        strip = np.where(is_valid[rows], frame[rows], low).astype(np.float64)
+        result[rows] = np.clip((strip / 2 - low / 2) * (255 / span), 0, 255).astype(np.uint8)
+    return result
 
 
 def _tones(look: PictureLook) -> NDArray[np.uint8]:

@@ -43,9 +43,9 @@ class FoundPath(str):
     @classmethod
     def from_steps(cls, steps: Steps) -> FoundPath:
         """Return the path with these steps; ``$`` for the whole message."""
-        found = cls(path_text(steps) if steps else "$")
-        found.steps = steps
-        return found
+        path = cls(path_text(steps) if steps else "$")
+        path.steps = steps
+        return path
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,23 +90,23 @@ class JsonQuery:
         """
         count = _StepCounter(most_steps)
         looked_through = _wrap_counted(value, count)
-        found: dict[FoundPath, object] = {}
+        results: dict[FoundPath, object] = {}
         if not isinstance(looked_through, (_CountedObject, _CountedList)):
             return QueryResult({FoundPath.from_steps(()): value} if self.text == "$" else {})
         cut = ""
         try:
             for match in self._path.finditer(looked_through):
-                if len(found) >= most_found:
+                if len(results) >= most_found:
                     cut = _("Only the first {count} are shown.").format(count=most_found)
                     break
-                found[FoundPath.from_steps(tuple(match.parts))] = _unwrap(match.obj)
+                results[FoundPath.from_steps(tuple(match.parts))] = _unwrap(match.obj)
         except _LimitReached:
             cut = _("Search stopped after {count} values; these were found so far.").format(count=most_steps)
         except RecursionError:
             cut = _("The message is nested too deeply for a query.")
         except jsonpath.JSONPathError as error:
             cut = _error_message(error, self.text)
-        return QueryResult(found, cut)
+        return QueryResult(results, cut)
 
 
 @cache
@@ -133,8 +133,8 @@ class _LimitReached(Exception):  # noqa: N818  not an error: it ends the search
 class _StepCounter:
     """Counter of visited values."""
 
-    def __init__(self, most: int) -> None:
-        self._left = most
+    def __init__(self, max_steps: int) -> None:
+        self._left = max_steps
 
     def add(self, steps: int = 1) -> None:
         self._left -= steps

@@ -26,15 +26,15 @@ def folder(settings: Settings | None = None) -> Path:
     This is the folder chosen in the settings. The default is ``NEP Studio`` in the system's picture
     folder, or ``Pictures`` in ``$NEP_STUDIO_HOME`` if that is set.
     """
-    chosen = settings.get(FOLDER_SETTING, "") if settings is not None else ""
-    if chosen:
-        return Path(chosen)
+    configured = settings.get(FOLDER_SETTING, "") if settings is not None else ""
+    if configured:
+        return Path(configured)
     if os.environ.get("NEP_STUDIO_HOME"):
         return home() / "Pictures"
     return platformdirs.user_pictures_path() / FOLDER_NAME
 
 
-def save(message: Message, into: Path | None = None) -> Path:
+def save(message: Message, target_folder: Path | None = None) -> Path:
     """Save the image of a message to a new file, named by topic and time; return its path.
 
     Never overwrites a file. Raises NepError if the message is not an image, OSError if the file can't
@@ -42,14 +42,14 @@ def save(message: Message, into: Path | None = None) -> Path:
 
     Args:
         message: Message with an image.
-        into: Folder; default: `folder`.
+        target_folder: Folder; default: `folder`.
     """
     data = encode_png(message)
-    place = into if into is not None else folder()
-    place.mkdir(parents=True, exist_ok=True)
+    folder_path = target_folder if target_folder is not None else folder()
+    folder_path.mkdir(parents=True, exist_ok=True)
     stem = file_stem(message)
     for number in range(1, 1000):
-        path = place / (f"{stem}.png" if number == 1 else f"{stem} {number}.png")
+        path = folder_path / (f"{stem}.png" if number == 1 else f"{stem} {number}.png")
         try:
             with path.open("xb") as file:
                 file.write(data)

@@ -54,10 +54,10 @@ class DecodeChecker:
     def __init__(
         self,
         clock: Callable[[], float] = time.monotonic,
-        work: Callable[[], float] = time.thread_time,
+        cpu_clock: Callable[[], float] = time.thread_time,
     ) -> None:
         # `clock` is monotonic seconds; `work` is the CPU time of the calling thread in seconds.
-        self._clock, self._work = clock, work
+        self._clock, self._work = clock, cpu_clock
         self._lock = threading.Lock()
         self._found: dict[str, CheckResult] = {}
         self._suspects: dict[str, float] = {}
@@ -68,86 +68,90 @@ class DecodeChecker:
         """Check messages of one topic, oldest first. Images and bytes are skipped."""
         if not messages or messages[-1].codec not in CHECKED_CODECS:
             return
-        found = CheckResult()
+        result = CheckResult()
         self._refill_budget()
-        self._check(topic, messages, found)
+        self._check(topic, messages, result)
         with self._lock:
             old = self._found.get(topic)
             if old is not None:
-                found.checked += old.checked
-                found.bad_count += old.bad_count
-                found.unchecked_count += old.unchecked_count
-                found.error = found.error or old.error
-            self._found[topic] = found
+                result.checked += old.checked
+                result.bad_count += old.bad_count
+                result.unchecked_count += old.unchecked_count
+                result.error = result.error or old.error
+            self._found[topic] = result
 
     def pop_results(self) -> dict[str, CheckResult]:
         """Return the results by topic, and clear them."""
         with self._lock:
-            found, self._found = self._found, {}
-        return found
+            results, self._found = self._found, {}
+        return results
 
     def _refill_budget(self) -> None:
         now = self._clock()
         self._advance_s = min(MAX_BUDGET_S, self._advance_s + max(0.0, now - self._refilled) * MAX_CPU_SHARE)
         self._refilled = now
 
-    def _check(self, topic: str, messages: Sequence[Message], found: CheckResult) -> None:
+    def _check(self, topic: str, messages: Sequence[Message], result: CheckResult) -> None:
         newest = messages[-1]
         # the newest is always decoded and stays decoded: panels show it
-        found.error = _decode_error(newest, keep=True)
-        found.is_newest_readable = not found.error
-        found.checked, found.bad_count = 1, int(not found.is_newest_readable)
+        result.error = _decode_error(newest, keep_decoded=True)
+        result.is_newest_readable = not result.error
+        result.checked, result.bad_count = 1, int(not result.is_newest_readable)
         now = self._refilled
-        if found.bad_count:
+        if result.bad_count:
             self._suspects[topic] = now
         if len(messages) > 1:  # reading the clock takes longer than a single message
-            self._check_older(topic, messages, found, now)
+            self._check_older(topic, messages, result, now)
 
-    def _check_older(self, topic: str, messages: Sequence[Message], found: CheckResult, now: float) -> None:
-        began = self._work()
-        left = self._advance_s - (0.0 if self._is_suspect(topic, now) else RESERVED_BUDGET_S)
-        place, some, worked, older = 0, 1, 0.0, len(messages) - 1
-        while place < older and worked < left:
-            was_well, before = not found.bad_count, worked
-            end = min(older, place + some)
-            place = _check_batch(messages, place, end, found)
-            if was_well and found.bad_count:
+    def _check_older(self, topic: str, messages: Sequence[Message], result: CheckResult, now: float) -> None:
+        started_s = self._work()
+        budget_s = self._advance_s - (0.0 if self._is_suspect(topic, now) else RESERVED_BUDGET_S)
+        index, batch_size, worked, older = 0, 1, 0.0, len(messages) - 1
+        while index < older and worked < budget_s:
+            was_well, before = not result.bad_count, worked
+            end = min(older, index + batch_size)
+            index = _check_batch(messages, index, end, result)
+            if was_well and result.bad_count:
                 self._suspects[topic] = now
-                left = self._advance_s
-            worked = self._work() - began
-            some = min(2 * some, SOME) if worked - before < CLOCK_READ_INTERVAL_S else max(1, some // 2)
-        found.unchecked_count = len(messages) - found.checked
+                budget_s = self._advance_s
+            worked = self._work() - started_s
+            batch_size = (
+                min(2 * batch_size, SOME)
+                if worked - before < CLOCK_READ_INTERVAL_S
+                else max(1, batch_size // 2)
+            )
+        result.unchecked_count = len(messages) - result.checked
         self._advance_s -= worked
 
     def _is_suspect(self, topic: str, now: float) -> bool:
-        seen = self._suspects.get(topic)
-        if seen is not None and now - seen > SUSPECT_TIMEOUT_S:
+        last_suspected_s = self._suspects.get(topic)
+        if last_suspected_s is not None and now - last_suspected_s > SUSPECT_TIMEOUT_S:
             del self._suspects[topic]
             return False
-        return seen is not None
+        return last_suspected_s is not None
 
 
-def _check_batch(messages: Sequence[Message], place: int, end: int, found: CheckResult) -> int:
+def _check_batch(messages: Sequence[Message], index: int, end: int, result: CheckResult) -> int:
     # Returns the index of the first message that was not decoded (fewer are decoded when they are large).
     size_bytes = 0
-    while place < end and size_bytes < SOME_BYTES:
-        message = messages[place]
-        problem = _decode_error(message, keep=False)
-        found.checked += 1
+    while index < end and size_bytes < SOME_BYTES:
+        message = messages[index]
+        problem = _decode_error(message, keep_decoded=False)
+        result.checked += 1
         if problem:
-            found.bad_count += 1
-            found.error = found.error or problem
+            result.bad_count += 1
+            result.error = result.error or problem
         size_bytes += message.size_bytes
-        place += 1
-    return place
+        index += 1
+    return index
 
 
-def _decode_error(message: Message, *, keep: bool) -> str:
+def _decode_error(message: Message, *, keep_decoded: bool) -> str:
     # "" also for large messages: the panel that shows one decodes it.
     if message.size_bytes > LARGE_BYTES:
         return ""
     try:
-        if keep:
+        if keep_decoded:
             _ = message.payload
         else:
             message.kind.decode(message.raw, message.extension)

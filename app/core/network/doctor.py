@@ -25,11 +25,11 @@ class Doctor:
 
     def __init__(
         self,
-        look: Callable[[str, doctor.ProgressCallback], Sequence[doctor.Finding]],
+        diagnose: Callable[[str, doctor.ProgressCallback], Sequence[doctor.Finding]],
         clock: Callable[[], float] = time.time,
     ) -> None:
         # `look` gets the missed topic and a progress callback (findings so far, checks done, checks in all).
-        self._look, self._clock = look, clock
+        self._look, self._clock = diagnose, clock
         self._thread: threading.Thread | None = None
         self._missed = self._told_of = ""
         self._found: tuple[doctor.Finding, ...] = ()
@@ -101,26 +101,26 @@ class Doctor:
     def _run_checks(self) -> None:
         while True:  # repeats when another topic was set meanwhile
             missed, self._so_far = self._missed, None
-            found = self._find(missed)
+            findings = self._find(missed)
             if missed == self._missed:
                 break
-        self._found, self._looked_s, self._told_of = found, self._clock(), missed
+        self._found, self._looked_s, self._told_of = findings, self._clock(), missed
         self._so_far = None
         self.revision += 1
 
-    def _report(self, found: tuple[doctor.Finding, ...], looked_at: int, things: int) -> None:
-        self._so_far, self.looked_at, self.things = found, looked_at, things
+    def _report(self, findings: tuple[doctor.Finding, ...], looked_at: int, total_checks: int) -> None:
+        self._so_far, self.looked_at, self.things = findings, looked_at, total_checks
         self.revision += 1
 
     def _find(self, missed: str) -> tuple[doctor.Finding, ...]:
         try:
             return tuple(self._look(missed, self._report))
         except Exception as error:  # noqa: BLE001  reported as a finding
-            words = _("The doctor couldn't finish: {kind}: {error}.").format(
+            message = _("The doctor couldn't finish: {kind}: {error}.").format(
                 kind=type(error).__name__, error=error
             )
             return (
-                doctor.Finding("doctor", "error", words, _("Report it to the developers of NEP Studio.")),
+                doctor.Finding("doctor", "error", message, _("Report it to the developers of NEP Studio.")),
             )
 
 

@@ -27,45 +27,49 @@ def change_messages(before: GraphView, after: GraphView) -> list[str]:
     There is one sentence for each new node with its topics, each new topic of a known node, and each
     node that left.
     """
-    here: list[tuple[str, str]] = []
+    join_messages: list[tuple[str, str]] = []
     more: list[tuple[str, str]] = []
-    came = [id for id, node in after.nodes.items() if id not in before.nodes and _is_reported(node)]
+    new_nodes = [id for id, node in after.nodes.items() if id not in before.nodes and _is_reported(node)]
     reported: set[str] = set()
     topics_of = _topics_by_node(after)
-    for node in came:
+    for node in new_nodes:
         new = [name for name in topics_of.get(node, ()) if not _is_published(before, name)]
         name, original = after.nodes[node].name, after.nodes[node].generation != NATIVE_GENERATION
         if len(new) > MAX_LISTED_TOPICS:
-            here.append((name, _joined_message(name, len(new), original=original)))
+            join_messages.append((name, _joined_message(name, len(new), original=original)))
             reported.update(new)
         elif not new:
-            words = _("{node} joined (original NEP)") if original else _("{node} joined")
-            here.append((name, words.format(node=name)))
+            template = _("{node} joined (original NEP)") if original else _("{node} joined")
+            join_messages.append((name, template.format(node=name)))
     for name, info in after.topics.items():
         count = len(info.publishers)
         if count and name not in reported and not _is_internal(name) and not _is_published(before, name):
-            words = ngettext("{topic} is new, {count} publisher", "{topic} is new, {count} publishers", count)
-            more.append((name, words.format(topic=name, count=count)))
-    left = [node.name for id, node in before.nodes.items() if id not in after.nodes and _is_reported(node)]
+            template = ngettext(
+                "{topic} is new, {count} publisher", "{topic} is new, {count} publishers", count
+            )
+            more.append((name, template.format(topic=name, count=count)))
+    left_names = [
+        node.name for id, node in before.nodes.items() if id not in after.nodes and _is_reported(node)
+    ]
     return [
-        *_summarize(here, _("{count} nodes joined: {names} and {more} more")),
+        *_summarize(join_messages, _("{count} nodes joined: {names} and {more} more")),
         *_summarize(more, _("{count} new topics: {names} and {more} more")),
         *_summarize(
-            [(name, _("{node} left").format(node=name)) for name in left],
+            [(name, _("{node} left").format(node=name)) for name in left_names],
             _("{count} nodes left: {names} and {more} more"),
         ),
     ]
 
 
-def _summarize(lines: Sequence[tuple[str, str]], many: str) -> list[str]:
+def _summarize(lines: Sequence[tuple[str, str]], summary_template: str) -> list[str]:
     if len(lines) <= MAX_LINES:
         return [line for _name, line in lines]
-    named = ", ".join(name for name, _line in lines[:MAX_NAMED])
-    return [many.format(count=len(lines), names=named, more=len(lines) - MAX_NAMED)]
+    listed_names = ", ".join(name for name, _line in lines[:MAX_NAMED])
+    return [summary_template.format(count=len(lines), names=listed_names, more=len(lines) - MAX_NAMED)]
 
 
 def _joined_message(node: str, count: int, *, original: bool) -> str:
-    words = (
+    template = (
         ngettext(
             "{node} joined with {count} topic (original NEP)",
             "{node} joined with {count} topics (original NEP)",
@@ -74,7 +78,7 @@ def _joined_message(node: str, count: int, *, original: bool) -> str:
         if original
         else ngettext("{node} joined with {count} topic", "{node} joined with {count} topics", count)
     )
-    return words.format(node=node, count=count)
+    return template.format(node=node, count=count)
 
 
 def _is_reported(node: NodeInfo) -> bool:
@@ -95,9 +99,9 @@ def _is_published(view: GraphView, topic: str) -> bool:
 
 
 def _topics_by_node(view: GraphView) -> dict[str, dict[str, None]]:
-    found: dict[str, dict[str, None]] = {}
+    topics_by_node: dict[str, dict[str, None]] = {}
     for name, info in view.topics.items():
         if not _is_internal(name):
             for publisher in info.publishers:
-                found.setdefault(publisher.node_id, {})[name] = None
-    return found
+                topics_by_node.setdefault(publisher.node_id, {})[name] = None
+    return topics_by_node

@@ -64,15 +64,15 @@ class MasterChangeDetector:
     def __init__(self) -> None:
         self._new_epoch = (0, 0.0)
 
-    def is_incomplete(self, known: GraphView | None, view: GraphView, now: float) -> bool:
+    def is_incomplete(self, previous: GraphView | None, view: GraphView, now: float) -> bool:
         """Return True if another master has just replaced the known one and may not know all nodes yet.
 
         Args:
-            known: Last applied graph, or None.
+            previous: Last applied graph, or None.
             view: New graph.
             now: Monotonic seconds.
         """
-        if known is None or view.epoch == known.epoch:
+        if previous is None or view.epoch == previous.epoch:
             return False
         if self._new_epoch[0] != view.epoch:
             self._new_epoch = (view.epoch, now)
@@ -124,15 +124,15 @@ class MasterStarter:
             self._thread.join(timeout=JOIN_TIMEOUT_S)
 
     def _start(self) -> None:
-        why = self._try_start()
-        if not why:
+        error_text = self._try_start()
+        if not error_text:
             self._wait_s, self._retry_at, self._last_reason = AGAIN_S, 0.0, ""
             return
         self._retry_at = self._clock() + self._wait_s
         self._wait_s = min(2 * self._wait_s, AGAIN_AT_MOST_S)
-        if why != self._last_reason:
-            self._last_reason = why
-            self._failed(why)
+        if error_text != self._last_reason:
+            self._last_reason = error_text
+            self._failed(error_text)
 
     def _try_start(self) -> str:
         if is_running(self._address, timeout_s=0.5):

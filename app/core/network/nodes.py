@@ -141,10 +141,10 @@ class Nodes:
                 new = not self._first_graph
                 node = self._nodes[id] = NodeEntry(id, info.name, is_new=new, network=self._network)
             _update_entry(node, info)
-            place = parameters_topic(id)
-            node.can_set_parameters = place in view.services
-            topic = view.topics.get(place)
-            topic = view.topics.get(place)
+            parameter_topic = parameters_topic(id)
+            node.can_set_parameters = parameter_topic in view.services
+            topic = view.topics.get(parameter_topic)
+            topic = view.topics.get(parameter_topic)
             node.has_parameters = node.can_set_parameters or (topic is not None and bool(topic.publishers))
             node.published_topics, node.subscribed_topics = publishes.get(id, ()), subscribes.get(id, ())
         for id, node in self._nodes.items():
@@ -176,8 +176,8 @@ def _topics_by_node(view: GraphView) -> tuple[Mapping[str, tuple[str, ...]], Map
             publishes.setdefault(publisher.node_id, {})[name] = None
         for subscriber in info.subscribers:
             subscribes.setdefault(subscriber.node_id, {})[name] = None
-    for name, wide in view.patterns.items():
-        for subscriber in wide.subscribers:
+    for name, pattern_info in view.patterns.items():
+        for subscriber in pattern_info.subscribers:
             subscribes.setdefault(subscriber.node_id, {})[name] = None
     return (
         {id: tuple(names) for id, names in publishes.items()},

@@ -45,12 +45,12 @@ class RemoteAccess:
         alerts: Alerts,
         post_event: Callable[[object], None],
         *,
-        ask: Callable[[Sequence[str], str], None] = listen,
-        here: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
+        request_listen: Callable[[Sequence[str], str], None] = listen,
+        local_addresses: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
     ) -> None:
         # `ask` sends the request to the master at `address`; `here` returns this computer's addresses.
         self._address, self._settings, self._alerts = address, settings, alerts
-        self._post_event, self._ask, self._here = post_event, ask, here
+        self._post_event, self._ask, self._here = post_event, request_listen, local_addresses
         self._epoch = 0
         self._asking: threading.Thread | None = None
         self.hosts: tuple[str, ...] = ()
@@ -88,7 +88,7 @@ class RemoteAccess:
         try:
             self._settings.set(SETTING_KEY, list(hosts))
         except SettingsError as error:
-            words = (
+            template = (
                 _("Can't save this change: other computers can't connect after the next start ({error}).")
                 if hosts
                 else _("Can't save this change: other computers can connect after the next start ({error}).")
@@ -97,7 +97,7 @@ class RemoteAccess:
                 NOT_KEPT,
                 "warn",
                 _("The list of allowed connections can't be saved."),
-                words.format(error=error),
+                template.format(error=error),
                 button=_("Choose another"),
                 action="network.others",
                 count=0,
@@ -111,9 +111,9 @@ class RemoteAccess:
         if view.epoch != self._epoch:
             self._epoch = view.epoch
             hosts: list[object] = self._settings.get(SETTING_KEY, [])
-            kept = tuple(map(str, hosts))
-            if kept and self.is_local and set(kept) - set(self.hosts):
-                self._request(kept)
+            saved_hosts = tuple(map(str, hosts))
+            if saved_hosts and self.is_local and set(saved_hosts) - set(self.hosts):
+                self._request(saved_hosts)
 
     def changed(self, event: RemoteAccessChanged) -> None:
         """Apply the master's reply."""
@@ -152,14 +152,14 @@ class RemoteAccess:
         self._asking.start()
 
 
-def access_status(reach: RemoteAccess) -> tuple[str, str, str | None]:
+def access_status(access: RemoteAccess) -> tuple[str, str, str | None]:
     """Return the icon, the text and the status that the status bar shows for remote access."""
-    if reach.hosts:
+    if access.hosts:
         return (
             "wifi",
-            _("Other computers connect at {addresses}").format(addresses=", ".join(reach.hosts)),
+            _("Other computers connect at {addresses}").format(addresses=", ".join(access.hosts)),
             "warn",
         )
-    if not reach.is_local:
-        return "network", _("Master on {master_host}").format(master_host=reach.master_host), None
+    if not access.is_local:
+        return "network", _("Master on {master_host}").format(master_host=access.master_host), None
     return "lock", _("This computer only"), None

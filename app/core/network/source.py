@@ -109,12 +109,12 @@ class Source(Protocol):
     def unwatch(self, topic: str) -> None:
         """Unsubscribe from ``topic``."""
 
-    def submit(self, what: str, job: Job) -> None:
+    def submit(self, error_template: str, job: Job) -> None:
         """Run a job with Studio's node in the source's thread. A failure is reported as `JobFailed`.
 
         Args:
-            what: Sentence for the report (a `lazy` text) with the placeholder ``error``; "" to report
-                nothing.
+            error_template: Sentence for the report (a `lazy` text) with the placeholder ``error``; "" to
+                report nothing.
             job: Function that receives the node.
         """
 
@@ -169,8 +169,8 @@ class LiveSource:
         """Subscribe to ``topic`` as soon as it exists."""
         with self._lock:
             self._wanted.add(topic)
-            held = self._subscribers.get(topic)
-            self._missed_before[topic] = -(held[1].lost or 0) if held is not None else 0
+            existing = self._subscribers.get(topic)
+            self._missed_before[topic] = -(existing[1].lost or 0) if existing is not None else 0
         self.submit("", _ignore_wake_job)
 
     def unwatch(self, topic: str) -> None:
@@ -179,21 +179,21 @@ class LiveSource:
             self._wanted.discard(topic)
         self.submit("", _ignore_wake_job)
 
-    def submit(self, what: str, job: Job) -> None:
+    def submit(self, error_template: str, job: Job) -> None:
         """Queue a job. Jobs run in order and wait until a master replies.
 
         Args:
-            what: Sentence for the report, see `Source.submit`.
+            error_template: Sentence for the report, see `Source.submit`.
             job: Function that receives the node.
         """
-        self._jobs.put((what, job))
+        self._jobs.put((error_template, job))
 
     def lost_counts(self) -> Mapping[str, int]:
         """Return the number of messages lost on each topic since its watch began."""
         with self._lock:
-            held = {topic: subscriber for topic, (_, subscriber) in self._subscribers.items()}
+            subscribers = {topic: subscriber for topic, (_, subscriber) in self._subscribers.items()}
             before = dict(self._missed_before)
-        return {topic: before.get(topic, 0) + (each.lost or 0) for topic, each in held.items()}
+        return {topic: before.get(topic, 0) + (each.lost or 0) for topic, each in subscribers.items()}
 
     def request_stop(self) -> None:
         """Signal the thread to stop, without waiting for it; `close` waits."""
@@ -275,22 +275,22 @@ class LiveSource:
             return False
         return True
 
-    def _report_lost(self, sentence: str) -> None:
+    def _report_lost(self, message: str) -> None:
         if self._is_connected is not False:
             self._is_connected = False
-            self._post_event(MasterLost(self.address, sentence))
+            self._post_event(MasterLost(self.address, message))
 
     def _query_graph(self) -> float:
         # Returns the duration of the query in seconds, 0.0 when it failed.
         if self._node is None:
             return 0.0
-        asked = time.monotonic()
+        started_s = time.monotonic()
         try:
             view = self.query_graph(self._node)
         except NepError as error:
             self._report_lost(str(error))
             return 0.0
-        asked_s = time.monotonic() - asked
+        asked_s = time.monotonic() - started_s
         if self._is_connected is not True:
             self._is_connected = True
             self._post_event(MasterFound(self.address))
@@ -307,14 +307,14 @@ class LiveSource:
                 return
             if item is None:
                 return
-            what, job = item
+            error_template, job = item
             try:
                 job(self._node)
             except NepError as error:
-                self._post_event(JobFailed(what, str(error)))
+                self._post_event(JobFailed(error_template, str(error)))
             except Exception as error:  # noqa: BLE001  a failing job must not end the thread
                 _log.exception("a network job failed")
-                self._post_event(JobFailed(what, error_text(error)))
+                self._post_event(JobFailed(error_template, error_text(error)))
             self._reconcile()
 
     def _reconcile(self) -> None:
@@ -322,20 +322,20 @@ class LiveSource:
         if view is None:
             return
         with self._lock:
-            wanted = {*self._wanted, *self._always}
-        for topic in [topic for topic in self._subscribers if topic not in wanted]:
+            watched = {*self._wanted, *self._always}
+        for topic in [topic for topic in self._subscribers if topic not in watched]:
             self._unsubscribe(topic)
             self._missed_before.pop(topic, None)
-        for topic in wanted:
+        for topic in watched:
             info = view.topics.get(topic)
             msg_type = self._always.get(topic) if info is None else info.msg_type
             if msg_type is None:
                 continue
-            held = self._subscribers.get(topic)
-            if held is not None and held[0] != msg_type:
+            existing = self._subscribers.get(topic)
+            if existing is not None and existing[0] != msg_type:
                 self._missed_before[topic] += self._unsubscribe(topic)
-                held = None
-            if held is None:
+                existing = None
+            if existing is None:
                 self._subscribe(topic, msg_type)
 
     def _subscribe(self, topic: str, msg_type: str) -> None:
@@ -363,9 +363,11 @@ class LiveSource:
 
 
 def _free_name(view: GraphView) -> str:
-    taken = {node.name for node in view.nodes.values()}
+    used_names = {node.name for node in view.nodes.values()}
     others = (f"{NODE_NAME} {number}" for number in count(2))
-    return NODE_NAME if NODE_NAME not in taken else next(name for name in others if name not in taken)
+    return (
+        NODE_NAME if NODE_NAME not in used_names else next(name for name in others if name not in used_names)
+    )
 
 
 def _ignore_wake_job(_node: Node) -> None: ...

@@ -82,12 +82,12 @@ class TopicFolder:
     def stats(self) -> FolderStats:
         """Statistics, computed at the first access after `invalidate_stats`."""
         if self._stats is None:
-            there = [topic for topic in self.topics if topic.gone_s is None]
+            present = [topic for topic in self.topics if topic.gone_s is None]
             self._stats = FolderStats(
-                _sum(topic.rate_hz for topic in there),
-                _sum(topic.bandwidth_Bps for topic in there),
-                min((topic.age_s for topic in there if topic.age_s is not None), default=None),
-                _sum(topic.lost for topic in there),
+                _sum(topic.rate_hz for topic in present),
+                _sum(topic.bandwidth_Bps for topic in present),
+                min((topic.age_s for topic in present if topic.age_s is not None), default=None),
+                _sum(topic.lost for topic in present),
             )
         return self._stats
 
@@ -100,8 +100,8 @@ TreeRow = TopicFolder | Topic
 
 
 def _sum(values: Iterable[Number | None]) -> Number | None:
-    known = [value for value in values if value is not None]
-    return sum(known) if known else None
+    known_values = [value for value in values if value is not None]
+    return sum(known_values) if known_values else None
 
 
 class TopicTree:
@@ -145,18 +145,18 @@ class TopicTree:
             folder.invalidate_stats()
 
     def _insert(self, topic: Topic) -> None:
-        inside, path = self._top, "/"
-        for deep, part in enumerate(split_name(topic.name)[:-1]):
+        siblings, path = self._top, "/"
+        for depth, part in enumerate(split_name(topic.name)[:-1]):
             path = f"{path}{part}/"
             folder = self._folders.get(folder_key(topic.network, path))
             if folder is None:
-                folder = TopicFolder(part, path, topic.network, deep)
+                folder = TopicFolder(part, path, topic.network, depth)
                 folder.is_open = folder.key not in self._closed
                 self._folders[folder.key] = folder
-                inside.append(folder)
+                siblings.append(folder)
             folder.topics.append(topic)
-            inside = folder.children
-        inside.append(topic)
+            siblings = folder.children
+        siblings.append(topic)
 
 
 def folders_above(topic: str, network: str = "") -> list[str]:
@@ -172,18 +172,20 @@ def topic_filter(words: Iterable[str]) -> Callable[[str, str], bool]:
     starts with ``!`` excludes the topics that match the rest of the word. Any other word may occur
     anywhere in the details.
     """
-    wanted: list[tuple[bool, re.Pattern[str] | str]] = []
+    conditions: list[tuple[bool, re.Pattern[str] | str]] = []
     for word in words:
         leaves_out = word.startswith("!") and len(word) > 1
         text = (word[1:] if leaves_out else word).casefold()
         is_pattern = "*" in text or "?" in text
-        wanted.append((leaves_out, re.compile(translate(text)) if is_pattern else text))
+        conditions.append((leaves_out, re.compile(translate(text)) if is_pattern else text))
 
-    def matches(name: str, told: str) -> bool:
-        name, told = name.casefold(), told.casefold()
-        for leaves_out, what in wanted:
-            found = what in told if isinstance(what, str) else what.match(name) is not None
-            if found is leaves_out:
+    def matches(name: str, details: str) -> bool:
+        name, details = name.casefold(), details.casefold()
+        for leaves_out, condition in conditions:
+            is_match = (
+                condition in details if isinstance(condition, str) else condition.match(name) is not None
+            )
+            if is_match is leaves_out:
                 return False
         return True
 

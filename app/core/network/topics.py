@@ -113,18 +113,18 @@ class Topic:
 
     def static_values(self) -> tuple[object, ...]:
         """Return the values that change rarely. Panels rebuild their rows if one of these values changes."""
-        gone = self.gone_since is not None
-        return (self.msg_type, self.codec, self.publisher_nodes, self.is_new, gone, self.is_stale)
+        is_gone = self.gone_since is not None
+        return (self.msg_type, self.codec, self.publisher_nodes, self.is_new, is_gone, self.is_stale)
 
 
 class Topics:
     """All topics, in order of their first appearance. Not thread-safe; use it from the main thread."""
 
-    def __init__(self, own: tuple[str, int] | None = None, network: str = "") -> None:
+    def __init__(self, own_process: tuple[str, int] | None = None, network: str = "") -> None:
         # `own` is (host, process id) of the watching process: a topic with no other subscriber counts as
         # vanished.
         self._network = network
-        self._own = own if own is not None else (platform.node(), os.getpid())
+        self._own = own_process if own_process is not None else (platform.node(), os.getpid())
         self._topics: dict[str, Topic] = {}
         self._first_graph = True
         self._seen = (-1, -1)
@@ -174,42 +174,46 @@ class Topics:
         If no node or topic has changed, only the statistics are updated. The statistics of more than
         `MAX_TOPICS_PER_UPDATE` topics are updated in parts, by `update_ages`.
         """
-        seen = (view.epoch, view.revision)
+        version = (view.epoch, view.revision)
         self._clocks = self._clock_offsets(view)
-        if seen != self._seen:
+        if version != self._seen:
             self._apply_graph(view, now)
         elif len(self._topics) <= MAX_TOPICS_PER_UPDATE:
             _update_statistics(self._topics.values(), view, now, self._clocks)
-        self._seen, self._view, self._reported_at = seen, view, now
+        self._seen, self._view, self._reported_at = version, view, now
         self.values_revision += 1
 
     def _own_node_ids(self, view: GraphView) -> set[str]:
         return {id for id, node in view.nodes.items() if (node.host, node.pid) == self._own}
 
     def _clock_offsets(self, view: GraphView) -> Mapping[str, int]:
-        known = {
+        offsets_ns = {
             id: node.clock_offset_ns for id, node in view.nodes.items() if node.clock_offset_ns is not None
         }
-        if not any(known.values()):
+        if not any(offsets_ns.values()):
             return {}  # all nodes are on the master's computer
-        own = next((known[id] for id in self._own_node_ids(view) if id in known), None)
-        return {} if own is None else {id: offset - own for id, offset in known.items() if offset != own}
+        own_offset_ns = next((offsets_ns[id] for id in self._own_node_ids(view) if id in offsets_ns), None)
+        return (
+            {}
+            if own_offset_ns is None
+            else {id: offset - own_offset_ns for id, offset in offsets_ns.items() if offset != own_offset_ns}
+        )
 
     def _apply_graph(self, view: GraphView, now: float) -> None:
-        own = self._own_node_ids(view)
-        shown = {
+        own_node_ids = self._own_node_ids(view)
+        listed_topics = {
             name: info
             for name, info in view.topics.items()
-            if info.publishers or any(each.node_id not in own for each in info.subscribers)
+            if info.publishers or any(each.node_id not in own_node_ids for each in info.subscribers)
         }
-        for name, info in shown.items():
+        for name, info in listed_topics.items():
             topic = self._topics.get(name)
             if topic is None:
                 topic = self._topics[name] = Topic(name, is_new=not self._first_graph, network=self._network)
                 self.revision += 1
             self._apply_info(topic, info, view, now)
         for name, topic in self._topics.items():
-            if name not in shown and topic.gone_since is None:
+            if name not in listed_topics and topic.gone_since is None:
                 self._mark_vanished(topic, now)
         self._first_graph = False
 
@@ -248,10 +252,13 @@ class Topics:
             if topic.is_watched and topic.gone_since is None
         }
         for name, (received, size_bytes) in arrived.items():
-            had = before.get(name)
-            if had is not None and had[0] <= received and passed_s > 0:
+            previous = before.get(name)
+            if previous is not None and previous[0] <= received and passed_s > 0:
                 topic = self._topics[name]
-                topic.measured_rates = (received - had[0]) / passed_s, (size_bytes - had[1]) / passed_s
+                topic.measured_rates = (
+                    (received - previous[0]) / passed_s,
+                    (size_bytes - previous[1]) / passed_s,
+                )
                 if topic.info is None or topic.info.rate_hz is None:
                     topic.rate_hz, topic.bandwidth_Bps = topic.measured_rates
                     topic.rates.append(topic.measured_rates[0])
@@ -270,10 +277,10 @@ class Topics:
         if self._next_index >= len(self._topics):
             self._next_index = 0
         begin, self._next_index = self._next_index, self._next_index + MAX_TOPICS_PER_UPDATE
-        some = list(islice(self._topics.values(), begin, self._next_index))
+        batch = list(islice(self._topics.values(), begin, self._next_index))
         if self._view is not None and len(self._topics) > MAX_TOPICS_PER_UPDATE:
-            _update_statistics(some, self._view, self._reported_at, self._clocks)
-        for topic in some:
+            _update_statistics(batch, self._view, self._reported_at, self._clocks)
+        for topic in batch:
             if topic.gone_since is not None:
                 topic.gone_s = now - topic.gone_since
                 if topic.gone_s >= GONE_DISPLAY_S:
@@ -284,13 +291,13 @@ class Topics:
 
     def _remove_or_hide(self, topic: Topic) -> None:
         # A vanished topic that is still watched only leaves the lists.
-        listed = topic.name not in self._hidden
+        was_listed = topic.name not in self._hidden
         if topic.is_watched:
             self._hidden.add(topic.name)
         else:
             self._hidden.discard(topic.name)
             del self._topics[topic.name]
-        self.revision += listed
+        self.revision += was_listed
 
     def add(self, name: str, batch: Batch, now: float) -> None:
         """Add messages received on a watched topic."""
@@ -320,13 +327,13 @@ class Topics:
             topic.last_received_s = None
             topic.is_watched = False
 
-    def set_stats(self, figures: Mapping[str, tuple[float | None, int | None]]) -> None:
+    def set_stats(self, stats: Mapping[str, tuple[float | None, int | None]]) -> None:
         """Set the statistics reported for each topic.
 
         Args:
-            figures: Messages per second and time of the newest message (ns since 1970), by topic.
+            stats: Messages per second and time of the newest message (ns since 1970), by topic.
         """
-        for name, (rate_hz, newest_ns) in figures.items():
+        for name, (rate_hz, newest_ns) in stats.items():
             topic = self._topics.get(name)
             if topic is not None:
                 topic.rate_hz, topic.last_stamp_ns = rate_hz, newest_ns
@@ -411,8 +418,8 @@ def _publisher_names(info: TopicInfo, view: GraphView) -> tuple[str, ...]:
 def _age(topic: Topic, now: float, now_ns: int) -> float | None:
     stamp, newest = topic.last_stamp_ns, topic.newest
     if newest is not None and newest.stamp_ns is not None:
-        known = newest.kind.clock.difference
-        stamp = max(stamp or 0, newest.stamp_ns + (0 if known is None else known.offset_ns))
+        difference = newest.kind.clock.difference
+        stamp = max(stamp or 0, newest.stamp_ns + (0 if difference is None else difference.offset_ns))
     if stamp is not None:
         return (now_ns - stamp) / 1e9 if now_ns > stamp else 0.0
     return now - topic.last_received_s if topic.last_received_s is not None else None
@@ -444,5 +451,5 @@ def _silence_s(topic: Topic, now: float, told_at: float) -> float | None:
 
 def total_rate_hz(topics: Iterable[TopicInfo]) -> float | None:
     """Return the total message rate of the topics; None if no publisher reports one."""
-    known = [info.rate_hz for info in topics if info.rate_hz is not None]
-    return sum(known) if known else None
+    rates_hz = [info.rate_hz for info in topics if info.rate_hz is not None]
+    return sum(rates_hz) if rates_hz else None

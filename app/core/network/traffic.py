@@ -70,8 +70,8 @@ class Traffic:
 
     def add(self, batches: Mapping[str, Batch], now: float) -> None:
         """Count the messages received since the last tick."""
-        shown = sum(len(batch.messages) for batch in batches.values())
-        self._count(shown, sum(batch.arrived_count for batch in batches.values()), now)
+        shown_count = sum(len(batch.messages) for batch in batches.values())
+        self._count(shown_count, sum(batch.arrived_count for batch in batches.values()), now)
         self._update_totals_if_due(now)
 
     def _update_totals_if_due(self, now: float) -> None:
@@ -98,12 +98,12 @@ class Traffic:
                 topic.missed = total
         self._count(0, grown, now)
 
-    def _count(self, shown: int, sent: int, now: float) -> None:
+    def _count(self, shown_count: int, sent: int, now: float) -> None:
         if sent:
-            self._recent.append((now, shown, sent))
-            self.shown_30s += shown
+            self._recent.append((now, shown_count, sent))
+            self.shown_30s += shown_count
             self.sent_30s += sent
         while self._recent and now - self._recent[0][0] > WINDOW_S:
-            _, shown, sent = self._recent.popleft()
-            self.shown_30s -= shown
+            _, shown_count, sent = self._recent.popleft()
+            self.shown_30s -= shown_count
             self.sent_30s -= sent

@@ -71,11 +71,11 @@ class PageList:
     def update(self, pages: Sequence[ConnectedPage], now: float) -> None:
         """Apply a snapshot of the connected pages at ``now`` (monotonic seconds)."""
         self._now = now
-        there = {page.id for page in pages}
-        if there != self._pages.keys() - self._left_at.keys():
+        connected_ids = {page.id for page in pages}
+        if connected_ids != self._pages.keys() - self._left_at.keys():
             self.revision += 1
         for id_ in self._pages:
-            if id_ not in there:
+            if id_ not in connected_ids:
                 self._left_at.setdefault(id_, now)
         for page in pages:
             self._pages[page.id] = page
@@ -94,8 +94,8 @@ class PageList:
         """Yield the topics on which messages to a connected page were dropped recently (`SLOW_DISPLAY_S`)."""
         for page in self.connected:
             for topic in page.topics:
-                at = self._drops_at.get((page.id, topic.topic))
-                if at is not None and self._now - at <= SLOW_DISPLAY_S:
+                dropped_at = self._drops_at.get((page.id, topic.topic))
+                if dropped_at is not None and self._now - dropped_at <= SLOW_DISPLAY_S:
                     yield SlowTopic(page, topic.topic, dropped_share(topic.sent_count, topic.dropped_count))
 
     def _record_drops(self, pages: Sequence[ConnectedPage], now: float) -> None:
@@ -106,7 +106,9 @@ class PageList:
             if topic.dropped_count
         }
         risen = {key: now for key, count in dropped.items() if count > self._dropped.get(key, 0)}
-        self._drops_at = {key: at for key, at in (self._drops_at | risen).items() if key in dropped}
+        self._drops_at = {
+            key: dropped_at for key, dropped_at in (self._drops_at | risen).items() if key in dropped
+        }
         self._dropped = dropped
 
 

@@ -327,9 +327,9 @@ class WebPages:
     def _apply_settings(self) -> int:
         if self._server is None:
             return 0
-        wanted = channels.LiveChannels() if "foxglove" in self.protocols else None
+        live_channels = channels.LiveChannels() if "foxglove" in self.protocols else None
         self._server.set_allow_moving(self.robots)
-        self._server.set_foxglove(wanted)
+        self._server.set_foxglove(live_channels)
         self._server.set_rosbridge("rosbridge" in self.protocols)
         return self._server.set_access(access.Access(frozenset(self.origins), self.token))
 
@@ -388,11 +388,13 @@ class WebPages:
             try:
                 running = self._start(settings)
             except AddressInUseError:
-                sentence, free_port = _port_conflict(port)
-                self._post_event(WebServerStarted(number, None, sentence, free_port))
+                message, free_port = _port_conflict(port)
+                self._post_event(WebServerStarted(number, None, message, free_port))
             except NepError as error:
-                said = str(error)
-                self._post_event(WebServerStarted(number, None, f"{said[:1].upper()}{said[1:]}."))
+                error_message = str(error)
+                self._post_event(
+                    WebServerStarted(number, None, f"{error_message[:1].upper()}{error_message[1:]}.")
+                )
             else:
                 if number != self._number:  # switched off meanwhile
                     running.close()
@@ -402,14 +404,14 @@ class WebPages:
 
         self._run_in_thread(work)
 
-    def _run_in_thread(self, work: Callable[[], None]) -> None:
+    def _run_in_thread(self, job: Callable[[], None]) -> None:
         # Runs one job after the other: a server ends before the next one binds its port.
         before = self._thread
 
         def run() -> None:
             if before is not None:
                 before.join()
-            work()
+            job()
 
         self._thread = threading.Thread(target=run, name="studio-web", daemon=True)
         self._thread.start()
@@ -417,12 +419,12 @@ class WebPages:
 
 def _port_conflict(port: int) -> tuple[str, int]:
     """Return an error message that names the program using the port, and the next unused port."""
-    holder = processes.process_fact(processes.listening_ports().get(port))
-    if holder is None:
-        sentence = _("Port {port} is in use by another program, perhaps rosbridge.").format(port=port)
+    port_owner = processes.process_fact(processes.listening_ports().get(port))
+    if port_owner is None:
+        message = _("Port {port} is in use by another program, perhaps rosbridge.").format(port=port)
     else:
-        sentence = _("Port {port} is in use by {program} (process {pid}).").format(
-            port=port, program=holder.name, pid=holder.pid
+        message = _("Port {port} is in use by {program} (process {pid}).").format(
+            port=port, program=port_owner.name, pid=port_owner.pid
         )
     others = range(port + 1, min(port + 1 + _MAX_PORTS_TRIED, MAX_PORT + 1))
-    return sentence, next((each for each in others if processes.is_free(each)), 0)
+    return message, next((each for each in others if processes.is_free(each)), 0)

@@ -54,24 +54,24 @@ class WebNotice:
     value: str = ""
 
 
-def is_wireless(own: OwnAddress) -> bool:
+def is_wireless(address: OwnAddress) -> bool:
     """Return True if an address belongs to a Wi-Fi interface, judged by the name of the interface."""
-    return own.interface.casefold().startswith(_WIRELESS_PREFIXES)
+    return address.interface.casefold().startswith(_WIRELESS_PREFIXES)
 
 
-def address_text(own: OwnAddress) -> str:
+def address_text(address: OwnAddress) -> str:
     """Format an address of this computer, such as "Wi-Fi 192.168.1.20" or "192.168.1.20 (eth0)"."""
-    if is_wireless(own):
-        return _("Wi-Fi {address}").format(address=own.host)
-    return f"{own.host} ({own.interface})" if own.interface else own.host
+    if is_wireless(address):
+        return _("Wi-Fi {address}").format(address=address.host)
+    return f"{address.host} ({address.interface})" if address.interface else address.host
 
 
 def host_text(web: WebPages) -> str:
     """Format the address at which other computers connect; "" if other computers can't connect."""
     if not web.host:
         return ""
-    own = next((each for each in web.addresses() if each.host == web.host), OwnAddress(web.host, ""))
-    return address_text(own)
+    address = next((each for each in web.addresses() if each.host == web.host), OwnAddress(web.host, ""))
+    return address_text(address)
 
 
 def web_status(web: WebPages, network: str) -> tuple[str, str, str | None]:
@@ -86,10 +86,10 @@ def web_status(web: WebPages, network: str) -> tuple[str, str, str | None]:
     count = len(web.connected)
     pages = ngettext("{count} page", "{count} pages", count).format(count=count) if count else ""
     if not web.host:
-        words = _("Web: this computer only")
-        return "globe", ", ".join(filter(None, (words, pages))), None
-    words = _("Web: open to {network}").format(network=network or web.host)
-    return "globe", ", ".join(filter(None, (words, pages))), "warn"
+        access_text = _("Web: this computer only")
+        return "globe", ", ".join(filter(None, (access_text, pages))), None
+    access_text = _("Web: open to {network}").format(network=network or web.host)
+    return "globe", ", ".join(filter(None, (access_text, pages))), "warn"
 
 
 def page_name(page: ConnectedPage) -> str:
@@ -120,20 +120,20 @@ def page_nodes(web: WebPages) -> dict[str, PageNode]:
 
 def terminal_command(web: WebPages, platform: str = sys.platform) -> str:
     """Return the terminal command that starts a server with the same settings without Studio."""
-    words = ["nep", "web"]
+    arguments = ["nep", "web"]
     if web.port != DEFAULT_PORT:
-        words += ["--port", str(web.port)]
+        arguments += ["--port", str(web.port)]
     if web.host:
-        words += ["--listen", web.host]
+        arguments += ["--listen", web.host]
     for origin in web.origins:
-        words += ["--origin", origin]
+        arguments += ["--origin", origin]
     for robot in web.robots:
-        words += ["--allow-moving", robot]
+        arguments += ["--allow-moving", robot]
     if "foxglove" in web.protocols:
-        words.append("--foxglove")
+        arguments.append("--foxglove")
     if web.master != master_address():
-        words += ["--master", web.master]
-    return subprocess.list2cmdline(words) if platform == "win32" else shlex.join(words)
+        arguments += ["--master", web.master]
+    return subprocess.list2cmdline(arguments) if platform == "win32" else shlex.join(arguments)
 
 
 def notices(web: WebPages, dismissed: Collection[tuple[str, ...]] = ()) -> tuple[WebNotice, ...]:
@@ -145,57 +145,57 @@ def notices(web: WebPages, dismissed: Collection[tuple[str, ...]] = ()) -> tuple
         web: Web server of Studio.
         dismissed: Keys of notices that the user closed.
     """
-    found: dict[tuple[str, ...], WebNotice] = {}
+    notices_by_key: dict[tuple[str, ...], WebNotice] = {}
     for notice in (*_rejection_notices(web), *_slow_notices(web)):
         if notice.key not in dismissed:
-            found.setdefault(notice.key, notice)
-    return tuple(found.values())
+            notices_by_key.setdefault(notice.key, notice)
+    return tuple(notices_by_key.values())
 
 
 def _rejection_notices(web: WebPages) -> Iterator[WebNotice]:
-    for refusal in reversed(web.rejections):
-        if refusal.kind == "kept out":
-            yield from _blocked_notices(web, refusal)
+    for rejection in reversed(web.rejections):
+        if rejection.kind == "kept out":
+            yield from _blocked_notices(web, rejection)
             continue
-        if refusal.origin and refusal.origin in web.origins:
+        if rejection.origin and rejection.origin in web.origins:
             continue
-        if refusal.kind == "robot" and refusal.robot in web.robots:
+        if rejection.kind == "robot" and rejection.robot in web.robots:
             continue
-        yield _create_notice(refusal)
+        yield _create_notice(rejection)
 
 
-def _blocked_notices(web: WebPages, refusal: Rejection) -> Iterator[WebNotice]:
+def _blocked_notices(web: WebPages, rejection: Rejection) -> Iterator[WebNotice]:
     for page in web.kept_out.values():
-        if refusal.client in {page.origin, page.address}:
-            sentence = _("{page} tried to connect again at {time} and was rejected.").format(
-                page=page_name(page), time=_clock_text(refusal.time_s)
+        if rejection.client in {page.origin, page.address}:
+            message = _("{page} tried to connect again at {time} and was rejected.").format(
+                page=page_name(page), time=_clock_text(rejection.time_s)
             )
-            yield WebNotice(("kept out", str(page.id)), "error", sentence, "let in", str(page.id))
+            yield WebNotice(("kept out", str(page.id)), "error", message, "let in", str(page.id))
 
 
-def _create_notice(refusal: Rejection) -> WebNotice:
-    key = (refusal.kind, refusal.client, refusal.robot)
-    who, clock = refusal.client, _clock_text(refusal.time_s)
-    if refusal.kind == "robot" and refusal.robot:
-        sentence = _("A page tried to move {robot} and was blocked.").format(robot=refusal.robot)
-        return WebNotice(("robot", refusal.robot), "error", sentence, "choose robots", refusal.robot)
-    if refusal.kind == "origin" or refusal.origin:
-        sentence = _("{origin} was rejected at {time}. Its origin isn't allowed.")
-        step: NextStep = "allow origin" if refusal.origin else ""
-        return WebNotice(key, "error", sentence.format(origin=who, time=clock), step, refusal.origin)
-    if refusal.kind == "token":
-        sentence = _("{address} was rejected at {time}: wrong token.")
-        return WebNotice(key, "error", sentence.format(address=who, time=clock))
-    sentence = _("{address} was rejected at {time}: {reason}.")
-    return WebNotice(key, "error", sentence.format(address=who, time=clock, reason=refusal.reason))
+def _create_notice(rejection: Rejection) -> WebNotice:
+    key = (rejection.kind, rejection.client, rejection.robot)
+    client, clock = rejection.client, _clock_text(rejection.time_s)
+    if rejection.kind == "robot" and rejection.robot:
+        message = _("A page tried to move {robot} and was blocked.").format(robot=rejection.robot)
+        return WebNotice(("robot", rejection.robot), "error", message, "choose robots", rejection.robot)
+    if rejection.kind == "origin" or rejection.origin:
+        message = _("{origin} was rejected at {time}. Its origin isn't allowed.")
+        step: NextStep = "allow origin" if rejection.origin else ""
+        return WebNotice(key, "error", message.format(origin=client, time=clock), step, rejection.origin)
+    if rejection.kind == "token":
+        message = _("{address} was rejected at {time}: wrong token.")
+        return WebNotice(key, "error", message.format(address=client, time=clock))
+    message = _("{address} was rejected at {time}: {reason}.")
+    return WebNotice(key, "error", message.format(address=client, time=clock, reason=rejection.reason))
 
 
 def _slow_notices(web: WebPages) -> Iterator[WebNotice]:
     for slow in web.slow_topics:
-        sentence = _("{page} can't keep up with {topic}. {share} of the messages were dropped.").format(
+        message = _("{page} can't keep up with {topic}. {share} of the messages were dropped.").format(
             page=page_name(slow.page), topic=slow.topic, share=share_text(slow.dropped_share)
         )
-        yield WebNotice(("slow", slow.page.name, slow.topic), "warn", sentence)
+        yield WebNotice(("slow", slow.page.name, slow.topic), "warn", message)
 
 
 def share_text(share: float) -> str:
@@ -206,5 +206,5 @@ def share_text(share: float) -> str:
 
 
 def _clock_text(time_s: float) -> str:
-    then = dt.datetime.fromtimestamp(time_s).astimezone()
-    return f"{then.hour}:{then.minute:02d}"
+    local_time = dt.datetime.fromtimestamp(time_s).astimezone()
+    return f"{local_time.hour}:{local_time.minute:02d}"

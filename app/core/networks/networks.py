@@ -234,8 +234,8 @@ class Networks:
     def _saved(self) -> dict[str, object]:
         return self._settings.get(SETTING_KEY, {})
 
-    def _save(self, chosen: dict[str, object]) -> None:
-        self._settings.set(SETTING_KEY, chosen)
+    def _save(self, selected: dict[str, object]) -> None:
+        self._settings.set(SETTING_KEY, selected)
 
     def _start(self, network: OtherNetwork, address: str) -> None:
         number, kind = next(self._numbers), network.kind
@@ -262,12 +262,12 @@ class Networks:
 
     # -- interface of the session ----------------------------------------------------------------------------
 
-    def on_event(self, told: NetworkEvent, now: float) -> None:
+    def on_event(self, network_event: NetworkEvent, now: float) -> None:
         """Apply an event of a network's source."""
-        network = self._networks[told.kind]
-        if network.is_selected and told.number == network.number:
+        network = self._networks[network_event.kind]
+        if network.is_selected and network_event.number == network.number:
             before = network.state
-            network.on_event(told.event, now)
+            network.on_event(network_event.event, now)
             if network.state != before:
                 self._changes += 1
                 self._update_alert(network)
@@ -304,9 +304,9 @@ class Networks:
         if network is None:
             return
         self._watched[name].add(topic)
-        known = network.topics.get(topic)
-        if known is not None:
-            known.is_watched = True
+        known_topic = network.topics.get(topic)
+        if known_topic is not None:
+            known_topic.is_watched = True
         if network.source is not None:
             network.source.watch(topic)
 

@@ -93,8 +93,8 @@ def _set_parameter(node: Node, node_id: str, name: str, value: object) -> bool:
     try:
         with RemoteParameters(
             node.new_client(parameters_topic(node_id), timeout_s=REPLY_TIMEOUT_S)
-        ) as theirs:
-            theirs.set(name, value)
+        ) as remote_parameters:
+            remote_parameters.set(name, value)
     except NepError:
         raise
     except Exception as error:
@@ -137,13 +137,13 @@ class NodeParameters:
 
     def show(self, node: NodeEntry | None) -> None:
         """Show the parameters of a node; None to show no node."""
-        wanted = node if node is not None and node.has_parameters else None
-        if wanted is self.node:
+        displayed = node if node is not None and node.has_parameters else None
+        if displayed is self.node:
             return
         self.close()
-        self.node = wanted
-        if wanted is not None:
-            self.watching = self._watch(key_of(wanted.network, parameters_topic(wanted.id)))
+        self.node = displayed
+        if displayed is not None:
+            self.watching = self._watch(key_of(displayed.network, parameters_topic(displayed.id)))
 
     def close(self) -> None:
         """Stop showing a node."""
@@ -197,12 +197,12 @@ class NodeParameters:
 
     def _check_result(self, node: NodeEntry) -> None:
         try:
-            done = self._setter.has_been_set(node.id, self.setting)
+            is_done = self._setter.has_been_set(node.id, self.setting)
         except NepError as error:
             self.refusal, self.setting = str(error), ""
             self.revision += 1
         else:
-            if done:
+            if is_done:
                 self.setting = ""
                 self.revision += 1
 
@@ -246,35 +246,35 @@ def parse_parameters(state: object) -> tuple[ReportedParameter, ...]:
 
     Validation is necessary, because any node can publish on a parameter topic.
     """
-    listed = state.get("parameters") if isinstance(state, Mapping) else None
-    if not isinstance(listed, list):
+    entries = state.get("parameters") if isinstance(state, Mapping) else None
+    if not isinstance(entries, list):
         raise NepError(_("this isn't a list of parameters"))
-    parameters = [_parse_parameter(each) for each in listed[:MAX_PARAMETERS] if isinstance(each, Mapping)]
+    parameters = [_parse_parameter(each) for each in entries[:MAX_PARAMETERS] if isinstance(each, Mapping)]
     return tuple({each.name: each for each in parameters}.values())
 
 
-def _parse_parameter(told: Mapping[str, object]) -> ReportedParameter:
-    choices = told.get("choices")
+def _parse_parameter(entry: Mapping[str, object]) -> ReportedParameter:
+    choices = entry.get("choices")
     return ReportedParameter(
-        bounded_str(told.get("name")),
-        told.get("value"),
-        bounded_str(told.get("type")),
-        bounded_str(told.get("description") or "", _MAX_DESCRIPTION_LENGTH),
-        _number(told.get("min")),
-        _number(told.get("max")),
+        bounded_str(entry.get("name")),
+        entry.get("value"),
+        bounded_str(entry.get("type")),
+        bounded_str(entry.get("description") or "", _MAX_DESCRIPTION_LENGTH),
+        _number(entry.get("min")),
+        _number(entry.get("max")),
         tuple(choices[:MAX_PARAMETERS]) if isinstance(choices, list) else (),
-        told.get("read_only") is True,
-        format_value(told.get("value")),
+        entry.get("read_only") is True,
+        format_value(entry.get("value")),
     )
 
 
-def _number(told: object) -> float | None:
-    return told if isinstance(told, int | float) and not isinstance(told, bool) else None
+def _number(value: object) -> float | None:
+    return value if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
-def _are_equal(one: object, other: object) -> bool:
+def _are_equal(value: object, other: object) -> bool:
     # 1, 1.0 and True are different values.
-    return type(one) is type(other) and one == other
+    return type(value) is type(other) and value == other
 
 
 def format_value(value: object) -> str:
@@ -314,16 +314,16 @@ def parse_value(text: str, kind: str) -> object:
     return value
 
 
-def _parse_int(said: str) -> int:
+def _parse_int(text: str) -> int:
     try:
-        return int(said)
+        return int(text)
     except ValueError:
         raise ValueError(_("enter a whole number")) from None
 
 
-def _parse_float(said: str) -> float:
+def _parse_float(text: str) -> float:
     try:
-        return parse_number(said)
+        return parse_number(text)
     except TypedNumberError as error:
         if error.has_separators:
             raise ValueError(_("enter a number with at most one comma or point")) from None

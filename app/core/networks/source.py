@@ -69,9 +69,9 @@ class OtherSource(LiveSource):
     def subscribe(self, node: Node, topic: str, msg_type: str, sink: NodeSink) -> Subscriber:
         """Subscribe to a topic with the message type given by `NetworkKind.readable_type_of`."""
         info = self._view.topics.get(topic) if self._view is not None else None
-        wanted = self._kind.readable_type_of(info) if info is not None else msg_type
+        readable_type = self._kind.readable_type_of(info) if info is not None else msg_type
         with _convert_errors():
-            return node.new_sub(topic, wanted, sink=sink, wildcards=False, qos=self._kind.qos)
+            return node.new_sub(topic, readable_type, sink=sink, wildcards=False, qos=self._kind.qos)
 
 
 def _graph_members(view: GraphView) -> object:
@@ -80,13 +80,13 @@ def _graph_members(view: GraphView) -> object:
         (
             each.name,
             each.msg_type,
-            tuple((one.node_id, one.id) for one in each.publishers),
-            tuple((one.node_id, one.id) for one in each.subscribers),
+            tuple((endpoint.node_id, endpoint.id) for endpoint in each.publishers),
+            tuple((endpoint.node_id, endpoint.id) for endpoint in each.subscribers),
         )
         for each in view.topics.values()
     }
     patterns = {
-        (each.name, tuple((one.node_id, one.id) for one in each.subscribers))
+        (each.name, tuple((endpoint.node_id, endpoint.id) for endpoint in each.subscribers))
         for each in view.patterns.values()
     }
     return nodes, topics, patterns, set(view.services)

@@ -58,12 +58,12 @@ class RecordingChoice:
             size_bytes: Current size.
             speed: Current data rate in bytes per second, or None.
         """
-        ends = [] if self.max_minutes is None else [60.0 * self.max_minutes]
+        limits_s = [] if self.max_minutes is None else [60.0 * self.max_minutes]
         if self.max_gb is not None and speed:
-            ends.append(elapsed_s + (1e9 * self.max_gb - size_bytes) / speed)
-        if speed is None or not ends:
+            limits_s.append(elapsed_s + (1e9 * self.max_gb - size_bytes) / speed)
+        if speed is None or not limits_s:
             return None
-        at_s = max(elapsed_s, min(ends))
+        at_s = max(elapsed_s, min(limits_s))
         return at_s, size_bytes + speed * (at_s - elapsed_s)
 
     @property
@@ -87,18 +87,18 @@ class RecordingChoice:
         return ""
 
 
-def parse_choice(told: object) -> RecordingChoice:
+def parse_choice(data: object) -> RecordingChoice:
     """Parse a selection stored in the settings; invalid parts become defaults."""
-    if not isinstance(told, Mapping):
+    if not isinstance(data, Mapping):
         return RecordingChoice()
-    mode = told.get("mode")
+    mode = data.get("mode")
     return RecordingChoice(
         mode if isinstance(mode, str) and mode in MODES else "all",
-        _parse_names(told.get("topics")),
-        _parse_names(told.get("patterns")),
-        _parse_names(told.get("left_out")),
-        _number(told.get("ends_min"), MIN_MINUTES, MAX_MINUTES),
-        _number(told.get("ends_gb"), MIN_GB, MAX_GB),
+        _parse_names(data.get("topics")),
+        _parse_names(data.get("patterns")),
+        _parse_names(data.get("left_out")),
+        _number(data.get("ends_min"), MIN_MINUTES, MAX_MINUTES),
+        _number(data.get("ends_gb"), MIN_GB, MAX_GB),
     )
 
 
@@ -114,8 +114,10 @@ def choice_to_json(choice: RecordingChoice) -> dict[str, object]:
     }
 
 
-def _parse_names(told: object) -> tuple[str, ...]:
-    return tuple(each for each in told if isinstance(each, str))[:MAX_NAMES] if isinstance(told, list) else ()
+def _parse_names(names: object) -> tuple[str, ...]:
+    return (
+        tuple(each for each in names if isinstance(each, str))[:MAX_NAMES] if isinstance(names, list) else ()
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,38 +144,38 @@ class RingSettings:
         return RecordingChoice("pattern", (), self.patterns, self.excluded).problem
 
 
-def parse_ring_settings(told: object) -> RingSettings:
+def parse_ring_settings(data: object) -> RingSettings:
     """Parse the settings of the flight recorder; invalid parts become defaults."""
-    if not isinstance(told, Mapping):
+    if not isinstance(data, Mapping):
         return RingSettings()
-    seconds, size_gb = told.get("seconds"), told.get("size_gb")
+    seconds, size_gb = data.get("seconds"), data.get("size_gb")
     return RingSettings(
-        told.get("is_on") is True,
+        data.get("is_on") is True,
         int(seconds) if _is_within(seconds, MIN_S, MAX_S) else USUAL_S,  # type: ignore[arg-type]
         float(size_gb) if _is_within(size_gb, MIN_GB, MAX_GB) else USUAL_GB,  # type: ignore[arg-type]
-        _parse_names(told.get("patterns")),
-        _parse_names(told.get("left_out")),
+        _parse_names(data.get("patterns")),
+        _parse_names(data.get("left_out")),
     )
 
 
-def ring_settings_to_json(wish: RingSettings) -> dict[str, object]:
+def ring_settings_to_json(settings: RingSettings) -> dict[str, object]:
     """Return the settings of the flight recorder as JSON data."""
     return {
-        "is_on": wish.is_on,
-        "seconds": wish.seconds,
-        "size_gb": wish.size_gb,
-        "patterns": list(wish.patterns),
-        "left_out": list(wish.excluded),
+        "is_on": settings.is_on,
+        "seconds": settings.seconds,
+        "size_gb": settings.size_gb,
+        "patterns": list(settings.patterns),
+        "left_out": list(settings.excluded),
     }
 
 
-def _number(value: object, least: float, most: float) -> float | None:
-    return float(value) if _is_within(value, least, most) else None  # type: ignore[arg-type]
+def _number(value: object, minimum: float, maximum: float) -> float | None:
+    return float(value) if _is_within(value, minimum, maximum) else None  # type: ignore[arg-type]
 
 
-def _is_within(value: object, least: float, most: float) -> bool:
+def _is_within(value: object, minimum: float, maximum: float) -> bool:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_number and least <= value <= most  # type: ignore[operator]
+    return is_number and minimum <= value <= maximum  # type: ignore[operator]
 
 
 def parse_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -182,18 +184,18 @@ def parse_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     Returns:
         Patterns of topics to record, and patterns after "not", whose topics are excluded.
     """
-    wanted: list[str] = []
+    included: list[str] = []
     unwanted: list[str] = []
     is_not = False
-    for word in text.replace(",", " ").split():
-        if word.casefold() in {EXCLUDE_KEYWORD, _(EXCLUDE_KEYWORD).casefold()}:
+    for token in text.replace(",", " ").split():
+        if token.casefold() in {EXCLUDE_KEYWORD, _(EXCLUDE_KEYWORD).casefold()}:
             is_not = True
             continue
-        into = unwanted if is_not else wanted
-        if word not in into:
-            into.append(word)
+        target = unwanted if is_not else included
+        if token not in target:
+            target.append(token)
         is_not = False
-    return tuple(wanted), tuple(unwanted)
+    return tuple(included), tuple(unwanted)
 
 
 def file_stem(name: str) -> str:
@@ -201,20 +203,20 @@ def file_stem(name: str) -> str:
 
     Returns "" if no valid character remains.
     """
-    plain = _INVALID_CHARACTERS.sub(" ", name)
-    plain = " ".join(plain.split())[:MAX_NAME_LENGTH].strip(" .")
-    return f"_{plain}" if _RESERVED_NAMES.fullmatch(plain) else plain
+    stem = _INVALID_CHARACTERS.sub(" ", name)
+    stem = " ".join(stem.split())[:MAX_NAME_LENGTH].strip(" .")
+    return f"_{stem}" if _RESERVED_NAMES.fullmatch(stem) else stem
 
 
-def free_path(wanted: Path, *, is_folder: bool = False) -> Path:
-    """Return an unused path: ``wanted``, or the same path with a number appended to the name.
+def free_path(preferred: Path, *, is_folder: bool = False) -> Path:
+    """Return an unused path: ``preferred``, or the same path with a number appended to the name.
 
     Args:
-        wanted: Preferred path.
+        preferred: Preferred path.
         is_folder: True for a folder; a dot in the name then does not start an extension.
     """
-    stem, suffix = (wanted.name, "") if is_folder else (wanted.stem, wanted.suffix)
-    path, number = wanted, 2
+    stem, suffix = (preferred.name, "") if is_folder else (preferred.stem, preferred.suffix)
+    path, number = preferred, 2
     while path.exists():
-        path, number = wanted.with_name(f"{stem} {number}{suffix}"), number + 1
+        path, number = preferred.with_name(f"{stem} {number}{suffix}"), number + 1
     return path

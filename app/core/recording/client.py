@@ -282,9 +282,9 @@ class RecorderClient:
             )
         )
         limits = {"seconds": seconds, "size_bytes": most_bytes}
-        ends = {name: limit for name, limit in limits.items() if limit is not None}
+        end_limits = {name: limit for name, limit in limits.items() if limit is not None}
         self._send(
-            op="record", path=str(path), topics=list(topics), left_out=list(left_out), note=note, **ends
+            op="record", path=str(path), topics=list(topics), left_out=list(left_out), note=note, **end_limits
         )
         return True
 
@@ -424,23 +424,23 @@ class RecorderClient:
         self._set_state(replace(self._without_pending_save(path), last=path or self.state.last))
 
     def _on_problem(self, content: Mapping[str, object]) -> None:
-        op, sentence = content.get("op"), str(content.get("sentence", ""))
+        op, message = content.get("op"), str(content.get("sentence", ""))
         if op == "record":
             self._set_state(replace(self.state, phase="", path=None))
-            self._alerts.raise_alert("recorder:ended", "error", _("Nothing is being recorded."), sentence)
+            self._alerts.raise_alert("recorder:ended", "error", _("Nothing is being recorded."), message)
         elif op == "keep":
             self._set_state(self._without_pending_save(_parse_path(content)))
             self._alerts.raise_alert(
-                "recorder:keep", "error", _("The last seconds couldn't be saved."), sentence
+                "recorder:keep", "error", _("The last seconds couldn't be saved."), message
             )
         elif op == "ring":
             self._ring = None
             self._set_state(replace(self.state, ring_s=None, ring_bytes=0))
-            self._alert_ring_off(sentence)
+            self._alert_ring_off(message)
         elif op == "stop":
             self._set_state(replace(self.state, phase=""))
             self._alerts.raise_alert(
-                "recorder:ended", "error", _("The recording couldn't be closed."), sentence
+                "recorder:ended", "error", _("The recording couldn't be closed."), message
             )
 
     def _on_exited(self, detail: str) -> None:
@@ -516,9 +516,11 @@ class RecorderClient:
 
 
 def _with_status(state: RecorderState, status: Mapping[str, object]) -> RecorderState:
-    plain = status.get("topics")
-    named = plain.items() if isinstance(plain, Mapping) else ()
-    topics = {str(topic): each for topic, told in named if (each := parse_stats(told)) is not None}
+    raw_topics = status.get("topics")
+    topic_items = raw_topics.items() if isinstance(raw_topics, Mapping) else ()
+    topics = {
+        str(topic): each for topic, raw_stats in topic_items if (each := parse_stats(raw_stats)) is not None
+    }
     duration = status.get("duration_s")
     return replace(
         state,

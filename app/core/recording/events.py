@@ -40,9 +40,9 @@ class RecordedEvents:
     sent.
     """
 
-    def __init__(self, say: SendEvent, *, clock_ns: Callable[[], int] = time.time_ns) -> None:
+    def __init__(self, send_event: SendEvent, *, clock_ns: Callable[[], int] = time.time_ns) -> None:
         # `clock_ns` is ns since 1970, as in the recorder.
-        self._say, self._clock_ns = say, clock_ns
+        self._say, self._clock_ns = send_event, clock_ns
         self._numbers = count(1)
         self._present: dict[str, tuple[str, Mapping[str, object]]] = {}
         self._run: RunState | None = None
@@ -54,8 +54,8 @@ class RecordedEvents:
         Args:
             to: Destination: "recording" or "ring" (the flight recorder).
         """
-        for role, told in self._present.values():
-            self._say(role, told, to)
+        for role, content in self._present.values():
+            self._say(role, content, to)
 
     # ---- behaviours
 
@@ -86,10 +86,10 @@ class RecordedEvents:
 
     def _send_result(self, run: RunState) -> None:
         # Sent again with the robots' time once they have replied.
-        told = {**self._run_told, **_result(run)}
-        if told != self._run_told:
-            self._run_told = told
-            self._say("runs", dict(told))
+        content = {**self._run_told, **_result(run)}
+        if content != self._run_told:
+            self._run_told = content
+            self._say("runs", dict(content))
         if run.state in {"proven", "ready"}:
             self._run_told = {}
 
@@ -98,19 +98,19 @@ class RecordedEvents:
     def on_alarm(self, event: AlarmEvent) -> None:
         """Send an alarm event: raised, cleared, or still active."""
         key = f"alarm-{event.rule.id}"
-        known = self._present.get(key)
+        active = self._present.get(key)
         if event.kind == "off":
-            if known is not None:
+            if active is not None:
                 del self._present[key]
-                self._say("alarms", {**known[1], "until_ns": self._clock_ns()})
+                self._say("alarms", {**active[1], "until_ns": self._clock_ns()})
             return
-        if known is not None:
+        if active is not None:
             return
         condition = event.rule.condition
-        told = self._new_entry(f"{key}-{next(self._numbers)}", event_text(condition, event.value))
-        told["severity"] = severity_of(condition)
-        told["topic"] = "" if condition.is_about_node else condition.name
-        self._add("alarms", told, key)
+        entry = self._new_entry(f"{key}-{next(self._numbers)}", event_text(condition, event.value))
+        entry["severity"] = severity_of(condition)
+        entry["topic"] = "" if condition.is_about_node else condition.name
+        self._add("alarms", entry, key)
 
     # ---- private
 
@@ -123,10 +123,10 @@ class RecordedEvents:
             "until_ns": None,
         }
 
-    def _add(self, role: str, told: Mapping[str, object], key: str = "") -> None:
-        self._say(role, dict(told))
+    def _add(self, role: str, content: Mapping[str, object], key: str = "") -> None:
+        self._say(role, dict(content))
         if len(self._present) < MAX_ACTIVE_ALARMS:
-            self._present[key or str(told["id"])] = (role, told)
+            self._present[key or str(content["id"])] = (role, content)
 
 
 def _is_unchanged(before: RunState, run: RunState) -> bool:

@@ -66,22 +66,22 @@ class FilmStripPreview:
             if topic.name in topics:
                 share = self._share_in_range(self.by_topic.get(topic.name, ()), begin_ns, end_ns)
                 count += share * topic.message_count
-                its = self.size_of(topic)
-                is_known = is_known and its is not None
-                size += share * (its or 0.0)
+                topic_bytes = self.size_of(topic)
+                is_known = is_known and topic_bytes is not None
+                size += share * (topic_bytes or 0.0)
         return count, size if is_known else None
 
     def _share_in_range(self, counts: Sequence[int], begin_ns: int, end_ns: int) -> float:
         # Share of the counted messages within the range, 0 to 1.
         if begin_ns <= self.start_ns and end_ns >= self.end_ns:
             return 1.0
-        whole = sum(counts)
-        if not whole:
+        total = sum(counts)
+        if not total:
             return 0.0
-        wide = (self.end_ns + 1 - self.start_ns) / len(counts)
-        first, last = (begin_ns - self.start_ns) / wide, (end_ns + 1 - self.start_ns) / wide
-        inside = (max(0.0, min(last, at + 1) - max(first, at)) for at in range(len(counts)))
-        return sum(part * count for part, count in zip(inside, counts, strict=True)) / whole
+        bucket_ns = (self.end_ns + 1 - self.start_ns) / len(counts)
+        first, last = (begin_ns - self.start_ns) / bucket_ns, (end_ns + 1 - self.start_ns) / bucket_ns
+        overlaps = (max(0.0, min(last, index + 1) - max(first, index)) for index in range(len(counts)))
+        return sum(part * count for part, count in zip(overlaps, counts, strict=True)) / total
 
 
 def film_strip(
@@ -117,53 +117,55 @@ def _pictures(recording: Recording, count: int, fit: Size) -> tuple[Picture | No
         return ()
     topic = max(topics, key=lambda each: each.message_count).name
     images = []
-    for place in range(count):
+    for index in range(count):
         span = recording.end_ns - recording.start_ns
-        at_ns = recording.start_ns + (2 * place + 1) * span // (2 * count)
-        found = recording.newest(at_ns, (topic,)).get(topic) or recording.after(at_ns, topic)
-        images.append(decode(found.message, 0.0, fit)[0] if found is not None else None)
+        at_ns = recording.start_ns + (2 * index + 1) * span // (2 * count)
+        entry = recording.newest(at_ns, (topic,)).get(topic) or recording.after(at_ns, topic)
+        images.append(decode(entry.message, 0.0, fit)[0] if entry is not None else None)
     return tuple(images)
 
 
 def _message_bytes(recording: Recording) -> dict[str, float]:
     # From the recorder's counts, else from a few messages along the time.
-    figures = recording.stats()
-    made = {
+    stats = recording.stats()
+    mean_bytes = {
         topic: each.size_bytes / each.received
-        for topic, each in figures.items()
+        for topic, each in stats.items()
         if each.received and topic in recording.topics
     }
-    others = [topic for topic in recording.topics if topic not in made][:MAX_SAMPLED_TOPICS]
-    seen: dict[str, dict[int, int]] = {topic: {} for topic in others}
+    others = [topic for topic in recording.topics if topic not in mean_bytes][:MAX_SAMPLED_TOPICS]
+    samples: dict[str, dict[int, int]] = {topic: {} for topic in others}
     span = recording.end_ns - recording.start_ns
-    for place in range(SAMPLES_PER_TOPIC if others else 0):
-        at_ns = recording.start_ns + (place + 1) * span // SAMPLES_PER_TOPIC
-        for topic, found in recording.newest(at_ns, others).items():
-            seen[topic][found.log_ns] = found.message.size_bytes
-    return made | {topic: sum(sizes.values()) / len(sizes) for topic, sizes in seen.items() if sizes}
+    for index in range(SAMPLES_PER_TOPIC if others else 0):
+        at_ns = recording.start_ns + (index + 1) * span // SAMPLES_PER_TOPIC
+        for topic, entry in recording.newest(at_ns, others).items():
+            samples[topic][entry.log_ns] = entry.message.size_bytes
+    return mean_bytes | {topic: sum(sizes.values()) / len(sizes) for topic, sizes in samples.items() if sizes}
 
 
 def select_part(
-    look: FilmStripPreview, begin_ns: int, end_ns: int, wanted: Sequence[str], unwanted: Sequence[str]
+    preview: FilmStripPreview, begin_ns: int, end_ns: int, included: Sequence[str], unwanted: Sequence[str]
 ) -> Part:
     """Return the part of a recording in an inclusive time range, limited to topics that match patterns.
 
     Raises `BadTopicError` for an invalid pattern.
 
     Args:
-        look: Preview of the recording.
+        preview: Preview of the recording.
         begin_ns: Start of the range.
         end_ns: End of the range.
-        wanted: Patterns of topics to include; empty for all topics.
+        included: Patterns of topics to include; empty for all topics.
         unwanted: Patterns of topics to exclude.
 
     Returns:
         Part of the recording. If no topic matches, its ``topics`` is empty.
     """
     topics = None
-    if wanted or unwanted:
-        selection = TopicSelection(tuple(wanted), tuple(unwanted))
-        topics = [each.name for each in look.topics if selection.has(each.name)]
+    if included or unwanted:
+        selection = TopicSelection(tuple(included), tuple(unwanted))
+        topics = [each.name for each in preview.topics if selection.has(each.name)]
     return Part(
-        None if begin_ns <= look.start_ns else begin_ns, None if end_ns >= look.end_ns else end_ns + 1, topics
+        None if begin_ns <= preview.start_ns else begin_ns,
+        None if end_ns >= preview.end_ns else end_ns + 1,
+        topics,
     )

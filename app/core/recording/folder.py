@@ -87,19 +87,19 @@ def default_folder() -> Path:
     return Path(home or platformdirs.user_documents_dir()) / _("Recordings")
 
 
-def new_path(folder: Path, now: datetime, word: str = "recording") -> Path:
+def new_path(folder: Path, now: datetime, prefix: str = "recording") -> Path:
     """Return an unused path for a new recording.
 
     Args:
         folder: Folder of recordings.
         now: Current local time, used in the file name.
-        word: First part of the file name.
+        prefix: First part of the file name.
     """
-    stem = f"{word}-{now.strftime('%Y-%m-%d-%H-%M-%S')}"
-    made, number = folder / f"{stem}{SUFFIX}", 2
-    while made.exists():
-        made, number = folder / f"{stem}-{number}{SUFFIX}", number + 1
-    return made
+    stem = f"{prefix}-{now.strftime('%Y-%m-%d-%H-%M-%S')}"
+    path, number = folder / f"{stem}{SUFFIX}", 2
+    while path.exists():
+        path, number = folder / f"{stem}-{number}{SUFFIX}", number + 1
+    return path
 
 
 class RecordingFolder:
@@ -135,77 +135,77 @@ class RecordingFolder:
     def _scan(self, being_written: Path | None) -> FolderScan:
         try:
             with os.scandir(self.folder) as entries:
-                there = [
+                found_files = [
                     (Path(each.path), each.stat())
                     for each in entries
                     if each.name.lower().endswith(SUFFIX) and each.is_file()
                 ]
         except OSError as error:
             return FolderScan(problem=(error.strerror or str(error)).lower())
-        there.sort(key=lambda each: (-each[1].st_mtime_ns, each[0].name))
-        listed, left_out = there[:MAX_FILES], max(0, len(there) - MAX_FILES)
-        self._known = {path: self._known[path] for path, _about in listed if path in self._known}
+        found_files.sort(key=lambda each: (-each[1].st_mtime_ns, each[0].name))
+        listed_files, left_out = found_files[:MAX_FILES], max(0, len(found_files) - MAX_FILES)
+        self._known = {path: self._known[path] for path, _about in listed_files if path in self._known}
         files, opened, until = [], 0, time.monotonic() + MAX_SCAN_S
-        for path, about in listed:
+        for path, about in listed_files:
             mark = (about.st_mtime_ns, about.st_size)
-            known = self._known.get(path)
-            if known is not None and known[0] == mark:
-                files.append(known[1])
+            cached = self._known.get(path)
+            if cached is not None and cached[0] == mark:
+                files.append(cached[1])
                 continue
-            plain = RecordingInfo(path, about.st_size, about.st_mtime)
+            info = RecordingInfo(path, about.st_size, about.st_mtime)
             if (
                 path != being_written
                 and opened < MAX_READS_PER_SCAN
                 and (not opened or time.monotonic() < until)
             ):
                 opened += 1
-                plain = read_info(plain, self._opener)
-                self._known[path] = (mark, plain)
-            files.append(plain)
+                info = read_info(info, self._opener)
+                self._known[path] = (mark, info)
+            files.append(info)
         is_whole = all(each.is_read or each.path == being_written for each in files)
         return FolderScan(tuple(files), "", left_out, is_whole)
 
 
-def read_info(plain: RecordingInfo, opener: RecordingOpener) -> RecordingInfo:
+def read_info(file_info: RecordingInfo, opener: RecordingOpener) -> RecordingInfo:
     """Return the facts of a recording with the fields that are read from the file.
 
     If reading fails, they contain the reason.
 
     Args:
-        plain: Facts from the file system.
+        file_info: Facts from the file system.
         opener: Opener of recordings.
     """
     try:
-        with opener.open(plain.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
-            words = recording.recorder_metadata
+        with opener.open(file_info.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
+            metadata = recording.recorder_metadata
             return RecordingInfo(
-                plain.path,
-                plain.size_bytes,
-                plain.changed_s,
+                file_info.path,
+                file_info.size_bytes,
+                file_info.changed_s,
                 is_read=True,
                 start_ns=recording.start_ns,
                 duration_s=recording.duration_s,
                 message_count=recording.message_count,
                 topics=tuple(recording.topics)[:MAX_TOPICS],
-                note=words.get("note", ""),
+                note=metadata.get("note", ""),
                 is_complete=recording.is_complete,
-                is_repaired=words.get("repaired") == "1",
-                is_from_flight_recorder=words.get("kept") == "1",
+                is_repaired=metadata.get("repaired") == "1",
+                is_from_flight_recorder=metadata.get("kept") == "1",
                 lost=_lost_count(recording),
             )
     except RecordingTooLargeError as error:
-        why = _("Not scanned: {reason}.").format(reason=error.reason)
-        return replace(plain, is_read=True, is_complete=True, scan_problem=why)
+        problem = _("Not scanned: {reason}.").format(reason=error.reason)
+        return replace(file_info, is_read=True, is_complete=True, scan_problem=problem)
     except (NepError, OSError) as error:
-        return replace(plain, is_read=True, problem=str(error))
+        return replace(file_info, is_read=True, problem=str(error))
 
 
 def _lost_count(recording: Recording) -> int | None:
     try:
-        figures = recording.stats()
+        stats = recording.stats()
     except RecordingTooLargeError:  # a file that was not closed would have to be read completely
         return None
-    return sum((each.lost or 0) + each.unkept for each in figures.values()) if figures else None
+    return sum((each.lost or 0) + each.unkept for each in stats.values()) if stats else None
 
 
 def read_picture(path: Path, fit: Size, opener: RecordingOpener) -> Picture | None:
@@ -223,7 +223,7 @@ def read_picture(path: Path, fit: Size, opener: RecordingOpener) -> Picture | No
                 return None
             topic = max(topics, key=lambda each: each.message_count).name
             middle = (recording.start_ns + recording.end_ns) // 2
-            found = recording.newest(middle, (topic,)).get(topic) or recording.after(middle, topic)
-            return decode(found.message, 0.0, fit)[0] if found is not None else None
+            entry = recording.newest(middle, (topic,)).get(topic) or recording.after(middle, topic)
+            return decode(entry.message, 0.0, fit)[0] if entry is not None else None
     except (NepError, OSError):
         return None

@@ -94,8 +94,8 @@ class SessionRecordings:
     @property
     def folder(self) -> Path:
         """Folder of recordings."""
-        chosen = self._settings.get(FOLDER_KEY, "")
-        return Path(chosen) if chosen else folders.default_folder()
+        configured = self._settings.get(FOLDER_KEY, "")
+        return Path(configured) if configured else folders.default_folder()
 
     def set_folder(self, folder: Path) -> None:
         """Set and save the folder of recordings."""
@@ -192,43 +192,49 @@ class SessionRecordings:
         """True if the flight recorder is on."""
         return self.client.state.ring_s is not None
 
-    def set_ring_settings(self, wish: RingSettings) -> None:
+    def set_ring_settings(self, ring_settings: RingSettings) -> None:
         """Set and save the settings of the flight recorder.
 
         A change of the topic selection restarts the flight recorder and discards its content.
         """
-        self.wish = wish
-        self._save_setting(RING_KEY, ring_settings_to_json(wish))
+        self.wish = ring_settings
+        self._save_setting(RING_KEY, ring_settings_to_json(ring_settings))
         self._apply_ring_settings()
 
     def _apply_ring_settings(self) -> None:
-        wish = self.wish
-        if not wish.is_on:
+        ring_settings = self.wish
+        if not ring_settings.is_on:
             self.client.set_ring(None)
             return
         folder = data_home() / "flight-recorder"
-        size_bytes = round(wish.size_gb * _GB)
+        size_bytes = round(ring_settings.size_gb * _GB)
         self.client.set_ring(
-            RingChoice(folder, float(wish.seconds), size_bytes, wish.patterns, wish.excluded)
+            RingChoice(
+                folder,
+                float(ring_settings.seconds),
+                size_bytes,
+                ring_settings.patterns,
+                ring_settings.excluded,
+            )
         )
 
     def save_last(
-        self, note: str = "", seconds: float | None = None, done: DoneCallback | None = None
+        self, note: str = "", seconds: float | None = None, on_done: DoneCallback | None = None
     ) -> str:
         """Save the newest content of the flight recorder; return the reason if that can't start, else "".
 
         Args:
             note: Note stored in the file.
             seconds: Duration to save; default: the whole content.
-            done: Called with the result when the file is finished.
+            on_done: Called with the result when the file is finished.
         """
         if not self.wish.is_on:
             return _("The flight recorder is off.")
         folder = self._prepare_folder()
         if folder is None:
             return _("The recordings folder is missing.")
-        word = "alarm" if done is not None else "kept"
-        path = folders.new_path(folder, self._now(), word)
+        prefix = "alarm" if on_done is not None else "kept"
+        path = folders.new_path(folder, self._now(), prefix)
         number = 2
         while path in self._keeping:
             path, number = path.with_stem(f"{path.stem}-{number}"), number + 1
@@ -236,22 +242,22 @@ class SessionRecordings:
             path, seconds if seconds is not None else float(self.wish.seconds), note
         ):
             return _("The last seconds can't be saved now.")
-        self._keeping[path] = done
+        self._keeping[path] = on_done
         return ""
 
-    def save_for_alarm(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
+    def save_for_alarm(self, event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
         """Save the newest content of the flight recorder, as the action of an alarm.
 
         Args:
             event: Alarm event that triggered the action.
             action: Action with the duration to save.
-            done: Called with the result.
+            on_done: Called with the result.
         """
-        said = event_text(event.rule.condition, event.value)
-        why_not = self.save_last(said, action.recording_s, done)
-        if why_not:
-            words = _("nothing saved: {reason}")
-            done(False, words.format(reason=f"{why_not[:1].lower()}{why_not[1:]}".rstrip(".")))
+        text = event_text(event.rule.condition, event.value)
+        problem = self.save_last(text, action.recording_s, on_done)
+        if problem:
+            template = _("nothing saved: {reason}")
+            on_done(False, template.format(reason=f"{problem[:1].lower()}{problem[1:]}".rstrip(".")))
 
     # ---- interface of the session
 
@@ -281,13 +287,13 @@ class SessionRecordings:
             if state.last is not None and state.last == was.path:
                 self.on_made(state.last, "recorded")
         for path in [each for each in self._keeping if each not in state.pending_saves]:
-            done = self._keeping.pop(path)
-            is_there = state.last == path
-            if is_there:
+            on_done = self._keeping.pop(path)
+            is_saved = state.last == path
+            if is_saved:
                 self.on_made(path, "kept")
-            if done is not None:
-                words = _("saved {file}") if is_there else _("nothing saved: see the alerts")
-                done(is_there, words.format(file=path.name))
+            if on_done is not None:
+                template = _("saved {file}") if is_saved else _("nothing saved: see the alerts")
+                on_done(is_saved, template.format(file=path.name))
 
     def close(self) -> None:
         """Close the recorder. Its process finishes a recording in progress, even after Studio has exited."""
@@ -298,7 +304,7 @@ class SessionRecordings:
             self._settings.set(key, value)
 
 
-def saved_file_name(words: str) -> str:
+def saved_file_name(text: str) -> str:
     """Return the file name in a text such as "kept alarm-2026-11-27-10-00-00.mcap"; "" if there is none."""
-    found = _SAVED_FILE_PATTERN.search(words)
-    return found[0] if found is not None else ""
+    match = _SAVED_FILE_PATTERN.search(text)
+    return match[0] if match is not None else ""

@@ -82,18 +82,18 @@ def exit_text(code: int) -> str:
             name = ""
         return f"ended by signal {-code}{name}"
     if code >= MIN_CRASH_STATUS:
-        words = STATUS_TEXTS.get(code)
-        return f"ended with the status 0x{code:08X}" + (f" ({words})" if words else "")
+        text = STATUS_TEXTS.get(code)
+        return f"ended with the status 0x{code:08X}" + (f" ({text})" if text else "")
     return f"ended with the code {code}"
 
 
-def split_trace(said: str) -> tuple[str, str]:
+def split_trace(output: str) -> tuple[str, str]:
     """Split the output of a process into normal output and faulthandler's stack trace ("" if none)."""
-    lines = said.splitlines(keepends=True)
-    for place, line in enumerate(lines):
+    lines = output.splitlines(keepends=True)
+    for index, line in enumerate(lines):
         if line.startswith(TRACE_PREFIXES):
-            return "".join(lines[:place]), "".join(lines[place:])
-    return said, ""
+            return "".join(lines[:index]), "".join(lines[index:])
+    return output, ""
 
 
 def fatal_line(trace: str) -> str:

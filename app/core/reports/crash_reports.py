@@ -95,32 +95,32 @@ class CrashReports:
 
     def _unused_path(self, stem: str) -> Path:
         # An unused name, considering both offered and new reports.
-        taken = {each.path.name.replace(".new.txt", ".txt") for each in self.all()}
-        names = (stem, *(f"{stem} {number}" for number in range(2, len(taken) + 3)))
-        return self._folder / f"{next(name for name in names if f'{name}.txt' not in taken)}.new.txt"
+        used_names = {each.path.name.replace(".new.txt", ".txt") for each in self.all()}
+        names = (stem, *(f"{stem} {number}" for number in range(2, len(used_names) + 3)))
+        return self._folder / f"{next(name for name in names if f'{name}.txt' not in used_names)}.new.txt"
 
     def all(self) -> list[CrashReport]:
         """Return the stored reports, newest first."""
         try:
-            found = [_parse_report(path) for path in self._folder.glob("crash *.txt")]
+            parsed = [_parse_report(path) for path in self._folder.glob("crash *.txt")]
         except OSError:
             return []
-        known = [each for each in found if each is not None]
-        return sorted(known, key=lambda each: (each.detected_s, each.path.name), reverse=True)
+        valid = [each for each in parsed if each is not None]
+        return sorted(valid, key=lambda each: (each.detected_s, each.path.name), reverse=True)
 
     def take_new(self) -> list[CrashReport]:
         """Return the new reports, newest first, and save that they have been offered.
 
         A report for which that can't be saved is omitted; otherwise it would be offered at every start.
         """
-        taken = []
-        for each in self.all():
-            if each.is_new:
-                path = each.path.with_name(each.path.name.replace(".new.txt", ".txt"))
+        new_reports = []
+        for report in self.all():
+            if report.is_new:
+                path = report.path.with_name(report.path.name.replace(".new.txt", ".txt"))
                 with suppress(OSError):  # another instance took it, or the disk is read-only
-                    replace_file(each.path, path)
-                    taken.append(CrashReport(path, each.part, each.detected_s, is_new=False))
-        return taken
+                    replace_file(report.path, path)
+                    new_reports.append(CrashReport(path, report.part, report.detected_s, is_new=False))
+        return new_reports
 
 
 class CrashLog(logging.Handler):
@@ -139,9 +139,9 @@ class CrashLog(logging.Handler):
 
 def show_crash_alert(alerts: Alerts, reports: CrashReports) -> None:
     """Raise an alert about crashes before this start, with a button that creates a problem report."""
-    found = reports.take_new()
-    if found:
-        worst = min(found, key=lambda each: PARTS.index(each.part))
+    new_reports = reports.take_new()
+    if new_reports:
+        worst = min(new_reports, key=lambda each: PARTS.index(each.part))
         version = _read_version(worst)
         sentences = [_(ALERT_DETAIL)]
         if version not in {"", __version__}:  # it may be fixed already
@@ -158,13 +158,13 @@ def show_crash_alert(alerts: Alerts, reports: CrashReports) -> None:
 
 def read_reports(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
     """Return the file names and contents of reports; unreadable reports are skipped."""
-    found = []
-    for each in reports:
+    contents = []
+    for report in reports:
         with suppress(OSError):
-            found.append(
-                (each.path.name.replace(".new.txt", ".txt"), read_regular_file(each.path, MAX_BYTES))
+            contents.append(
+                (report.path.name.replace(".new.txt", ".txt"), read_regular_file(report.path, MAX_BYTES))
             )
-    return found
+    return contents
 
 
 def _read_version(report: CrashReport) -> str:
@@ -173,8 +173,8 @@ def _read_version(report: CrashReport) -> str:
         first = read_regular_file(report.path, MAX_BYTES).partition(b"\n")[0].decode("utf-8", "replace")
     except OSError:
         return ""
-    found = first.removeprefix(HEADING).strip()
-    return found if first.startswith(HEADING) and VERSION_PATTERN.fullmatch(found) else ""
+    version = first.removeprefix(HEADING).strip()
+    return version if first.startswith(HEADING) and VERSION_PATTERN.fullmatch(version) else ""
 
 
 def _format_report(crash: Crash, now_s: float) -> str:

@@ -87,30 +87,30 @@ class MissingLibraries:
     @property
     def start_title(self) -> str:
         """Error message for the case that the window can't be opened."""
-        words = ngettext(
+        template = ngettext(
             "NEP Studio can't start: the system library {names} is missing.",
             "NEP Studio can't start: the system libraries {names} are missing.",
             len(self.names),
         )
-        return words.format(names=format_list(self.names))
+        return template.format(names=format_list(self.names))
 
     @property
     def start_remedy(self) -> str:
         """Instructions for installing the libraries that the window needs."""
         if not self.command:
             return _("Install the package that contains it, then start Studio again.")
-        words = _("On Debian and Ubuntu, run “{command}” in a terminal, then start Studio again.")
-        return words.format(command=self.command)
+        template = _("On Debian and Ubuntu, run “{command}” in a terminal, then start Studio again.")
+        return template.format(command=self.command)
 
     @property
     def title(self) -> str:
         """Error message for the case that the block editor can't be opened."""
-        words = ngettext(
+        template = ngettext(
             "The block editor can't open: the system library {names} is missing.",
             "The block editor can't open: the system libraries {names} are missing.",
             len(self.names),
         )
-        return words.format(names=format_list(self.names))
+        return template.format(names=format_list(self.names))
 
     @property
     def remedy(self) -> str:
@@ -141,10 +141,10 @@ def missing_libraries(
         load: Loads a library by name; raises OSError.
         release: Returns the fields of os-release.
     """
-    named = _library_in(str(error))
-    if not named:
+    library = _library_in(str(error))
+    if not library:
         return None
-    names = {named: None}
+    names = {library: None}
     for name in PACKAGES_BY_LIBRARY:
         try:
             load(name)
@@ -160,8 +160,8 @@ def alert_missing(alerts: Alerts, missing: MissingLibraries) -> None:
 
 def _library_in(error: str) -> str:
     # From an error of the dynamic linker; "" when it names none.
-    found = _MISSING_LIBRARY.search(error)
-    return found[1] if found is not None else ""
+    match = _MISSING_LIBRARY.search(error)
+    return match[1] if match is not None else ""
 
 
 def import_problem(

@@ -106,8 +106,8 @@ def describe_contents(parts: ReportParts) -> list[str]:
     ]
     crashed = len(parts.crashes.all())
     if crashed:
-        words = ngettext("{count} crash report", "{count} crash reports", crashed)
-        lines.append(words.format(count=crashed))
+        template = ngettext("{count} crash report", "{count} crash reports", crashed)
+        lines.append(template.format(count=crashed))
     return lines
 
 
@@ -116,13 +116,13 @@ def work_text(names: Sequence[str]) -> str:
     return _("Open behaviours: {names}").format(names=format_list([f"“{name}”" for name in names]))
 
 
-def create_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] = ()) -> bytes:
+def create_report(parts: ReportParts, happened: str, documents: Sequence[ReportedWork] = ()) -> bytes:
     """Create the content of the zip file. Slow because of the doctor; don't call it in the main thread.
 
     Args:
         parts: Sources of the report.
         happened: Description by the user.
-        work: Behaviours to include.
+        documents: Behaviours to include.
     """
     files: list[tuple[str, bytes]] = [
         ("README.txt", README_TEXT.format(version=__version__).encode()),
@@ -136,7 +136,7 @@ def create_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork
             files.append((f"log/{path.name}", _anonymize(read_regular_file(path).decode("utf-8", "replace"))))
     for name, data in read_reports(parts.crashes.all()):
         files.append((f"crashes/{name}", _anonymize(data.decode("utf-8", "replace"))))
-    files += _encode_work(work)
+    files += _encode_work(documents)
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in files:
@@ -202,22 +202,24 @@ def _format_settings(values: Mapping[str, object]) -> str:
     return json.dumps(reportable_settings(values), indent=1, ensure_ascii=False, default=str)
 
 
-def _encode_work(work: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
+def _encode_work(documents: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
     # Each with a unique name that is valid on every system.
-    found: dict[str, bytes] = {}
-    for each in work:
-        plain = "".join(c if c.isalnum() or c in " -_," else "_" for c in each.name)[:MAX_NAME_LENGTH].strip()
-        stem, again = plain or "behaviour", 2
+    data_by_name: dict[str, bytes] = {}
+    for document in documents:
+        safe_name = "".join(c if c.isalnum() or c in " -_," else "_" for c in document.name)[
+            :MAX_NAME_LENGTH
+        ].strip()
+        stem, copy_number = safe_name or "behaviour", 2
         name = f"work/{stem}{SUFFIX}"
-        while name in found:
-            name, again = f"work/{stem} {again}{SUFFIX}", again + 1
-        found[name] = each.data
-    return list(found.items())
+        while name in data_by_name:
+            name, copy_number = f"work/{stem} {copy_number}{SUFFIX}", copy_number + 1
+        data_by_name[name] = document.data
+    return list(data_by_name.items())
 
 
 def _format_versions(parts: ReportParts) -> str:
-    used = ("versions used here", format_versions(parts.settings))
-    lines = [f"{name}: {value}" for name, value in (*_system_info(), used, *parts.info)]
+    versions = ("versions used here", format_versions(parts.settings))
+    lines = [f"{name}: {value}" for name, value in (*_system_info(), versions, *parts.info)]
     return "\n".join([*lines, "", "packages:", *_list_packages()]) + "\n"
 
 
@@ -247,5 +249,5 @@ def _distribution() -> str:
 
 
 def _list_packages() -> list[str]:
-    found = {str(each.metadata["Name"]): each.version for each in metadata.distributions()}
-    return sorted((f"{name} {version}" for name, version in found.items()), key=str.lower)
+    versions = {str(each.metadata["Name"]): each.version for each in metadata.distributions()}
+    return sorted((f"{name} {version}" for name, version in versions.items()), key=str.lower)

@@ -77,7 +77,7 @@ class StudioRun:
         """Create the marker file. A failure is logged."""
         self._began_s = self._clock()
         try:
-            self._write(asked=False)
+            self._write(is_exit_requested=False)
             self._lock.acquire()
             self._enable_faulthandler()
         except OSError as error:
@@ -88,7 +88,7 @@ class StudioRun:
         """Record that Studio was asked to exit, so that ending now is not detected as a crash."""
         if self.is_recorded:
             with contextlib.suppress(OSError):
-                self._write(asked=True)
+                self._write(is_exit_requested=True)
 
     def finish(self) -> None:
         """Delete the marker file when Studio exits normally."""
@@ -117,18 +117,18 @@ class StudioRun:
             marks = [mark for mark in self._folder.glob("*.json") if mark != self._mark]
         except OSError:
             return []
-        found = [self._check_marker(mark) for mark in marks]
-        return [crash for crash in found if crash is not None]
+        checked = [self._check_marker(mark) for mark in marks]
+        return [crash for crash in checked if crash is not None]
 
     # -- this run -------------------------------------------------------------------------------------------
 
-    def _write(self, *, asked: bool) -> None:
+    def _write(self, *, is_exit_requested: bool) -> None:
         entry = {
             "pid": os.getpid(),
             "began_s": self._began_s,
             "version": __version__,
             "trace": _trace_name(self._mark),
-            "asked": asked,
+            "asked": is_exit_requested,
         }
         write_atomically(self._mark, json.dumps(entry).encode(), durable=False, private=True)
 
@@ -177,9 +177,9 @@ class StudioRun:
             if entry.get("asked") is True or psutil.boot_time() > began_s + CLOCK_TOLERANCE_S:
                 return None
             how = NO_TRACE_CAUSE
-        began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(began_s))
+        start_time = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(began_s))
         version = parse_version(entry.get("version"))
-        text = f"It was version {version or 'not known'}, begun {began}.\n\n{trace}\n{self._log_tail()}"
+        text = f"It was version {version or 'not known'}, begun {start_time}.\n\n{trace}\n{self._log_tail()}"
         return Crash("studio", how, text, version)
 
     def _read_trace(self, mark: Path) -> str:

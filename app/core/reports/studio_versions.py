@@ -35,7 +35,7 @@ def known_versions(values: Mapping[str, object]) -> list[tuple[str, float]]:
     Times are in seconds since 1970.
     """
     entries = values.get(SETTING_KEY)
-    found = []
+    versions = []
     for entry in entries if isinstance(entries, list) else ():
         if not isinstance(entry, Mapping):
             continue
@@ -46,8 +46,8 @@ def known_versions(values: Mapping[str, object]) -> list[tuple[str, float]]:
             and 0 <= since <= _MAX_TIME_S
             and version
         ):
-            found.append((version, float(since)))
-    return found[-MAX_VERSIONS:]
+            versions.append((version, float(since)))
+    return versions[-MAX_VERSIONS:]
 
 
 def add_this_version(

@@ -102,86 +102,96 @@ class Announcements:
 
     def is_announced(self, topic: str) -> bool:
         """Return True if a robot is announced on this topic."""
-        known = self._topics.get(topic)
-        return known is not None and known.watch is not None
+        announcement = self._topics.get(topic)
+        return announcement is not None and announcement.watch is not None
 
     @property
     def robots(self) -> Iterator[tuple[str, Robot, Identity]]:
         """Announced robots as tuples of topic, description and owner."""
-        for topic, known in self._topics.items():
-            if known.watch is not None and known.robot is not None and known.owner is not None:
-                yield topic, known.robot, known.owner
+        for topic, announcement in self._topics.items():
+            if (
+                announcement.watch is not None
+                and announcement.robot is not None
+                and announcement.owner is not None
+            ):
+                yield topic, announcement.robot, announcement.owner
 
     @property
     def unreadable_topics(self) -> tuple[str, ...]:
         """Topics whose descriptions are invalid."""
         return tuple(
-            topic for topic, known in self._topics.items() if known.is_unreadable and known.robot is None
+            topic
+            for topic, announcement in self._topics.items()
+            if announcement.is_unreadable and announcement.robot is None
         )
 
     @property
     def claims(self) -> Mapping[str, Claim]:
         """Rejected announcements by id."""
-        found = {}
-        for topic, known in self._topics.items():
-            if known.watch is None:
+        claims_by_id = {}
+        for topic, announcement in self._topics.items():
+            if announcement.watch is None:
                 continue
-            if known.other_owners and known.owner is not None:
-                name = known.robot.name if known.robot is not None else topic
-                found[topic] = Claim(
+            if announcement.other_owners and announcement.owner is not None:
+                name = announcement.robot.name if announcement.robot is not None else topic
+                claims_by_id[topic] = Claim(
                     _("{count} programs announce themselves as {robot}.").format(
-                        count=len(known.other_owners) + 1, robot=name
+                        count=len(announcement.other_owners) + 1, robot=name
                     ),
                     _("{first} was first and is used; {others} is ignored. Close all but one.").format(
-                        first=known.owner.display_name,
+                        first=announcement.owner.display_name,
                         others=format_list(
-                            [twin.display_name for twin in known.other_owners[:MAX_CLAIMANTS]]
+                            [twin.display_name for twin in announcement.other_owners[:MAX_CLAIMANTS]]
                         ),
                     ),
                 )
-            elif known.claim is not None:
-                found[topic] = known.claim
+            elif announcement.claim is not None:
+                claims_by_id[topic] = announcement.claim
         if self.left_out:
             title = ngettext(
                 "{count} more robot is on the network; Studio shows at most {most}.",
                 "{count} more robots are on the network; Studio shows at most {most}.",
                 len(self.left_out),
             ).format(count=len(self.left_out), most=MAX_ROBOTS)
-            found["robots"] = Claim(title, _("Find out which program announces them, and close it."))
-        return found
+            claims_by_id["robots"] = Claim(title, _("Find out which program announces them, and close it."))
+        return claims_by_id
 
     def update(self, view: GraphView) -> None:
         """Apply a new graph, which determines the announced robots and their owners."""
-        there = {
+        nodes_by_topic = {
             topic: nodes
             for topic, info in view.topics.items()
             if info.msg_type == DESCRIPTION_TYPE and (nodes := publisher_nodes(view, topic))
         }
-        self._senders.update(view, there)
-        for topic, known in self._topics.items():
-            if topic not in there:
-                self._mark_vanished(known)
+        self._senders.update(view, nodes_by_topic)
+        for topic, announcement in self._topics.items():
+            if topic not in nodes_by_topic:
+                self._mark_vanished(announcement)
         left_out: list[str] = []
-        for place, topic in _fair_topic_order(there):
-            nodes = there[topic]
-            begun = self._topics.get(topic) or self._add_topic(topic, place, left_out)
-            if begun is None:
+        for rank, topic in _fair_topic_order(nodes_by_topic):
+            nodes = nodes_by_topic[topic]
+            added = self._topics.get(topic) or self._add_topic(topic, rank, left_out)
+            if added is None:
                 left_out.append(topic)
                 continue
-            known, begun.rank = begun, place
-            if known.watch is None:
-                known.watch = self._watches.open([topic])
-            if known.owner is None or known.owner.node_id not in nodes:
-                known.owner, known.robot, known.parsed_message = identity_of(view, nodes[0]), None, None
-                known.claim = None
-                known.owners = tuple(dict.fromkeys((nodes[0], *known.owners)))[:MAX_OWNERS]
-            others = (node for node in nodes if node != known.owner.node_id)
-            known.other_owners = tuple(identity_of(view, node) for node in others)
+            announcement, added.rank = added, rank
+            if announcement.watch is None:
+                announcement.watch = self._watches.open([topic])
+            if announcement.owner is None or announcement.owner.node_id not in nodes:
+                announcement.owner, announcement.robot, announcement.parsed_message = (
+                    identity_of(view, nodes[0]),
+                    None,
+                    None,
+                )
+                announcement.claim = None
+                announcement.owners = tuple(dict.fromkeys((nodes[0], *announcement.owners)))[:MAX_OWNERS]
+            others = (node for node in nodes if node != announcement.owner.node_id)
+            announcement.other_owners = tuple(identity_of(view, node) for node in others)
             ids = {publisher.id for publisher in view.topics[topic].publishers}
-            known.messages = {
+            announcement.messages = {
                 id: message
-                for id, message in known.messages.items()
-                if id in ids or self._senders.node_of(message) in known.owners
+                for id, message in announcement.messages.items()
+                if id in ids or self._senders.node_of(message) in announcement.owners
             }
             self._waiting.add(topic)
         self.left_out = tuple(left_out)
@@ -190,52 +200,61 @@ class Announcements:
     def add(self, batches: Mapping[str, Batch]) -> bool:
         """Add received descriptions; return True if a description, possibly an earlier one, was parsed."""
         for topic in batches.keys() & self._topics.keys():
-            known = self._topics[topic]
+            announcement = self._topics[topic]
             for message in batches[topic].messages:
                 if message.publisher is not None:
-                    known.messages.pop(message.publisher, None)  # so that the newest is last
-                    known.messages[message.publisher] = message
-            while len(known.messages) > MAX_CLAIMANTS:
-                self._evict_one(known)
+                    announcement.messages.pop(message.publisher, None)  # so that the newest is last
+                    announcement.messages[message.publisher] = message
+            while len(announcement.messages) > MAX_CLAIMANTS:
+                self._evict_one(announcement)
             self._waiting.add(topic)
         return self._parse_pending()
 
     # -- private ---------------------------------------------------------------------------------------------
 
-    def _add_topic(self, topic: str, place: int, left_out: list[str]) -> _Announcement | None:
+    def _add_topic(self, topic: str, rank: int, left_out: list[str]) -> _Announcement | None:
         # None when there are too many. Vanished topics are evicted first, then those of nodes that announce
         # more robots than this one.
         if len(self._topics) >= MAX_ROBOTS:
             strangers = [name for name in self._topics if not self._is_proven(name)]
-            gone = next((name for name in strangers if self._topics[name].watch is None), None)
+            evicted = next((name for name in strangers if self._topics[name].watch is None), None)
             last = max(strangers, key=lambda name: self._topics[name].rank, default=None)
-            if gone is None and last is not None and self._topics[last].rank > place:
-                gone = last
+            if evicted is None and last is not None and self._topics[last].rank > rank:
+                evicted = last
                 left_out.append(last)
-            if gone is None:
+            if evicted is None:
                 return None
-            self._mark_vanished(self._topics.pop(gone))
+            self._mark_vanished(self._topics.pop(evicted))
         return self._topics.setdefault(topic, _Announcement())
 
-    def _mark_vanished(self, known: _Announcement) -> None:
+    def _mark_vanished(self, announcement: _Announcement) -> None:
         # The owner and its description are kept: after a restart of the master or a suspension it returns
         # over the same connection.
-        if known.watch is not None:
-            known.watch.close()
-        known.watch, known.robot, known.parsed_message, known.other_owners = None, None, None, ()
-        known.messages = {id: told for id, told in known.messages.items() if self._is_from_owner(known, told)}
+        if announcement.watch is not None:
+            announcement.watch.close()
+        announcement.watch, announcement.robot, announcement.parsed_message, announcement.other_owners = (
+            None,
+            None,
+            None,
+            (),
+        )
+        announcement.messages = {
+            id: message
+            for id, message in announcement.messages.items()
+            if self._is_from_owner(announcement, message)
+        }
 
-    def _evict_one(self, known: _Announcement) -> None:
+    def _evict_one(self, announcement: _Announcement) -> None:
         # Evicts another publisher's description; those of the robot's programs last.
-        for owners in (known.owners, known.owners[:1]):
-            for id, told in known.messages.items():
-                if self._senders.node_of(told) not in owners:
-                    del known.messages[id]
+        for owners in (announcement.owners, announcement.owners[:1]):
+            for id, message in announcement.messages.items():
+                if self._senders.node_of(message) not in owners:
+                    del announcement.messages[id]
                     return
-        del known.messages[next(iter(known.messages))]
+        del announcement.messages[next(iter(announcement.messages))]
 
-    def _is_from_owner(self, known: _Announcement, message: Message) -> bool:
-        return known.owner is not None and self._senders.node_of(message) == known.owner.node_id
+    def _is_from_owner(self, announcement: _Announcement, message: Message) -> bool:
+        return announcement.owner is not None and self._senders.node_of(message) == announcement.owner.node_id
 
     def _parse_pending(self) -> bool:
         # New robots first, then the shortest description. The time is limited, so that a program that keeps
@@ -245,67 +264,75 @@ class Announcements:
             MAX_PARSE_BUDGET_S, self._parse_budget_s + (now - self._budget_updated_s) * MAX_CPU_SHARE
         )
         self._budget_updated_s = now
-        wait = {
+        pending = {
             topic: newest for topic in self._waiting if (newest := self._unparsed_message(topic)) is not None
         }
-        self._waiting = set(wait)
+        self._waiting = set(pending)
 
-        def sort_key(each: tuple[str, Message]) -> tuple[bool, int]:
-            return self._topics[each[0]].parsed_message is not None, len(each[1].data)
+        def sort_key(item: tuple[str, Message]) -> tuple[bool, int]:
+            return self._topics[item[0]].parsed_message is not None, len(item[1].data)
 
-        for topic, newest in sorted(wait.items(), key=sort_key):
+        for topic, newest in sorted(pending.items(), key=sort_key):
             if self._parse_budget_s <= 0:
                 break
-            began = self._clock()
+            start_time_s = self._clock()
             self._parse(topic, newest)
-            self._parse_budget_s -= self._clock() - began
+            self._parse_budget_s -= self._clock() - start_time_s
             self._waiting.discard(topic)
-        return len(self._waiting) < len(wait)
+        return len(self._waiting) < len(pending)
 
     def _unparsed_message(self, topic: str) -> Message | None:
         # None if the newest description of the robot's own program has been parsed.
-        known = self._topics.get(topic)
-        if known is None or known.watch is None:
+        announcement = self._topics.get(topic)
+        if announcement is None or announcement.watch is None:
             return None
         newest = next(
-            (told for told in reversed(known.messages.values()) if self._is_from_owner(known, told)), None
+            (
+                message
+                for message in reversed(announcement.messages.values())
+                if self._is_from_owner(announcement, message)
+            ),
+            None,
         )
-        return None if newest is known.parsed_message else newest
+        return None if newest is announcement.parsed_message else newest
 
     def _parse(self, topic: str, newest: Message) -> None:
-        known = self._topics[topic]
-        known.parsed_message, known.claim, known.is_unreadable = newest, None, False
+        announcement = self._topics[topic]
+        announcement.parsed_message, announcement.claim, announcement.is_unreadable = newest, None, False
         try:
             robot = parse_announcement(newest)
         except NepError:
             return  # reported by the session's alert `message:<topic>`; the previous description stays valid
         except DescriptionError as error:
-            sentence = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
-            whose = known.owner.display_name if known.owner is not None else topic
-            words = (
+            title = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
+            program = announcement.owner.display_name if announcement.owner is not None else topic
+            template = (
                 _("{program} sent this invalid description; fix its driver.")
-                if known.robot is None
+                if announcement.robot is None
                 else _(
                     "{program} sent this invalid description; fix its driver. "
                     "The previous description is used."
                 )
             )
-            known.claim, known.is_unreadable = Claim(sentence, words.format(program=whose)), True
+            announcement.claim, announcement.is_unreadable = (
+                Claim(title, template.format(program=program)),
+                True,
+            )
             return
-        wrong = description_topic_problem(robot, topic)
-        known.robot = robot if wrong is None else None
-        if wrong is not None:
-            known.claim = Claim(f"{wrong}.", _("Find out what this program is, and close it."))
+        problem = description_topic_problem(robot, topic)
+        announcement.robot = robot if problem is None else None
+        if problem is not None:
+            announcement.claim = Claim(f"{problem}.", _("Find out what this program is, and close it."))
 
 
-def _fair_topic_order(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
+def _fair_topic_order(nodes_by_topic: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
     # Sorted so that the first topic of each node comes before the second topic of any node.
     counts: Counter[str] = Counter()
-    placed = []
-    for topic, nodes in there.items():
-        placed.append((counts[nodes[0]], topic))
+    ranked = []
+    for topic, nodes in nodes_by_topic.items():
+        ranked.append((counts[nodes[0]], topic))
         counts[nodes[0]] += 1
-    return sorted(placed, key=lambda each: each[0])
+    return sorted(ranked, key=lambda each: each[0])
 
 
 class RizeNames:
@@ -341,9 +368,9 @@ class RizeNames:
         return {_match_name(node, candidates) for node in nodes}
 
 
-def _match_name(node: str, told: Collection[str]) -> str:
+def _match_name(node: str, names: Collection[str]) -> str:
     stem = node
     for suffix in NODE_NAME_SUFFIXES:
         stem = stem.removesuffix(suffix)
     same = {stem.lower(), node.lower()}
-    return next((name for name in told if name.lower() in same), stem or node)
+    return next((name for name in names if name.lower() in same), stem or node)

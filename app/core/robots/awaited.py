@@ -28,30 +28,30 @@ def awaited_values(
     hat = block_type_of(robot.model, "when", event.name)
     argument = BlockTemplate(event.text, event.filters).arguments.get(name, "")
     sensors = {block_type_of(robot.model, "get", each.name) for each in robot.sensors if each.kind == "text"}
-    found: dict[str, None] = {}
+    values: dict[str, None] = {}
     for workspace in workspaces:
         for block in saved_blocks(workspace):
             if block.get("type") == hat and _fields(block).get("ROBOT", robot.name) == robot.name:
-                found[str(_fields(block).get(argument) or "").strip()] = None
+                values[str(_fields(block).get(argument) or "").strip()] = None
             else:
-                found.update(dict.fromkeys(_compared_texts(block, sensors)))
+                values.update(dict.fromkeys(_compared_texts(block, sensors)))
     parameter = next((each for each in event.fields if each.name == name), None)
     if parameter is not None and isinstance(parameter.default, str):
-        found[parameter.default] = None
-    return tuple(word for word in found if MIN_LENGTH <= len(word) <= MAX_LENGTH)[:MAX_VALUES]
+        values[parameter.default] = None
+    return tuple(value for value in values if MIN_LENGTH <= len(value) <= MAX_LENGTH)[:MAX_VALUES]
 
 
 def _compared_texts(block: Mapping[str, object], sensors: set[str]) -> list[str]:
     # Texts compared with a sensor in one block: “last word heard” = “yes”.
     inputs = block.get("inputs")
-    held: list[Mapping[str, object]] = []
+    connected: list[Mapping[str, object]] = []
     for connection in inputs.values() if isinstance(inputs, Mapping) else ():
-        shown = connection.get("block", connection.get("shadow")) if isinstance(connection, Mapping) else None
-        if isinstance(shown, Mapping):
-            held.append(shown)
-    if not any(each.get("type") in sensors for each in held):
+        child = connection.get("block", connection.get("shadow")) if isinstance(connection, Mapping) else None
+        if isinstance(child, Mapping):
+            connected.append(child)
+    if not any(each.get("type") in sensors for each in connected):
         return []
-    texts = [_fields(each).get("TEXT") for each in held]
+    texts = [_fields(each).get("TEXT") for each in connected]
     return [text.strip() for text in texts if isinstance(text, str)]
 
 

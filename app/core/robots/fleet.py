@@ -171,9 +171,9 @@ class Fleet:
         described = link.robot.action(action)
         if described is None:
             raise RobotInputError((_("{robot} can't {action}").format(robot=name, action=action),))
-        wrong = described.check(input)
-        if wrong:
-            raise RobotInputError(wrong, described.problems(input))
+        problems = described.check(input)
+        if problems:
+            raise RobotInputError(problems, described.problems(input))
         if not self.permission.request_permission(
             [(link.robot, [action])], lambda: self._retry_invoke(name, action, input)
         ):
@@ -208,10 +208,10 @@ class Fleet:
         """
         link = self._get_link(name)
         actions = [action.name for action in link.robot.actions]
-        may = self.permission.request_permission(
+        is_allowed = self.permission.request_permission(
             [(link.robot, actions)], lambda: self._retry_change(name, change)
         )
-        if may and link.world_publisher is not None:
+        if is_allowed and link.world_publisher is not None:
             link.world_publisher.publish(dict(change))
 
     @property
@@ -267,22 +267,22 @@ class Fleet:
     def _is_responsive(link: RobotLink | None) -> bool:
         return link is not None and link.is_connected and not link.is_unresponsive
 
-    def apply_stop(self, words: Mapping[str, tuple[str, str]], report: StopReport) -> None:
+    def apply_stop(self, texts_by_robot: Mapping[str, tuple[str, str]], report: StopReport) -> None:
         """Apply the result of a Stop.
 
         If the Stop of a robot is not confirmed, its invocations end only when the robot reports that.
 
         Args:
-            words: Message and status for each robot.
+            texts_by_robot: Message and status for each robot.
             report: Result of the Stop.
         """
-        wrong = {name: robot.problem for name, robot in report.results_by_robot.items()}
-        for name, (last_stop, status) in words.items():
+        problems = {name: robot.problem for name, robot in report.results_by_robot.items()}
+        for name, (last_stop, status) in texts_by_robot.items():
             link = self._links.get(name)
             if link is None:
                 continue
             link.last_stop, link.last_stop_status = last_stop, status
-            link.stop_problem = wrong.get(name, "")
+            link.stop_problem = problems.get(name, "")
             link.pending_stop_start_s, link.is_stopping = None, False
             link.has_confirmed_stop |= name in report.stopped_names
             if not link.stop_problem:
@@ -291,9 +291,9 @@ class Fleet:
 
     def confirm_stopped(self, names: Iterable[str]) -> None:
         """Record that these robots are not moving, according to the user."""
-        known = tuple(names)
-        self.moved.confirm(known)
-        for link in map(self._links.get, known):
+        robot_names = tuple(names)
+        self.moved.confirm(robot_names)
+        for link in map(self._links.get, robot_names):
             if link is not None:
                 link.stop_problem = ""
                 self._update_motion(link)
@@ -313,10 +313,10 @@ class Fleet:
         topics = (self._own.topics(link.robot) for link in self._links.values())
         self._senders.update(view, {rize.ANSWERS}.union(*topics))
         self._update_announced_robots()
-        known = self._announcements
+        announcements = self._announcements
         self._unlisted = (
-            *unlisted_targets(view, known.left_out),
-            *unlisted_targets(view, known.unreadable_topics, is_expected=False),
+            *unlisted_targets(view, announcements.left_out),
+            *unlisted_targets(view, announcements.unreadable_topics, is_expected=False),
         )
         self._update_rize(view)
         commanded = map(self._links.get, self.moved.recently_commanded)
@@ -404,28 +404,28 @@ class Fleet:
         if self._rize_events is None and rize.EVENTS in view.topics:
             self._rize_events = self._watches.open([rize.EVENTS])
         native = {link.name for link in self._links.values() if link.robot.dialect == "native"}
-        there = self._rize_names.names_in(view, native)
-        for name in there:
-            known = self._links.get(name)
-            if known is None or known.robot.dialect == "rize":
+        rize_names = self._rize_names.names_in(view, native)
+        for name in rize_names:
+            existing = self._links.get(name)
+            if existing is None or existing.robot.dialect == "rize":
                 self.connect(rize.robot(name), f"{rize.COMMANDS} {name}")
         for link in self._links.values():
-            if link.robot.dialect == "rize" and link.is_connected and link.name not in there:
+            if link.robot.dialect == "rize" and link.is_connected and link.name not in rize_names:
                 self._disconnect(link)
 
     def _update_announced_robots(self) -> None:
         # Connects announced robots; disconnects those whose program is no longer listed.
-        found = {topic: (robot, identity) for topic, robot, identity in self._announcements.robots}
+        announced = {topic: (robot, identity) for topic, robot, identity in self._announcements.robots}
         for topic, name in list(self._names.items()):
-            link, now = self._links.get(name), found.get(topic)
+            link, now = self._links.get(name), announced.get(topic)
             if link is None or not link.is_connected:
                 continue
             is_same = now is not None and now[0].name == name and now[1] == link.identity
             if not is_same and not (now is None and self._is_listed(topic, link)):
                 self._disconnect(link)
-        for topic in self._foreign_claims.keys() - found.keys():
+        for topic in self._foreign_claims.keys() - announced.keys():
             del self._foreign_claims[topic]
-        for topic, (robot, identity) in found.items():
+        for topic, (robot, identity) in announced.items():
             claim = self._foreign_claim(robot)
             if claim is None:
                 self._foreign_claims.pop(topic, None)
@@ -438,16 +438,16 @@ class Fleet:
 
     def _is_listed(self, topic: str, link: RobotLink) -> bool:
         # The program is still listed, but its newest description can't be parsed.
-        there = publisher_nodes(self._own.view, topic)
-        return link.identity is not None and link.identity.node_id in there
+        nodes = publisher_nodes(self._own.view, topic)
+        return link.identity is not None and link.identity.node_id in nodes
 
     def _foreign_claim(self, robot: Robot) -> Claim | None:
         # Rejects a robot whose description names topics of another robot.
-        why = topic_conflict(robot, (link.robot for link in self._links.values()))
-        if why is None:
+        problem = topic_conflict(robot, (link.robot for link in self._links.values()))
+        if problem is None:
             return None
         return Claim(
-            f"{why}.",
+            f"{problem}.",
             _("{robot} is ignored. Find out what this program is, and close it.").format(robot=robot.name),
         )
 
@@ -475,8 +475,8 @@ class Fleet:
         link.is_connected, link.gone_s = True, None
         if before.topics != robot.topics or before.dialect != robot.dialect:
             if before.dialect == robot.dialect:
-                known = dict.fromkeys((*link.earlier_topics, before.topics))
-                link.earlier_topics = tuple(known)[:MAX_TOPICS]
+                earlier_topics = dict.fromkeys((*link.earlier_topics, before.topics))
+                link.earlier_topics = tuple(earlier_topics)[:MAX_TOPICS]
             self._close_topics(link)
         if link.watch is None:
             link.watch = self._watches.open([robot.topics.reply])

@@ -59,43 +59,45 @@ class Health:
         self._gone_since: dict[str, float] = {}
         self._robots: set[str] = set()
 
-    def update(self, found: Mapping[str, CheckResult]) -> None:
+    def update(self, results: Mapping[str, CheckResult]) -> None:
         """Raise alerts about topics with undecodable messages.
 
         `check` resolves an alert after a second without undecodable messages, so that the alert of a
         topic with both kinds of messages doesn't flicker.
 
         Args:
-            found: Results of the decode checks, by topic.
+            results: Results of the decode checks, by topic.
         """
-        for topic, checked in found.items():
-            bad = self._bad.get(topic)
-            if bad is None and checked.bad_count:
-                bad = self._bad[topic] = _BadTopic()
-            if bad is None:
+        for topic, checked in results.items():
+            bad_topic = self._bad.get(topic)
+            if bad_topic is None and checked.bad_count:
+                bad_topic = self._bad[topic] = _BadTopic()
+            if bad_topic is None:
                 continue
-            bad.has_recovered = checked.is_newest_readable
-            bad.unchecked_count += checked.unchecked_count
+            bad_topic.has_recovered = checked.is_newest_readable
+            bad_topic.unchecked_count += checked.unchecked_count
             if checked.bad_count:
-                bad.last_error_s = self._clock()
-                bad.count += checked.bad_count
-                self._alert_bad_topic(topic, bad, checked)
+                bad_topic.last_error_s = self._clock()
+                bad_topic.count += checked.bad_count
+                self._alert_bad_topic(topic, bad_topic, checked)
 
     def discard(self, topic: str) -> None:
         """Discard the problems of a topic that is no longer watched or has recovered."""
         self._bad.pop(topic, None)
         self._alerts.resolve(f"message:{topic}")
 
-    def check(self, used: Container[str] = (), started: Container[str] = ()) -> None:
+    def check(self, used_names: Container[str] = (), started: Container[str] = ()) -> None:
         """Update all alerts. Called once a second.
 
         Args:
-            used: Names of the robots that a program uses.
+            used_names: Names of the robots that a program uses.
             started: Names of the virtual robots that this Studio started and that are still running.
         """
         now = self._clock()
         for topic in [
-            t for t, bad in self._bad.items() if bad.has_recovered and now - bad.last_error_s >= RECOVERY_S
+            t
+            for t, bad_topic in self._bad.items()
+            if bad_topic.has_recovered and now - bad_topic.last_error_s >= RECOVERY_S
         ]:
             self.discard(topic)
         self._check_claims()
@@ -107,7 +109,7 @@ class Health:
             if link.is_connected:
                 self._gone_since.pop(link.name, None)
                 self._alerts.resolve(f"robot:{link.name}")
-            elif link.name in used:
+            elif link.name in used_names:
                 self._alerts.raise_alert(
                     f"robot:{link.name}",
                     "error",
@@ -122,13 +124,13 @@ class Health:
             else:
                 self._check_presence(link, now, runs_here=link.name in started)
 
-    def report_journal_problem(self, sentence: str | None) -> None:
+    def report_journal_problem(self, reason: str | None) -> None:
         """Raise or resolve the alert that unsaved work can't be backed up.
 
         Args:
-            sentence: Reason, or None to resolve the alert.
+            reason: Reason, or None to resolve the alert.
         """
-        if sentence is None:
+        if reason is None:
             self._alerts.resolve("journal")
             self._alerts.resolve(DISCARD_ALERT)
             return
@@ -136,20 +138,20 @@ class Health:
             "journal",
             "error",
             _("Your unsaved work isn't backed up."),
-            f"{sentence[0].upper()}{sentence[1:]}.",
+            f"{reason[0].upper()}{reason[1:]}.",
             button=_("Save"),
             action="file.save",
             count=0,
         )
 
-    def confirm_discard(self, name: str, sentence: str) -> bool:
+    def confirm_discard(self, name: str, reason: str) -> bool:
         """Return True if the user confirms closing the window although some work can't be saved.
 
         The first call raises an alert and returns False; a second call confirms.
 
         Args:
             name: Name of the behaviour.
-            sentence: Reason why the behaviour can't be saved.
+            reason: Reason why the behaviour can't be saved.
         """
         if self._alerts.has(DISCARD_ALERT):
             return True
@@ -158,27 +160,27 @@ class Health:
             DISCARD_ALERT,
             "error",
             _("Studio stays open: the unsaved work in {name} would be lost.").format(name=name),
-            _("{why}. Close again to discard it.").format(why=f"{sentence[0].upper()}{sentence[1:]}"),
+            _("{why}. Close again to discard it.").format(why=f"{reason[0].upper()}{reason[1:]}"),
             button=_("Save somewhere else"),
             action="file.save_as",
             count=0,
         )
         return False
 
-    def report_settings_problem(self, sentence: str | None) -> None:
+    def report_settings_problem(self, reason: str | None) -> None:
         """Raise or resolve the alert that settings can't be saved.
 
         Args:
-            sentence: Reason, or None to resolve the alert.
+            reason: Reason, or None to resolve the alert.
         """
-        if sentence is None:
+        if reason is None:
             self._alerts.resolve("settings")
             return
         self._alerts.raise_alert(
             "settings",
             "warn",
             _("Settings you change now are lost when Studio closes."),
-            f"{sentence[0].upper()}{sentence[1:]}.",
+            f"{reason[0].upper()}{reason[1:]}.",
             count=0,
         )
 
@@ -213,24 +215,24 @@ class Health:
         These are duplicate names, conflicting types and ports in use.
         """
         ids = set()
-        ports = [found for found in view.alerts if found.id.startswith("port:")]
-        for found in view.alerts:
-            if found not in ports:
-                ids.add(found.id)
-                self._alerts.raise_alert(found.id, "warn", found.sentence, found.hint, count=0)
+        ports = [alert for alert in view.alerts if alert.id.startswith("port:")]
+        for alert in view.alerts:
+            if alert not in ports:
+                ids.add(alert.id)
+                self._alerts.raise_alert(alert.id, "warn", alert.sentence, alert.hint, count=0)
         if ports:
             ids.add(PORTS_ALERT)
             self._alert_ports(ports)
-        for gone in self._from_graph - ids:
-            self._alerts.resolve(gone)
+        for alert_id in self._from_graph - ids:
+            self._alerts.resolve(alert_id)
         self._from_graph = ids
 
-    def _alert_ports(self, taken: Sequence[Alert]) -> None:
+    def _alert_ports(self, port_alerts: Sequence[Alert]) -> None:
         # One alert for all occupied ports of the original NEP: only its programs need them.
-        title, detail = taken[0].sentence, taken[0].hint
-        if len(taken) > 1:
+        title, detail = port_alerts[0].sentence, port_alerts[0].hint
+        if len(port_alerts) > 1:
             numbers = sorted(
-                {found.id.removeprefix("port:") for found in taken}, key=lambda port: (len(port), port)
+                {alert.id.removeprefix("port:") for alert in port_alerts}, key=lambda port: (len(port), port)
             )
             title = _("Other programs are using ports {ports}.").format(ports=format_list(numbers))
             detail = _("Programs of the original NEP can't connect. The connection doctor shows the cause.")
@@ -246,23 +248,23 @@ class Health:
             for_developers=True,
         )
 
-    def _alert_bad_topic(self, topic: str, bad: _BadTopic, checked: CheckResult) -> None:
+    def _alert_bad_topic(self, topic: str, bad_topic: _BadTopic, checked: CheckResult) -> None:
         title = ngettext(
             "{topic} sends messages that can't be decoded ({count} message).",
             "{topic} sends messages that can't be decoded ({count} messages).",
-            bad.count,
+            bad_topic.count,
         )
         detail = (
             _("{why} See the raw bytes in the Inspector. {count} more arrived too fast to be decoded.")
-            if bad.unchecked_count
+            if bad_topic.unchecked_count
             else _("{why} See the raw bytes in the Inspector.")
         )
-        why = f"{checked.error[:1].upper()}{checked.error[1:]}."
+        reason = f"{checked.error[:1].upper()}{checked.error[1:]}."
         self._alerts.raise_alert(
             f"message:{topic}",
             "warn",
-            title.format(topic=topic, count=bad.count),
-            detail.format(why=why, count=bad.unchecked_count),
+            title.format(topic=topic, count=bad_topic.count),
+            detail.format(why=reason, count=bad_topic.unchecked_count),
             button=_("Show"),
             action=f"inspect:{topic}",
             count=checked.bad_count,
@@ -311,26 +313,28 @@ class Health:
         """
         for name in self._unreachable - problems.keys():
             self._alerts.resolve(f"stop:{name}")
-        for name, why in problems.items():
-            detail = _("{why}. Studio tries again every second.").format(why=f"{why[:1].upper()}{why[1:]}")
+        for name, reason in problems.items():
+            detail = _("{why}. Studio tries again every second.").format(
+                why=f"{reason[:1].upper()}{reason[1:]}"
+            )
             title = _("Stop can't reach {robot}.").format(robot=name)
             self._alerts.raise_alert(f"stop:{name}", "error", title, detail, count=0)
         self._unreachable = set(problems)
 
     def _check_motion(self, link: RobotLink) -> None:
         # A robot that reports an action it couldn't end, or that may move and doesn't answer.
-        wrong = link.unended_actions if link.is_connected else ""
-        if not wrong and not link.stop_problem:  # otherwise covered by the alert of the Stop
-            wrong = link.motion_warning
-        if not wrong:
+        problem = link.unended_actions if link.is_connected else ""
+        if not problem and not link.stop_problem:  # otherwise covered by the alert of the Stop
+            problem = link.motion_warning
+        if not problem:
             self._alerts.resolve(f"moving:{link.name}")
             return
-        said = _("Switch it off by hand if it is still moving.")
+        detail = _("Switch it off by hand if it is still moving.")
         self._alerts.raise_alert(
             f"moving:{link.name}",
             "error",
-            f"{wrong}.",
-            said,
+            f"{problem}.",
+            detail,
             button=_("Stop"),
             action="run.stop",
             count=0,
@@ -339,7 +343,7 @@ class Health:
     def _check_driver(self, link: RobotLink, now: float) -> None:
         # Resolved when the counts have not increased for a while.
         rejected, errors = link.rejected, link.errors
-        said = {
+        counters = {
             "rejected": (
                 rejected,
                 ngettext(
@@ -357,11 +361,11 @@ class Health:
                 _("See the driver's log for the traceback."),
             ),
         }
-        for kind, (count, title, detail) in said.items():
+        for kind, (count, title, detail) in counters.items():
             if link.is_connected and count.is_growing(now):
-                words = title.format(robot=link.name, count=count.value)
+                alert_title = title.format(robot=link.name, count=count.value)
                 self._alerts.raise_alert(
-                    f"{kind}:{link.name}", "warn", words, detail, count=0, for_developers=True
+                    f"{kind}:{link.name}", "warn", alert_title, detail, count=0, for_developers=True
                 )
             else:
                 self._alerts.resolve(f"{kind}:{link.name}")

@@ -60,21 +60,21 @@ def health_items(link: RobotLink, topics: Topics, now: float, age_words: FormatA
         now: Monotonic seconds, on the same clock as the times in ``link``.
         age_words: Formats a duration, such as "14 s".
     """
-    facts = [_connection(link, now, age_words)]
+    items = [_connection(link, now, age_words)]
     if link.is_connected:
-        facts += [*_battery(link), *_temperature(link)]
-    facts.append(_stop(link))
+        items += [*_battery(link), *_temperature(link)]
+    items.append(_stop(link))
     if link.is_connected:
-        facts += [*_camera(link, topics, age_words), *_sensors(link, topics, age_words)]
-        facts += [*_count_items(REJECTED, link.rejected, now), *_count_items(ERRORS, link.errors, now)]
-    facts += [_watchdog_item(link), *_heartbeat_items(link)]
-    return tuple(sorted(facts, key=lambda fact: not fact.needs_attention))
+        items += [*_camera(link, topics, age_words), *_sensors(link, topics, age_words)]
+        items += [*_count_items(REJECTED, link.rejected, now), *_count_items(ERRORS, link.errors, now)]
+    items += [_watchdog_item(link), *_heartbeat_items(link)]
+    return tuple(sorted(items, key=lambda fact: not fact.needs_attention))
 
 
-def has_reported(link: RobotLink, facts: Sequence[HealthItem]) -> bool:
+def has_reported(link: RobotLink, items: Sequence[HealthItem]) -> bool:
     """Return True if the robot has sent a message; otherwise only its description is known."""
     return link.last_reply_s is not None or any(
-        fact.title in REPORTED_TITLES and fact.status == "ok" for fact in facts
+        item.title in REPORTED_TITLES and item.status == "ok" for item in items
     )
 
 
@@ -82,22 +82,22 @@ def _connection(link: RobotLink, now: float, age_words: FormatAge) -> HealthItem
     age = age_words(now - link.last_reply_s) if link.last_reply_s is not None else ""
     if not link.is_connected:
         if link.gone_s is None:
-            words = (
+            template = (
                 _("disconnected; restart it")
                 if link.is_virtual
                 else _("disconnected; check that it is switched on")
             )
-            return HealthItem(CONNECTION, "warn", words)
-        words = (
+            return HealthItem(CONNECTION, "warn", template)
+        template = (
             _("disconnected {age} ago; restart it")
             if link.is_virtual
             else _("disconnected {age} ago; check that it is switched on")
         )
-        return HealthItem(CONNECTION, "warn", words.format(age=age_words(now - link.gone_s)))
+        return HealthItem(CONNECTION, "warn", template.format(age=age_words(now - link.gone_s)))
     if link.is_unresponsive:
         return HealthItem(CONNECTION, "error", _unresponsive_text(link, age))
-    words = _("last response {age} ago").format(age=age) if age else _("connected; no request sent yet")
-    return HealthItem(CONNECTION, "ok", words)
+    template = _("last response {age} ago").format(age=age) if age else _("connected; no request sent yet")
+    return HealthItem(CONNECTION, "ok", template)
 
 
 def _unresponsive_text(link: RobotLink, age: str) -> str:
@@ -107,12 +107,12 @@ def _unresponsive_text(link: RobotLink, age: str) -> str:
             if link.is_virtual
             else _("not responding; check that it is switched on")
         )
-    words = (
+    template = (
         _("not responding for {age}; restart it")
         if link.is_virtual
         else _("not responding for {age}; check that it is switched on")
     )
-    return words.format(age=age)
+    return template.format(age=age)
 
 
 def _battery(link: RobotLink) -> Iterable[HealthItem]:
@@ -130,17 +130,17 @@ def _battery(link: RobotLink) -> Iterable[HealthItem]:
 
 
 def _temperature(link: RobotLink) -> Iterable[HealthItem]:
-    readings = [found for sensor in link.robot.sensors for found in _temperatures(sensor, link.values)]
+    readings = [reading for sensor in link.robot.sensors for reading in _temperatures(sensor, link.values)]
     if readings:
-        value, what = max(readings)
+        value, title = max(readings)
         if value >= WARM_MOTOR_C:
             yield HealthItem(
                 TEMPERATURE,
                 "warn",
-                _("{what} warm, {degrees} °C; let it cool down").format(what=what, degrees=f"{value:.0f}"),
+                _("{what} warm, {degrees} °C; let it cool down").format(what=title, degrees=f"{value:.0f}"),
             )
         else:
-            yield HealthItem(TEMPERATURE, "ok", f"{what} {value:.0f} °C")
+            yield HealthItem(TEMPERATURE, "ok", f"{title} {value:.0f} °C")
 
 
 def _temperatures(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[float, str]]:
@@ -195,13 +195,15 @@ def _sensors(link: RobotLink, topics: Topics, age_words: FormatAge) -> Iterable[
     if silent:
         age = age_words(max(topic.silent_s or 0.0 for _sensor, topic in silent if topic is not None))
         first, more = silent[0][0].title, len(silent) - 1
-        words = _("{sensor} silent for {age}") if not more else _("{sensor} and {more} more silent for {age}")
-        yield HealthItem(SENSORS, "warn", words.format(sensor=first, more=more, age=age))
+        template = (
+            _("{sensor} silent for {age}") if not more else _("{sensor} and {more} more silent for {age}")
+        )
+        yield HealthItem(SENSORS, "warn", template.format(sensor=first, more=more, age=age))
         return
     sent = sum(1 for sensor in felt if _has_sent(topics.get(sensor.topic)))
     if not sent:
-        words = ngettext("has sent nothing yet", "none of {count} has sent anything yet", len(felt))
-        yield HealthItem(SENSORS, "off", words.format(count=len(felt)))
+        template = ngettext("has sent nothing yet", "none of {count} has sent anything yet", len(felt))
+        yield HealthItem(SENSORS, "off", template.format(count=len(felt)))
     elif sent < len(felt):
         yield HealthItem(
             SENSORS, "ok", _("{sent} of {count} have sent data").format(sent=sent, count=len(felt))
@@ -242,10 +244,10 @@ def _watchdog_item(link: RobotLink) -> HealthItem:
 
 
 def _heartbeat_items(link: RobotLink) -> Iterable[HealthItem]:
-    every = link.robot.heartbeat_interval_s
-    if every is not None:
+    interval_s = link.robot.heartbeat_interval_s
+    if interval_s is not None:
         yield HealthItem(
-            SIGN_OF_LIFE, "ok", _("every {seconds} s during actions").format(seconds=number(every))
+            SIGN_OF_LIFE, "ok", _("every {seconds} s during actions").format(seconds=number(interval_s))
         )
     elif link.robot.dialect == "native":
         yield HealthItem(SIGN_OF_LIFE, "off", _("none during actions"))

@@ -42,8 +42,8 @@ class KnownRobots:
     def robots(self) -> tuple[KnownRobot, ...]:
         """All known robots, most recently connected first; invalid entries are skipped."""
         entries: list[Entry] = self._settings.get(SETTING_KEY, []) if self._settings is not None else []
-        found = {robot.name: robot for robot in map(_parse_robot, entries) if robot is not None}
-        return tuple(sorted(found.values(), key=lambda robot: -robot.last_connected_s))
+        robots_by_name = {robot.name: robot for robot in map(_parse_robot, entries) if robot is not None}
+        return tuple(sorted(robots_by_name.values(), key=lambda robot: -robot.last_connected_s))
 
     def record(self, robots: Sequence[Robot]) -> None:
         """Save the current time as the time of the last connection of these robots."""
@@ -66,10 +66,15 @@ class KnownRobots:
             self._settings.set(SETTING_KEY, entries)
 
 
-def _parse_robot(told: object) -> KnownRobot | None:
-    if not isinstance(told, Mapping):
+def _parse_robot(entry: object) -> KnownRobot | None:
+    if not isinstance(entry, Mapping):
         return None
-    name, seen = told.get("name"), told.get("seen_s")
-    if not isinstance(name, str) or not name or isinstance(seen, bool) or not isinstance(seen, (int, float)):
+    name, last_seen_s = entry.get("name"), entry.get("seen_s")
+    if (
+        not isinstance(name, str)
+        or not name
+        or isinstance(last_seen_s, bool)
+        or not isinstance(last_seen_s, (int, float))
+    ):
         return None
-    return KnownRobot(name, float(seen))
+    return KnownRobot(name, float(last_seen_s))

@@ -35,16 +35,16 @@ class LastRobots:
         """True if running virtual robots are started again at the next start of Studio."""
         return self._settings.get(COME_BACK, True)
 
-    def set_restart_enabled(self, wanted: bool) -> None:
+    def set_restart_enabled(self, is_enabled: bool) -> None:
         """Set and save `is_restart_enabled`. Raises SettingsError."""
-        self._settings.set(COME_BACK, wanted)
+        self._settings.set(COME_BACK, is_enabled)
 
     def start(self, launcher: RobotStarter) -> None:
         """Start the robots of the last session. Returns immediately; starting a robot does not move it."""
         if not self.is_restart_enabled:
             return
-        kept: Mapping[str, object] = self._settings.get(KEPT, {})
-        for name, model in list(kept.items())[:MAX_ROBOTS]:
+        models_by_name: Mapping[str, object] = self._settings.get(KEPT, {})
+        for name, model in list(models_by_name.items())[:MAX_ROBOTS]:
             if name and isinstance(model, str) and model in VIRTUAL_ROBOT_MODULES:
                 launcher.start_virtual_robot(name, model)
 

@@ -116,13 +116,13 @@ class Launcher:
         self,
         address: str,
         post_event: Callable[[object], None],
-        is_there: Callable[[str], bool | None] = lambda _name: False,
+        is_listed: Callable[[str], bool | None] = lambda _name: False,
         clock: Callable[[], float] = time.monotonic,
         start: StartProcess = start_process,
     ) -> None:
         # `is_there` returns whether a robot is listed, from any instance, or None while unknown.
         self._address = address
-        self._is_there = is_there
+        self._is_there = is_listed
         self._clock = clock
         self._start = start
         self._requests: dict[str, _StartRequest] = {}
@@ -134,11 +134,11 @@ class Launcher:
         """Virtual robots that the user started here and did not stop, with their models."""
         self.ended: frozenset[str] = frozenset()
         """Virtual robots started here whose processes ended unexpectedly."""
-        sentence = (
+        title = (
             _("The master can't be started.") if is_loopback(address) else _("The master doesn't respond.")
         )
         self._master = MasterStarter(
-            address, lambda why: post_event(LaunchFailed("master", sentence, why, False))
+            address, lambda why: post_event(LaunchFailed("master", title, why, False))
         )
 
     @property
@@ -195,20 +195,20 @@ class Launcher:
         if not self._requests:
             return
         now = self._clock()
-        for name, wish in list(self._requests.items()):
-            there = self._is_there(name)
-            if there is None and (self._master.first or now >= wish.known_deadline_s):
-                there = False
-            if there is False:
+        for name, request in list(self._requests.items()):
+            is_listed = self._is_there(name)
+            if is_listed is None and (self._master.first or now >= request.known_deadline_s):
+                is_listed = False
+            if is_listed is False:
                 del self._requests[name]
-                self._start_robot(name, wish.model)
-            elif now >= wish.deadline_s:
+                self._start_robot(name, request.model)
+            elif now >= request.deadline_s:
                 del self._requests[name]
 
     def _start_robot(self, name: str, model: str) -> None:
         with self._lock:
-            held = self._robots.get(name)
-            if held is not None and held[0].poll() is None:
+            process_and_log = self._robots.get(name)
+            if process_and_log is not None and process_and_log[0].poll() is None:
                 return
             log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  open while the process writes
             command = [
@@ -238,11 +238,11 @@ class Launcher:
         self.wanted[name] = model
         self._requests.pop(name, None)
         with self._lock:
-            held = self._robots.pop(name, None)
-        if held is not None:
-            held[0].kill()
-            held[0].wait()
-            held[1].close()
+            process_and_log = self._robots.pop(name, None)
+        if process_and_log is not None:
+            process_and_log[0].kill()
+            process_and_log[0].wait()
+            process_and_log[1].close()
         self._starting[name] = self._clock() + STARTUP_TIMEOUT_S
         self._start_robot(name, model)
 
@@ -255,10 +255,10 @@ class Launcher:
         self._requests.pop(name, None)
         self._starting.pop(name, None)
         with self._lock:
-            held = self._robots.pop(name, None)
-        if held is not None:
-            _terminate(held[0])
-            held[1].close()
+            process_and_log = self._robots.pop(name, None)
+        if process_and_log is not None:
+            _terminate(process_and_log[0])
+            process_and_log[1].close()
 
     def check(self) -> None:
         """Detect processes that exited unexpectedly. Called at each tick of the session."""

@@ -36,12 +36,16 @@ class OwnMessageFilter:
         before, self.view = self.view, view
         for link in self._links.values() if before.nodes.keys() - view.nodes.keys() else ():
             topic, serving = before.topics.get(link.robot.topics.command), self._serving_nodes(link, before)
-            for each in topic.subscribers if topic is not None and link.robot.dialect == "native" else ():
-                if each.node_id in serving and each.node_id not in view.nodes:
-                    self._lapsed.setdefault(link.name, {})[each.id] = identity_of(before, each.node_id)
+            for subscriber in (
+                topic.subscribers if topic is not None and link.robot.dialect == "native" else ()
+            ):
+                if subscriber.node_id in serving and subscriber.node_id not in view.nodes:
+                    self._lapsed.setdefault(link.name, {})[subscriber.id] = identity_of(
+                        before, subscriber.node_id
+                    )
         for name, lapsed in list(self._lapsed.items()):
             ended = lapsed.keys() - self._connected_ids(self._links.get(name))
-            for id in ended | {id for id, each in lapsed.items() if each.node_id in view.nodes}:
+            for id in ended | {id for id, subscriber in lapsed.items() if subscriber.node_id in view.nodes}:
                 del lapsed[id]
             if not lapsed:
                 del self._lapsed[name]
@@ -67,12 +71,12 @@ class OwnMessageFilter:
         link = self._links.get(name)
         if link is None or link.robot.dialect != "native":
             return []
-        own = link.identity.node_id if link.identity is not None else ""
-        listed = [
-            identity_of(self.view, node) for node in self._serving_nodes(link, self.view) if node != own
+        own_node = link.identity.node_id if link.identity is not None else ""
+        programs = [
+            identity_of(self.view, node) for node in self._serving_nodes(link, self.view) if node != own_node
         ]
         connected = self._connected_ids(link)
-        return listed + [each for id, each in self._lapsed.get(name, {}).items() if id in connected]
+        return programs + [each for id, each in self._lapsed.get(name, {}).items() if id in connected]
 
     def new_programs(self, link: RobotLink, before: GraphView) -> list[Identity]:
         """Return the programs that serve the robot now but did not in the graph ``before``.
@@ -103,8 +107,8 @@ class OwnMessageFilter:
             return True
         node = self._senders.node_of(message)
         if link.robot.dialect != "native":
-            known = self.view.nodes.get(node or "")
-            is_gateway = known is None or known.generation == GATEWAY
+            node_info = self.view.nodes.get(node or "")
+            is_gateway = node_info is None or node_info.generation == GATEWAY
             return is_gateway or node in subscriber_nodes(self.view, link.robot.topics.command)
         return None if node is None or link.identity is None else node == link.identity.node_id
 
@@ -120,11 +124,13 @@ class OwnMessageFilter:
         """
         if batch is None or not batch.messages:
             return None
-        own = link.identity.node_id if link.identity is not None else ""
-        if own not in publisher_nodes(self.view, topic):
+        own_node = link.identity.node_id if link.identity is not None else ""
+        if own_node not in publisher_nodes(self.view, topic):
             return decode_mapping(batch.messages[-1])
-        found = (message for message in reversed(batch.messages) if self._senders.node_of(message) == own)
-        newest = next(found, None)
+        own_messages = (
+            message for message in reversed(batch.messages) if self._senders.node_of(message) == own_node
+        )
+        newest = next(own_messages, None)
         return None if newest is None else decode_mapping(newest)
 
 

@@ -172,10 +172,10 @@ class RobotLink:
     @property
     def running_invocations(self) -> tuple[Invocation, ...]:
         """Invocations that have not ended."""
-        known = {
+        invocations_by_id = {
             invocation.id: invocation for invocation in (*self.past_invocations, *self.invocations.values())
         }
-        return tuple(invocation for invocation in known.values() if invocation.is_running)
+        return tuple(invocation for invocation in invocations_by_id.values() if invocation.is_running)
 
     @property
     def state_label(self) -> str:
@@ -198,8 +198,8 @@ class RobotLink:
     @property
     def chip_text(self) -> str:
         """Text of the robot's chip, such as "virtual, ready"."""
-        words = self.state_label
-        return _("virtual, {state}").format(state=words) if self.is_virtual else words
+        state = self.state_label
+        return _("virtual, {state}").format(state=state) if self.is_virtual else state
 
 
 def excess_disconnected(links: Iterable[RobotLink], in_use: Collection[str]) -> Sequence[RobotLink]:
@@ -213,14 +213,14 @@ def excess_disconnected(links: Iterable[RobotLink], in_use: Collection[str]) -> 
         links: All robots in the list.
         in_use: Names of the robots that must not be removed.
     """
-    away = [
+    disconnected = [
         link
         for link in links
         if not (link.is_connected or link.has_confirmed_stop or link.stop_problem or link.name in in_use)
         and link.pending_stop_start_s is None
     ]
-    excess = max(0, len(away) - MAX_DISCONNECTED)
-    return sorted(away, key=lambda link: (link.last_reply_s is not None, link.gone_s or 0.0))[:excess]
+    excess = max(0, len(disconnected) - MAX_DISCONNECTED)
+    return sorted(disconnected, key=lambda link: (link.last_reply_s is not None, link.gone_s or 0.0))[:excess]
 
 
 def topics_of(robot: Robot) -> list[str]:

@@ -27,9 +27,13 @@ class RobotMessages:
     """
 
     def __init__(
-        self, own: OwnMessageFilter, tries: ManualInvocations, moved: MovedRobots, clock: Callable[[], float]
+        self,
+        own_filter: OwnMessageFilter,
+        tries: ManualInvocations,
+        moved: MovedRobots,
+        clock: Callable[[], float],
     ) -> None:
-        self._own, self._tries, self._moved, self._clock = own, tries, moved, clock
+        self._own, self._tries, self._moved, self._clock = own_filter, tries, moved, clock
         self._held: dict[str, PendingMessages] = {}
         self._settled: dict[str, None] = {}
 
@@ -40,8 +44,8 @@ class RobotMessages:
             link: State of the robot.
             batches: New messages, by topic.
         """
-        answers = batches.get(link.robot.topics.reply)
-        for message in answers.messages if answers is not None else ():
+        replies = batches.get(link.robot.topics.reply)
+        for message in replies.messages if replies is not None else ():
             is_own = self._own.is_from_robot(link, message)
             if is_own:
                 self._apply_reply(link, message)
@@ -60,8 +64,8 @@ class RobotMessages:
 
     def apply_held_replies(self, links: Mapping[str, RobotLink]) -> None:
         """Apply the stored replies whose publishers the new graph lists; discard all others."""
-        held, self._held = self._held, {}
-        for name, messages in held.items():
+        pending, self._held = self._held, {}
+        for name, messages in pending.items():
             link = links.get(name)
             for message in messages.pop_all() if link is not None else ():
                 if link is not None and self._own.is_from_robot(link, message):
@@ -77,38 +81,38 @@ class RobotMessages:
         return settled
 
     def _apply_reply(self, link: RobotLink, message: Message) -> None:
-        answer = decode_mapping(message)
-        if answer is not None and link.robot.dialect == "rize":
-            answer = rize.from_reply(answer)
-        if answer is not None:
-            self._tries.apply_reply(link, answer)
-            if answer.get("op") == "alive":
-                self._apply_heartbeat(link, answer)
+        reply = decode_mapping(message)
+        if reply is not None and link.robot.dialect == "rize":
+            reply = rize.from_reply(reply)
+        if reply is not None:
+            self._tries.apply_reply(link, reply)
+            if reply.get("op") == "alive":
+                self._apply_heartbeat(link, reply)
             else:
-                self._apply_final_reply(link, answer)
+                self._apply_final_reply(link, reply)
 
-    def _apply_final_reply(self, link: RobotLink, answer: Payload) -> None:
+    def _apply_final_reply(self, link: RobotLink, reply: Payload) -> None:
         # A final reply ends the motion, unless its error reports that the robot may still move.
-        state = answer.get("state")
+        state = reply.get("state")
         if not isinstance(state, str) or state not in FINAL_STATES:
             return
-        if answer.get("op") not in (None, "invoke"):
+        if reply.get("op") not in (None, "invoke"):
             return
-        id, error = answer.get("id"), answer.get("error")
+        id, error = reply.get("id"), reply.get("error")
         if isinstance(id, str) and not is_may_move_error(link.name, safe_error_text(error) if error else ""):
             self._moved.end_motion(link.name, id, link.identity)
 
-    def _apply_heartbeat(self, link: RobotLink, answer: Payload) -> None:
+    def _apply_heartbeat(self, link: RobotLink, reply: Payload) -> None:
         # Drivers omit counts that are zero.
         now_s = self._clock()
-        link.rejected.update(answer.get("rejected", 0), now_s)
-        link.errors.update(answer.get("errors", 0), now_s)
-        if "not_ended" not in answer:
+        link.rejected.update(reply.get("rejected", 0), now_s)
+        link.errors.update(reply.get("errors", 0), now_s)
+        if "not_ended" not in reply:
             return
         before, link.unended_actions = link.unended_actions, ""
-        if answer["not_ended"]:
+        if reply["not_ended"]:
             link.unended_actions = stop_error_text(
-                link.name, answer.get("error") or _("an action is still running")
+                link.name, reply.get("error") or _("an action is still running")
             )
         elif before and link.stop_problem:
             self._settled[link.name] = None

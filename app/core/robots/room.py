@@ -73,8 +73,8 @@ class SessionRoom:
             robots: Position and radius (x, y, radius) of each robot, by name.
         """
         moved = self.room.with_moved(name, x, y).thing(name)
-        for there in robots.values():
-            if isinstance(moved, (Box, Person)) and _touches(moved, *there):
+        for pose in robots.values():
+            if isinstance(moved, (Box, Person)) and _touches(moved, *pose):
                 return False
         return self._publish() if self._map.move(name, x, y) else False
 
@@ -158,7 +158,7 @@ class SessionRoom:
         return True
 
 
-def _touches(thing: Box | Person, x: float, y: float, radius: float) -> bool:
-    if isinstance(thing, Box):
-        return thing.distance_to(x, y) < radius
-    return math.hypot(thing.x - x, thing.y - y) < thing.radius + radius
+def _touches(obstacle: Box | Person, x: float, y: float, radius: float) -> bool:
+    if isinstance(obstacle, Box):
+        return obstacle.distance_to(x, y) < radius
+    return math.hypot(obstacle.x - x, obstacle.y - y) < obstacle.radius + radius

@@ -69,35 +69,35 @@ class ManualInvocations:
         if invocation is not None and invocation.is_running:
             self._send_cancel(link, invocation)
 
-    def apply_reply(self, link: RobotLink, answer: Payload) -> None:
+    def apply_reply(self, link: RobotLink, reply: Payload) -> None:
         """Apply a reply of the robot. A reply to another program only shows that the robot is responding."""
         link.last_contact_s = link.last_reply_s = self._clock()
         link.is_unresponsive = False
         for invocation in link.running_invocations:
-            if invocation.id != answer.get("id") or answer.get("op") not in (None, "invoke"):
+            if invocation.id != reply.get("id") or reply.get("op") not in (None, "invoke"):
                 continue
-            self._apply(link, invocation, answer)
+            self._apply(link, invocation, reply)
 
-    def _apply(self, link: RobotLink, made: Invocation, answer: Payload) -> None:
-        state = answer.get("state")
+    def _apply(self, link: RobotLink, invocation: Invocation, reply: Payload) -> None:
+        state = reply.get("state")
         if not isinstance(state, str) or (state not in FINAL_STATES and state not in ("accepted", "running")):
             return
         # Most replies have feedback only, and a robot may flood Studio with them.
-        if "feedback" in answer:
-            made.feedback = _object(answer["feedback"]) or made.feedback
-        if "output" in answer:
-            made.output = _object(answer["output"]) or made.output
-        if "waits_for" in answer:
-            made.awaited_actions = _names(answer["waits_for"]) or made.awaited_actions
-        if "replaces" in answer:
-            made.replaced_actions = _names(answer["replaces"]) or made.replaced_actions
-        error = answer.get("error")
+        if "feedback" in reply:
+            invocation.feedback = _object(reply["feedback"]) or invocation.feedback
+        if "output" in reply:
+            invocation.output = _object(reply["output"]) or invocation.output
+        if "waits_for" in reply:
+            invocation.awaited_actions = _names(reply["waits_for"]) or invocation.awaited_actions
+        if "replaces" in reply:
+            invocation.replaced_actions = _names(reply["replaces"]) or invocation.replaced_actions
+        error = reply.get("error")
         if state in FINAL_STATES:
-            self._end(link, made, state, safe_error_text(error) if error else None)
+            self._end(link, invocation, state, safe_error_text(error) if error else None)
             return
-        made.state = state
-        if state == "running" and made.execution_start_s is None:
-            made.execution_start_s = self._clock()
+        invocation.state = state
+        if state == "running" and invocation.execution_start_s is None:
+            invocation.execution_start_s = self._clock()
 
     def check_timeouts(self, links: Iterable[RobotLink]) -> None:
         """Cancel invocations that exceed their time limit or whose robot doesn't respond; they failed."""
@@ -106,13 +106,13 @@ class ManualInvocations:
             for invocation in link.running_invocations:
                 self._check_invocation(link, invocation, now)
 
-    def _check_invocation(self, link: RobotLink, made: Invocation, now: float) -> None:
+    def _check_invocation(self, link: RobotLink, invocation: Invocation, now: float) -> None:
         robot = link.robot
-        if robot.dialect == "native" and made.state == "sent":
-            if now - made.started_s > FIRST_REPLY_TIMEOUT_S:
+        if robot.dialect == "native" and invocation.state == "sent":
+            if now - invocation.started_s > FIRST_REPLY_TIMEOUT_S:
                 self._mark_unresponsive(
                     link,
-                    made,
+                    invocation,
                     _("{robot} isn't responding. Check that it is switched on.").format(robot=link.name),
                 )
             return
@@ -125,25 +125,25 @@ class ManualInvocations:
             error = _(
                 "{robot} stopped responding. Check that it is switched on, or press Stop to stop it."
             ).format(robot=link.name)
-            self._mark_unresponsive(link, made, error)
+            self._mark_unresponsive(link, invocation, error)
             return
-        left_s = made.remaining_s
+        left_s = invocation.remaining_s
         if left_s is not None and left_s < -GRACE_S:
             link.is_unresponsive = True  # until it replies
-            self._send_cancel(link, made)
+            self._send_cancel(link, invocation)
             self._end(
                 link,
-                made,
+                invocation,
                 "failed",
                 _("{action} took longer than {seconds} s").format(
-                    action=made.action, seconds=number(made.timeout_s or 0.0)
+                    action=invocation.action, seconds=number(invocation.timeout_s or 0.0)
                 ),
             )
 
-    def _mark_unresponsive(self, link: RobotLink, made: Invocation, sentence: str) -> None:
+    def _mark_unresponsive(self, link: RobotLink, invocation: Invocation, error: str) -> None:
         link.is_unresponsive = True
-        self._send_cancel(link, made)  # a robot that resumes must not continue
-        self._end(link, made, "failed", sentence)
+        self._send_cancel(link, invocation)  # a robot that resumes must not continue
+        self._end(link, invocation, "failed", error)
 
     def end_all(self, link: RobotLink, state: str, error: str | None = None) -> None:
         """End all invocations of a robot.
@@ -156,27 +156,35 @@ class ManualInvocations:
         for invocation in link.running_invocations:
             self._end(link, invocation, state, error)
 
-    def _end(self, link: RobotLink, made: Invocation, state: str, error: str | None) -> None:
-        made.state, made.error, made.ended_s = state, error, self._clock()
+    def _end(self, link: RobotLink, invocation: Invocation, state: str, error: str | None) -> None:
+        invocation.state, invocation.error, invocation.ended_s = state, error, self._clock()
         if not link.running_invocations:
             self._rest(link.name)
 
-    def _send_cancel(self, link: RobotLink, made: Invocation) -> None:
+    def _send_cancel(self, link: RobotLink, invocation: Invocation) -> None:
         if link.robot.dialect == "native":
-            self._send(link, {"id": made.id, "op": "cancel", "from": SENDER, "action": made.action})
+            self._send(
+                link, {"id": invocation.id, "op": "cancel", "from": SENDER, "action": invocation.action}
+            )
 
 
-def create_command(robot: Robot, made: Invocation, input: Payload) -> Payload:
+def create_command(robot: Robot, invocation: Invocation, input: Payload) -> Payload:
     """Return the message that invokes an action of a robot.
 
     Args:
         robot: Robot that receives the command.
-        made: Invocation of the action.
+        invocation: Invocation of the action.
         input: Input of the action.
     """
     if robot.dialect == "rize":
-        return rize.to_command(robot, made.action, input, made.id)
-    return {"id": made.id, "op": "invoke", "from": SENDER, "action": made.action, "input": dict(input)}
+        return rize.to_command(robot, invocation.action, input, invocation.id)
+    return {
+        "id": invocation.id,
+        "op": "invoke",
+        "from": SENDER,
+        "action": invocation.action,
+        "input": dict(input),
+    }
 
 
 def _names(value: object) -> tuple[str, ...]:

@@ -50,11 +50,11 @@ class Speaker(Protocol):
         The reason is known only after the first attempt to play a sound.
         """
 
-    def speak(self, words: str, language: str, volume: float) -> None:
+    def speak(self, text: str, language: str, volume: float) -> None:
         """Speak a text.
 
         Args:
-            words: Text.
+            text: Text.
             language: Language code such as ``en``.
             volume: Volume, 0 to 1.
         """
@@ -133,11 +133,11 @@ class RobotVoices:
         settings: Settings,
         fleet: Fleet,
         watch: Callable[[str], Watch],
-        tell: Callable[[str, str, str], object],
+        log: Callable[[str, str, str], object],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         # `tell` writes to the Console: level, origin, sentence.
-        self._settings, self._fleet, self._watch, self._tell = settings, fleet, watch, tell
+        self._settings, self._fleet, self._watch, self._tell = settings, fleet, watch, log
         self._clock = clock
         self.speaker: Speaker | None = None
         self._watches: dict[str, Watch] = {}
@@ -175,15 +175,17 @@ class RobotVoices:
         """Play new speech and sounds of the connected robots. Called at each tick."""
         if self.speaker is None:
             return
-        there = {link.name: link for link in self._fleet.connected if _is_audible(link)} if self.is_on else {}
-        for name in self._watches.keys() - there.keys():
+        links_by_name = (
+            {link.name: link for link in self._fleet.connected if _is_audible(link)} if self.is_on else {}
+        )
+        for name in self._watches.keys() - links_by_name.keys():
             self._watches.pop(name).close()
             self._stop_interrupted(name, self._last_drawings.pop(name, (None, RobotSound()))[1], RobotSound())
         stopped = self._fleet.stops != self._stops
         if stopped:
             self._stops = self._fleet.stops
             self.silence()
-        for name, link in there.items():
+        for name, link in links_by_name.items():
             if name not in self._watches and link.robot.topics.state is not None:
                 self._watches[name] = self._watch(link.robot.topics.state)
             self._process(name, link.drawing, is_heard=not stopped)
@@ -230,14 +232,14 @@ class RobotVoices:
             self._playing_robot = ""
             self.speaker.play((), 0.0)
 
-    def _enqueue(self, said: Utterance) -> None:
+    def _enqueue(self, utterance: Utterance) -> None:
         if len(self._waiting) >= MAX_QUEUED:
             lost = self._waiting.popleft()
-            words = _("“{words}” was shown but not spoken: too many texts were waiting").format(
+            message = _("“{words}” was shown but not spoken: too many texts were waiting").format(
                 words=lost.text
             )
-            self._tell("info", lost.robot, words)
-        self._waiting.append(said)
+            self._tell("info", lost.robot, message)
+        self._waiting.append(utterance)
 
     def _speak_next(self, speaker: Speaker) -> None:
         if self._current is not None and speaker.is_busy:
@@ -269,11 +271,11 @@ def _is_audible(link: RobotLink) -> bool:
     return link.is_virtual and not link.is_unresponsive
 
 
-def _fraction(value: object, default: float = 0.0, whole: float = 1.0) -> float:
+def _fraction(value: object, default: float = 0.0, maximum: float = 1.0) -> float:
     if not isinstance(value, (int, float)) or isinstance(value, bool):
         value = default
     # The bounds first: JSON has integers that don't fit a float.
-    return float(min(whole, max(0.0, value))) / whole
+    return float(min(maximum, max(0.0, value))) / maximum
 
 
 def _notes(value: object) -> Notes:
@@ -282,11 +284,11 @@ def _notes(value: object) -> Notes:
         return ()
     notes: list[tuple[float, float]] = []
     left_s = MAX_S
-    for each in value[:MAX_NOTES]:
-        if not (isinstance(each, list) and len(each) == 2):
+    for note in value[:MAX_NOTES]:
+        if not (isinstance(note, list) and len(note) == 2):
             return ()
-        hz, seconds = each
-        if not all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in each):
+        hz, seconds = note
+        if not all(isinstance(item, (int, float)) and not isinstance(item, bool) for item in note):
             return ()
         if (hz != 0 and not LOWEST_HZ <= hz <= HIGHEST_HZ) or not 0 < seconds <= left_s:
             return tuple(notes)

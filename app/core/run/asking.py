@@ -41,11 +41,11 @@ class OpenQuestion:
             number = event.question
             self.question = AskedQuestion(event.run, number, event.text, event.choices) if number else None
 
-    def answer(self, question: AskedQuestion, words: str) -> None:
+    def answer(self, question: AskedQuestion, text: str) -> None:
         """Send the user's answer to the program. Does nothing if the question is no longer open."""
         if self._runner is not None and question == self.question:
             self.question = None
-            self._runner.answer(question.number, words)
+            self._runner.answer(question.number, text)
 
     def clear(self) -> None:
         """Discard the question after the program has ended."""

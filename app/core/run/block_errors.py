@@ -29,9 +29,9 @@ class BlockErrors:
         self._ran: Mapping[str, object] = {}
         self._checked: Program | int | None = None  # the newest program, or count of edits, that was checked
 
-    def start_run(self, wanted: RequestedRun) -> None:
+    def start_run(self, request: RequestedRun) -> None:
         """Clear the errors of the previous run, at the start of a new one."""
-        self.by_block, self._wanted, self._ran = {}, wanted, wanted.document.workspace
+        self.by_block, self._wanted, self._ran = {}, request, request.document.workspace
 
     def set_errors(self, errors: Mapping[str, str], *, not_started: bool) -> None:
         """Set the errors of the run.
@@ -54,20 +54,20 @@ class BlockErrors:
             self.by_block = self._unchanged_errors(self._wanted.document.workspace)
         return len(self.by_block) < count
 
-    def _unsolved_errors(self, wanted: RequestedRun) -> Mapping[str, str]:
-        newest = wanted.document.newest_program()
+    def _unsolved_errors(self, request: RequestedRun) -> Mapping[str, str]:
+        newest = request.document.newest_program()
         if newest is None or newest is self._checked:
             return self.by_block
         self._checked = newest
-        program = newest if wanted.stack is None else wanted.program()
-        wrong = {} if program is None else wanted.problems(program)
-        return {block: words for block, words in self.by_block.items() if wrong.get(block) == words}
+        program = newest if request.stack is None else request.program()
+        problems = {} if program is None else request.problems(program)
+        return {block: error for block, error in self.by_block.items() if problems.get(block) == error}
 
     def _unchanged_errors(self, workspace: Mapping[str, object]) -> Mapping[str, str]:
         before, now = (_contents(each, self.by_block) for each in (self._ran, workspace))
         return {
-            block: words
-            for block, words in self.by_block.items()
+            block: error
+            for block, error in self.by_block.items()
             if block in now and deep_json.are_equal(before.get(block), now[block])
         }
 

@@ -34,37 +34,37 @@ class OutputReader:
 
     def __iter__(self) -> Iterator[bytes]:
         # Possible protocol lines until the pipe's end.
-        held = b""
+        remainder = b""
         while chunk := self._read():
-            whole, end, held = (held + chunk).rpartition(b"\n")
-            yield from self._protocol_lines(whole + end)
-            if len(held) > MAX_LINE_LENGTH:  # a line that is too long isn't a protocol line
-                self.strange_bytes += len(held) - 1
-                held = b"-"  # placeholder, so that the rest of the line isn't parsed either
+            complete, end, remainder = (remainder + chunk).rpartition(b"\n")
+            yield from self._protocol_lines(complete + end)
+            if len(remainder) > MAX_LINE_LENGTH:  # a line that is too long isn't a protocol line
+                self.strange_bytes += len(remainder) - 1
+                remainder = b"-"  # placeholder, so that the rest of the line isn't parsed either
             self._throttle(read=len(chunk))
-        self.strange_bytes += len(held)
+        self.strange_bytes += len(remainder)
 
-    def _protocol_lines(self, whole: bytes) -> Iterator[bytes]:
+    def _protocol_lines(self, data: bytes) -> Iterator[bytes]:
         # Other lines are skipped in one piece: a loop over a flood of short lines would keep the interpreter
         # from the thread that stops the program.
-        at = 0
-        while at < len(whole):
-            if whole.startswith(PROTOCOL_PREFIX, at):
-                end = whole.index(b"\n", at)
-                if end - at <= MAX_LINE_LENGTH:
+        offset = 0
+        while offset < len(data):
+            if data.startswith(PROTOCOL_PREFIX, offset):
+                end = data.index(b"\n", offset)
+                if end - offset <= MAX_LINE_LENGTH:
                     self._throttle(lines=1)
-                    yield whole[at:end]
+                    yield data[offset:end]
                 else:
-                    self.strange_bytes += end + 1 - at
-                at = end + 1
+                    self.strange_bytes += end + 1 - offset
+                offset = end + 1
                 continue
-            found = whole.find(b"\n" + PROTOCOL_PREFIX, at)
-            end = len(whole) if found < 0 else found + 1
-            strange = whole[at:end]
+            next_offset = data.find(b"\n" + PROTOCOL_PREFIX, offset)
+            end = len(data) if next_offset < 0 else next_offset + 1
+            strange = data[offset:end]
             while b"\n\n" in strange:  # skip empty lines
                 strange = strange.replace(b"\n\n", b"\n")
             self.strange_bytes += len(strange.lstrip(b"\n"))
-            at = end
+            offset = end
 
     def _read(self) -> bytes:
         try:
@@ -110,11 +110,11 @@ class RateLimiter:
         return count
 
 
-def parse_texts(said: object) -> tuple[str, ...]:
+def parse_texts(value: object) -> tuple[str, ...]:
     """Return the items of a list as strings; empty if the value is not a list."""
-    return tuple(str(each) for each in said) if isinstance(said, (list, tuple)) else ()
+    return tuple(str(each) for each in value) if isinstance(value, (list, tuple)) else ()
 
 
-def text_of(said: Mapping[str, object], name: str) -> str:
+def text_of(fields: Mapping[str, object], name: str) -> str:
     """Return a field as a string, shortened for display."""
-    return str(said.get(name, ""))[:MAX_TEXT_LENGTH]
+    return str(fields.get(name, ""))[:MAX_TEXT_LENGTH]

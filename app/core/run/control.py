@@ -205,10 +205,10 @@ class Runs:
         if variable is not None:
             self._show_variable(stack, variable)
             return
-        wanted, run = RequestedRun(self._documents.current, stack=stack), self._run
-        again = self.active and self._current_request == wanted
-        if not again or self._clock() - run.started_s >= DOUBLE_CLICK_INTERVAL_S:
-            self._request_run(wanted)
+        request, run = RequestedRun(self._documents.current, stack=stack), self._run
+        is_repeated = self.active and self._current_request == request
+        if not is_repeated or self._clock() - run.started_s >= DOUBLE_CLICK_INTERVAL_S:
+            self._request_run(request)
 
     def _show_variable(self, stack: Stack, id: str) -> None:
         # A new program would lack the value of the current or last run.
@@ -222,15 +222,15 @@ class Runs:
             self._pending_request is not None and self._pending_request.document is document
         )
 
-    def _request_run(self, wanted: RequestedRun) -> None:
+    def _request_run(self, request: RequestedRun) -> None:
         # Runs once the running program has stopped and its robots are proven to have stopped.
         if self._run.state in {"ready", "proven"}:
-            self._start(wanted)
+            self._start(request)
             return
         if self.active:
             self._stop(self._used)
         if self._run.state == "stopping":
-            self._pending_request = wanted
+            self._pending_request = request
             self._run = replace(self._run, is_restarting=True)
 
     def step(self) -> None:
@@ -298,8 +298,8 @@ class Runs:
     def _stop_in_thread(self, name: str) -> None:
         self._fleet.mark_stopping([name])
         mark = self._fleet.moved.mark
-        work = partial(stop_robot, self._post_event, self._network.stopper, name, mark)
-        threading.Thread(target=work, name="studio-stop-one", daemon=True).start()
+        target = partial(stop_robot, self._post_event, self._network.stopper, name, mark)
+        threading.Thread(target=target, name="studio-stop-one", daemon=True).start()
 
     def stop_again(self, name: str) -> None:
         """Repeat the Stop of a robot that has now ended an action that the first Stop could not end.
@@ -398,10 +398,10 @@ class Runs:
             self._on_late_reply(event)
         elif event.number == self._stop_number:
             if isinstance(event, RobotReplied):
-                answered = (*self._run.replies, event.robot)
-                self._run = replace(self._run, replies=answered)
+                replies = (*self._run.replies, event.robot)
+                self._run = replace(self._run, replies=replies)
                 if event.robot.problem or not event.robot.is_waiting:
-                    same = [robot for robot in answered if robot.name == event.robot.name]
+                    same = [robot for robot in replies if robot.name == event.robot.name]
                     self._news.update_fleet(StopReport(tuple(same), 0.0), self._stop_mark)
             else:
                 self._run = replace(self._run, has_stopped_blocks=bool(self.stopped_blocks))
@@ -419,9 +419,9 @@ class Runs:
             motion_warnings=self._news.motion_warnings(report),
         )
         self._news.notify_user(report, self._run.name or "stop")
-        wanted, self._pending_request = self._pending_request, None
-        if wanted is not None and not report.unconfirmed_robots:
-            self._start(wanted)
+        request, self._pending_request = self._pending_request, None
+        if request is not None and not report.unconfirmed_robots:
+            self._start(request)
 
     def _on_late_reply(self, event: LateReply) -> None:
         # A late reply counts unless the state has changed since.
@@ -433,43 +433,45 @@ class Runs:
 
     # -- private -----------------------------------------------------------------------------------------
 
-    def _start(self, wanted: RequestedRun) -> None:
-        document, self._current_request = wanted.document, wanted
+    def _start(self, request: RequestedRun) -> None:
+        document, self._current_request = request.document, request
         is_same, self.document = self.document is document, document
-        self._trial.prepare(wanted)
+        self._trial.prepare(request)
         self._alerts.resolve("program")
         self._warnings.reset()
-        self._errors.start_run(wanted)
+        self._errors.start_run(request)
         self._set_errors({})
         self._mark_blocks()
         try:
-            program = self._runnable_program(wanted)
+            program = self._runnable_program(request)
             if program is None:
                 return
-            used = [link.robot for link in self._fleet.connected if link.name in program.robots]
-            asked = actions_by_robot(program, used)
-            if not self._fleet.permission.request_permission(asked, partial(self._start_if_ready, wanted)):
+            robots = [link.robot for link in self._fleet.connected if link.name in program.robots]
+            requested_actions = actions_by_robot(program, robots)
+            if not self._fleet.permission.request_permission(
+                requested_actions, partial(self._start_if_ready, request)
+            ):
                 return  # the window asks the user first
-            self._fleet.return_to_start(program.robots if wanted.stack is None else ())
+            self._fleet.return_to_start(program.robots if request.stack is None else ())
             owners = owners_of(self._fleet)
-            runner = self._start_runner(program, document.name, wanted, owners)
+            runner = self._start_runner(program, document.name, request, owners)
         except AppError as error:
             self._alerts.raise_alert("program", "error", _("The behaviour can't be started."), str(error))
             return
         self.asking.reset(runner)
         self._runner, self._used, self._labels = runner, program.robots, program.labels
-        self._robots.start(runner, asked, owners)
+        self._robots.start(runner, requested_actions, owners)
         self._breakpoints, self._program_key = program.breakpoints, runner.program_key
-        self._fleet.moved.record_command((robot.name for robot in used), "behaviour")
+        self._fleet.moved.record_command((robot.name for robot in robots), "behaviour")
         self._variables = {variable.id: variable for variable in program.variables}
-        if wanted.stack is None or not is_same:
+        if request.stack is None or not is_same:
             self._show_values({})  # trying a block keeps the values of other variables
         self._console.ignore_process(runner.pid)
-        self._edits.set_program(document if wanted.stack is None else None, program)
-        self._show_start(self._documents.title(document), self._trial.start(program, used))
+        self._edits.set_program(document if request.stack is None else None, program)
+        self._show_start(self._documents.title(document), self._trial.start(program, robots))
 
     def _start_runner(
-        self, program: Program, name: str, wanted: RequestedRun, owners: Mapping[str, str]
+        self, program: Program, name: str, request: RequestedRun, owners: Mapping[str, str]
     ) -> Runner:
         runner = self._make_runner(self._post_event)
         runner.start(
@@ -477,7 +479,7 @@ class Runs:
             [link.robot.source for link in self._fleet.connected],
             self._network.address,
             name=name,
-            paused=wanted.starts_paused,
+            paused=request.starts_paused,
             pace_s=self.pace_s,
             owners=owners,
         )
@@ -494,34 +496,34 @@ class Runs:
         text = _("trying “{block}”").format(block=trying) if trying else _("started")
         self._console.add("info", self._run.name, text)
 
-    def _runnable_program(self, wanted: RequestedRun) -> Program | None:
+    def _runnable_program(self, request: RequestedRun) -> Program | None:
         # None if it has no blocks to run or has problems; the run bar shows the reason.
-        program = wanted.program()
-        wrong = {} if program is None else wanted.problems(program)
-        if program is None or (program.starts and not wrong):
+        program = request.program()
+        problems = {} if program is None else request.problems(program)
+        if program is None or (program.starts and not problems):
             return program
-        if wanted.stack is None or not wrong:  # problems of a tried block are shown at the block
+        if request.stack is None or not problems:  # problems of a tried block are shown at the block
             before = self._run
             self._run = RunState(
                 unrunnable_program=program,
                 last_stop_text=before.last_stop_text,
                 last_stop_status=before.last_stop_status,
             )
-        self._set_errors(wrong, not_started=True)
+        self._set_errors(problems, not_started=True)
         return None
 
-    def _start_if_ready(self, wanted: RequestedRun) -> None:
+    def _start_if_ready(self, request: RequestedRun) -> None:
         # After the user's permission, unless another run has begun meanwhile.
         if self._run.state in {"ready", "proven"}:
-            self._start(wanted)
+            self._start(request)
 
     def _on_print(self, event: RunnerEvent) -> None:
         # Shown in the Console, or as the value of a tried block.
-        words = self._trial.parse_line(event.text)
-        if words is None:
+        value = self._trial.parse_line(event.text)
+        if value is None:
             self._console.add("info", self._run.name, event.text)
         else:
-            self._run = replace(self._run, value=words)
+            self._run = replace(self._run, value=value)
 
     def _on_error(self, event: RunnerEvent) -> None:
         self._console.add("error", self._run.name, event.text)
@@ -554,8 +556,10 @@ class Runs:
         elif run.state not in {"stopping", "unanswered"}:
             elapsed_s = None
         # includes robots that have not replied to an earlier Stop, whose report is discarded
-        wanted = self._fleet.stoppable_robots if names is None else (*names, *self._fleet.unresponsive_robots)
-        asked = tuple(dict.fromkeys((*wanted, *self._fleet.stopping_robots)))
+        requested = (
+            self._fleet.stoppable_robots if names is None else (*names, *self._fleet.unresponsive_robots)
+        )
+        robots_to_stop = tuple(dict.fromkeys((*requested, *self._fleet.stopping_robots)))
         self._run = replace(
             self._run,
             state="stopping",
@@ -567,23 +571,23 @@ class Runs:
             finished=False,
             is_edited=False,
             is_restarting=False,
-            robots_to_stop=asked,
+            robots_to_stop=robots_to_stop,
         )
-        self._fleet.mark_stopping(asked)
+        self._fleet.mark_stopping(robots_to_stop)
         self._stop_mark = self._fleet.moved.mark
         self._mark_blocks(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
-        work = partial(
+        target = partial(
             stop_program,
             self._post_event,
             self._stop_number,
             self._runner,
             self._network.stopper,
-            asked,
+            robots_to_stop,
             self._program_key,
             is_for_all=names is None,
         )
-        self._stop_thread = threading.Thread(target=work, name="studio-stop", daemon=True)
+        self._stop_thread = threading.Thread(target=target, name="studio-stop", daemon=True)
         self._stop_thread.start()
 
     def _set_errors(self, errors: Mapping[str, str], *, not_started: bool = False) -> None:

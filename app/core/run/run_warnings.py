@@ -33,19 +33,19 @@ class RunWarnings:
         self.by_block = {}
         return True
 
-    def add(self, block: str, sentence: str, count: int, edits: int = 0) -> None:
+    def add(self, block: str, message: str, count: int, edits: int = 0) -> None:
         """Add a warning.
 
         Args:
             block: Id of the block.
-            sentence: Text of the warning.
+            message: Text of the warning.
             count: Number of occurrences in this run.
             edits: Current number of edits of the behaviour.
         """
         self._edits = edits
-        key = (block, sentence)
+        key = (block, message)
         self._counts[key] = count
-        self.by_block = {**self.by_block, block: with_count(sentence, count)}
+        self.by_block = {**self.by_block, block: with_count(message, count)}
         if count >= 10 * self._logged_counts.get(key, 0) or key not in self._logged_counts:
             self._log_count(key)
 
@@ -60,10 +60,10 @@ class RunWarnings:
         self._log(with_count(key[1], self._counts[key]))
 
 
-def with_count(sentence: str, count: int) -> str:
+def with_count(message: str, count: int) -> str:
     """Append the number of occurrences to a sentence, if there is more than one."""
     if count == 1:
-        return sentence
+        return message
     return ngettext("{sentence} ({count} time)", "{sentence} ({count} times)", count).format(
-        sentence=sentence, count=count
+        sentence=message, count=count
     )

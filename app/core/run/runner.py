@@ -156,12 +156,12 @@ class Runner:
         self._child = child = ChildProcess(self._command, home(), most_bytes=self._most_bytes)
         self._began_s = self._clock()
         self.state = "paused" if paused else "running"
-        kept = program.to_json() | ({} if name is None else {"name": name})
+        encoded = program.to_json() | ({} if name is None else {"name": name})
         self._commands.put(
             {
                 "do": "start",
                 "id": self.program_id,
-                "program": kept,
+                "program": encoded,
                 "robots": list(robots),
                 "owners": dict(owners or {}),
                 "master": master,
@@ -175,8 +175,8 @@ class Runner:
         # last, because it waits for the others
         self._start_thread(lambda: self._watch(child, reader, errors), "watch")
 
-    def _start_thread(self, work: Callable[[], None], label: str) -> threading.Thread:
-        thread = threading.Thread(target=work, name=f"runner {label}", daemon=True)
+    def _start_thread(self, target: Callable[[], None], label: str) -> threading.Thread:
+        thread = threading.Thread(target=target, name=f"runner {label}", daemon=True)
         self._threads.append(thread)
         thread.start()
         return thread
@@ -222,9 +222,9 @@ class Runner:
         """Run one block of a paused program."""
         self._commands.put({"do": "step"})
 
-    def answer(self, question: int, words: str) -> None:
+    def answer(self, question: int, text: str) -> None:
         """Answer a question of the program."""
-        self._commands.put({"do": "answer", "question": question, "text": words})
+        self._commands.put({"do": "answer", "question": question, "text": text})
 
     def stop(self) -> None:
         """Stop the program within 100 ms: request it to end, and kill the process if it doesn't.
@@ -350,12 +350,12 @@ class Runner:
             how = f"the program's process {exit_text(code)}"
             extra = {**CONSOLE_EXTRA, **crash_extra("behaviour", how, f"{output}{trace}")}
             _log.error("%s", how, extra=extra)
-        words = next((line for line in reversed(output.splitlines()) if line.strip()), "")
+        last_line = next((line for line in reversed(output.splitlines()) if line.strip()), "")
         if code < 0:
             how = _("The program's process was killed (signal {signal})").format(signal=-code)
         else:
             how = _("The program's process ended with exit code {code}").format(code=code)
-        return f"{how}: {words.strip()}." if words else f"{how}."
+        return f"{how}: {last_line.strip()}." if last_line else f"{how}."
 
     def _read_errors(self, child: ChildProcess) -> None:
         # Keeps the last lines; a line without an end is cut.
@@ -385,8 +385,8 @@ class Runner:
         if kind == "ready":
             return RunnerEvent("ready", self.run)
         if kind in ("running", "paused"):
-            says, text = text_of(event, "says"), text_of(event, "warning")
-            return RunnerEvent(kind, self.run, blocks=blocks, description=says, text=text)
+            description, text = text_of(event, "says"), text_of(event, "warning")
+            return RunnerEvent(kind, self.run, blocks=blocks, description=description, text=text)
         if kind == "error":
             return RunnerEvent("error", self.run, blocks=first, text=text_of(event, "sentence"), is_ok=False)
         if kind == "warning" and first:
@@ -397,14 +397,16 @@ class Runner:
             )
         if kind in ("print", "ask"):
             question = event.get("question")
-            asked = question if isinstance(question, int) else 0
+            question_number = question if isinstance(question, int) else 0
             choices = tuple(
                 each[:MAX_CHOICE_LENGTH] for each in parse_texts(event.get("choices"))[:MAX_CHOICES]
             )
-            return RunnerEvent(kind, self.run, text=text_of(event, "text"), question=asked, choices=choices)
+            return RunnerEvent(
+                kind, self.run, text=text_of(event, "text"), question=question_number, choices=choices
+            )
         if kind == "variables":
-            listed = event.get("values")
-            values = map(VariableValue.from_json, listed if isinstance(listed, list) else ())
+            value_list = event.get("values")
+            values = map(VariableValue.from_json, value_list if isinstance(value_list, list) else ())
             return RunnerEvent(
                 "variables", self.run, values=tuple(each for each in values if each is not None)
             )

@@ -27,10 +27,10 @@ class StopReporter:
         """
         self._fleet.moved.apply_report(report, mark)
         clock = clock_text(time.localtime())
-        words = {
+        texts_by_robot = {
             name: (stop_text(each, clock), each.status) for name, each in report.results_by_robot.items()
         }
-        self._fleet.apply_stop(words, report)
+        self._fleet.apply_stop(texts_by_robot, report)
 
     def motion_warnings(self, report: StopReport) -> tuple[str, ...]:
         """Return sentences about robots without a confirmation.
@@ -56,19 +56,19 @@ class StopReporter:
             origin: Origin of the Console record.
         """
         for name, program in report.impostors:
-            sentence = _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored").format(
+            message = _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored").format(
                 program=program, robot=name
             )
-            self._console.add("error", origin, sentence)
+            self._console.add("error", origin, message)
             detail = _("Find out what this program is, and close it.")
-            self._alerts.raise_alert(f"stranger:{name}", "error", f"{sentence}.", detail)
-        words = result_text(report)
+            self._alerts.raise_alert(f"stranger:{name}", "error", f"{message}.", detail)
+        result = result_text(report)
         if not report.unconfirmed_robots:
-            self._console.add("info", origin, words)
+            self._console.add("info", origin, result)
             self._alerts.resolve("stop")
         else:
             title, detail, _compact, _confirm = unconfirmed_texts(report, self.motion_warnings(report))
-            self._console.add("error", origin, f"{words}: {title}")
+            self._console.add("error", origin, f"{result}: {title}")
             self._alerts.raise_alert(
                 "stop", "error", f"{title}.", detail, button=_(STOP_AGAIN), action="run.stop"
             )

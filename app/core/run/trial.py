@@ -40,9 +40,9 @@ class Trial:
         self._request: RequestedRun | None = None
         self._unit = ""
 
-    def prepare(self, wanted: RequestedRun) -> None:
+    def prepare(self, request: RequestedRun) -> None:
         """Apply a new request to run, and discard the value of the previous trial."""
-        self._request, self._unit, self.value = wanted, "", None
+        self._request, self._unit, self.value = request, "", None
 
     def start(self, program: Program, robots: Iterable[Robot]) -> str:
         """Record the start of the program; return the label of the tried block ("" for a behaviour).
@@ -58,12 +58,12 @@ class Trial:
 
     def parse_line(self, line: str) -> str | None:
         """Return the value in a printed line as formatted text; None if the tried block has no value."""
-        wanted = self._request
-        if wanted is None or wanted.stack is None or not wanted.has_value:
+        request = self._request
+        if request is None or request.stack is None or not request.has_value:
             return None
-        words = f"{line} {self._unit}".strip() if line else _("not known yet")
-        self.show(wanted.document, wanted.stack, words)
-        return words
+        text = f"{line} {self._unit}".strip() if line else _("not known yet")
+        self.show(request.document, request.stack, text)
+        return text
 
     def show(self, document: Document, stack: Stack, words: str) -> None:
         """Set the formatted value of a tried stack."""

@@ -71,10 +71,10 @@ class RunState:
 
     def elapsed(self, now: float) -> float:
         """Return the running time in seconds at ``now``, without pauses."""
-        held = self.paused_s
+        paused_s = self.paused_s
         if self.pause_start_s is not None:
-            held += now - self.pause_start_s
-        return max(0.0, now - self.started_s - held)
+            paused_s += now - self.pause_start_s
+        return max(0.0, now - self.started_s - paused_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,17 +112,17 @@ class RunView:
     is_slow: bool = False
 
 
-def block_label(says: str, blocks: Sequence[str], labels: Mapping[str, str]) -> str:
+def block_label(description: str, blocks: Sequence[str], labels: Mapping[str, str]) -> str:
     """Return the text that describes the block before which a program is paused.
 
     Args:
-        says: Text of the block. If it contains a quotation, the label is returned instead.
+        description: Text of the block. If it contains a quotation, the label is returned instead.
         blocks: Ids of the paused blocks, the next one first.
         labels: Labels by block id.
     """
-    if "“" not in says or not blocks:
-        return says
-    return labels.get(blocks[0], says)
+    if "“" not in description or not blocks:
+        return description
+    return labels.get(blocks[0], description)
 
 
 def view_of(
@@ -158,12 +158,12 @@ def _tried_view(view: RunView, run: RunState) -> RunView:
         title = _("Trying “{block}”").format(block=run.tried_label)
         return replace(view, title=title, compact_text=title, run_label=RUN, is_edited=False)
     if view.state == "proven" or _ended_without_robots(run):
-        words = _("“{block}” stopped because of an error") if run.errors else _("“{block}” was stopped")
+        template = _("“{block}” stopped because of an error") if run.errors else _("“{block}” was stopped")
         detail = view.detail
         if run.finished:
-            words = _("Tried “{block}”")
+            template = _("Tried “{block}”")
             detail = _("Finished") if run.value is None else run.value
-        title = words.format(block=run.tried_label)
+        title = template.format(block=run.tried_label)
         compact = view.compact_text if view.result else title
         return replace(view, title=title, detail=detail, compact_text=compact)
     return view
@@ -188,8 +188,8 @@ def _named_view(view: RunView, run: RunState, now: float) -> RunView:
         )
     if view.state == "paused":
         if run.paused_at:
-            words = _("{name} is paused at “{block}”")
-            return replace(view, title=words.format(name=run.name, block=run.paused_at))
+            template = _("{name} is paused at “{block}”")
+            return replace(view, title=template.format(name=run.name, block=run.paused_at))
         return replace(view, title=_("{name} is paused").format(name=run.name))
     if view.state == "stopping":
         return replace(view, title=_("Stopping {name}").format(name=run.name))
@@ -300,16 +300,18 @@ def _early_stopping_view(run: RunState, now: float) -> RunView:
 def _stopping_view(run: RunState, now: float) -> RunView:
     # a robot that refuses, or that other programs serve too, is done only when all of it has stopped
     newest = {robot.name: robot for robot in run.replies}
-    done = {robot.name for robot in run.replies if robot.is_confirmed and not newest[robot.name].is_waiting}
-    done -= {robot.name for robot in run.replies if robot.problem}
-    waiting = [name for name in run.robots_to_stop if name not in done]
+    stopped_names = {
+        robot.name for robot in run.replies if robot.is_confirmed and not newest[robot.name].is_waiting
+    }
+    stopped_names -= {robot.name for robot in run.replies if robot.problem}
+    waiting = [name for name in run.robots_to_stop if name not in stopped_names]
     detail = result = ""
     if waiting:
         detail = _("Waiting for {robots}, {seconds} s").format(
             robots=format_list(waiting), seconds=number(now - run.stop_pressed_s, ".1f")
         )
     if run.robots_to_stop:
-        result = _stopped_count_text(len(done), len(run.robots_to_stop))
+        result = _stopped_count_text(len(stopped_names), len(run.robots_to_stop))
     title = _("Restarting") if run.is_restarting else _(STOPPING)
     return RunView("stopping", title, detail, title, stop_label=STOPPING, result=result or None)
 
@@ -333,7 +335,7 @@ _END_TITLES = {
 
 def _proven_view(run: RunState, _now: float) -> RunView:
     report = run.report if run.report is not None and run.report.robots else None
-    words = result_text(report) if report is not None else ""
+    result = result_text(report) if report is not None else ""
     title, detail = _ended_title(run), _("It stopped at the dashed block") if run.has_stopped_blocks else ""
     if run.errors:
         detail = next(iter(run.errors.values()))
@@ -343,18 +345,18 @@ def _proven_view(run: RunState, _now: float) -> RunView:
         "proven",
         title,
         detail,
-        words or title,
+        result or title,
         can_run=True,
         can_step=True,
-        result=words or None,
+        result=result or None,
         result_status=report.status if report is not None else "off",
     )
 
 
 def _ended_title(run: RunState, name: str = "") -> str:
     kind = "problem" if run.errors else "finished" if run.finished else "stopped"
-    words = _END_TITLES[kind, bool(name), run.elapsed_s is not None]
-    return _(words).format(name=name, time=duration_text(run.elapsed_s or 0.0))
+    template = _END_TITLES[kind, bool(name), run.elapsed_s is not None]
+    return _(template).format(name=name, time=duration_text(run.elapsed_s or 0.0))
 
 
 def _unanswered_view(run: RunState, now: float) -> RunView:
@@ -375,19 +377,19 @@ def _unanswered_view(run: RunState, now: float) -> RunView:
 
 def duration_text(value: float) -> str:
     """Format a duration in whole seconds, such as ``14 s`` or ``2 min 5 s``."""
-    whole = int(value)
-    return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60} s"
+    seconds = int(value)
+    return f"{seconds} s" if seconds < 60 else f"{seconds // 60} min {seconds % 60} s"
 
 
 def connected_text(names: Sequence[str], coming: Sequence[str] = ()) -> str:
     """Return the line below "Ready": the names of connected robots, or else of starting robots."""
     if not names and coming:
-        words = ngettext("{robots} is starting", "{robots} are starting", len(coming))
-        return words.format(robots=format_list(coming))
+        template = ngettext("{robots} is starting", "{robots} are starting", len(coming))
+        return template.format(robots=format_list(coming))
     if not names:
         return _("No robot is connected")
-    words = ngettext("{robots} is connected", "{robots} are connected", len(names))
-    return words.format(robots=format_list(names))
+    template = ngettext("{robots} is connected", "{robots} are connected", len(names))
+    return template.format(robots=format_list(names))
 
 
 def result_text(report: StopReport) -> str:
@@ -395,20 +397,20 @@ def result_text(report: StopReport) -> str:
 
     The icon next to the text depends on `StopReport.status`.
     """
-    names, still = report.names, report.stopped_names
+    names, stopped = report.names, report.stopped_names
     unsure = [robot.full_name for robot in report.robots if not robot.can_confirm]
     if report.unconfirmed_robots:
-        return _stopped_count_text(len(still), len(names))
+        return _stopped_count_text(len(stopped), len(names))
     if not names:
         return _("nothing to stop")
-    if not still:
+    if not stopped:
         return _("stop sent; {robots} can't confirm").format(robots=format_list(unsure))
     time_ms = max(1, round(report.elapsed_ms))
     if unsure:
-        words = _("{robots} stopped ({elapsed} ms); {others} can't confirm")
-        return words.format(robots=format_list(still), elapsed=time_ms, others=format_list(unsure))
+        template = _("{robots} stopped ({elapsed} ms); {others} can't confirm")
+        return template.format(robots=format_list(stopped), elapsed=time_ms, others=format_list(unsure))
     if len(names) == 1:
-        return _("{robot} stopped ({elapsed} ms)").format(robot=still[0], elapsed=time_ms)
+        return _("{robot} stopped ({elapsed} ms)").format(robot=stopped[0], elapsed=time_ms)
     return _("all {count} robots stopped ({elapsed} ms)").format(count=len(names), elapsed=time_ms)
 
 
@@ -427,20 +429,20 @@ def unconfirmed_texts(report: StopReport, doubts: Sequence[str] = ()) -> tuple[s
         report: Result of the Stop.
         doubts: Reasons why robots may be moving (`RunState`).
     """
-    still = report.stopped_names
+    stopped = report.stopped_names
     names = format_list(report.unconfirmed_names)
-    them = format_list(report.unconfirmed_names) if len(report.unconfirmed_names) <= 2 else _("them")
-    detail = _("Switch {robots} off by hand.").format(robots=them)
+    listed_names = format_list(report.unconfirmed_names) if len(report.unconfirmed_names) <= 2 else _("them")
+    detail = _("Switch {robots} off by hand.").format(robots=listed_names)
     if doubts:
         detail = ngettext(
             "{why}. Switch {robots} off by hand if it is still moving.",
             "{why}. Switch {robots} off by hand if they are still moving.",
             len(report.unconfirmed_names),
-        ).format(why="; ".join(doubts[:MAX_NAMED]), robots=them)
-    if still:
-        slowest = max(robot.elapsed_ms or 0 for robot in report.robots if robot.name in still)
+        ).format(why="; ".join(doubts[:MAX_NAMED]), robots=listed_names)
+    if stopped:
+        slowest = max(robot.elapsed_ms or 0 for robot in report.robots if robot.name in stopped)
         detail = _("{robots} stopped ({elapsed} ms). {next_step}").format(
-            robots=format_list(still), elapsed=max(1, round(slowest)), next_step=detail
+            robots=format_list(stopped), elapsed=max(1, round(slowest)), next_step=detail
         )
     count, title = len(report.unconfirmed_names), _problem_text(report)
     switch = ngettext("{wrong}; switch it off by hand", "{wrong}; switch them off by hand", count)
@@ -457,15 +459,15 @@ def _problem_text(report: StopReport) -> str:
     silent = [robot.full_name for robot in report.unconfirmed_robots if not robot.error]
     if len(silent) > MAX_NAMED:
         silent = [*silent[:MAX_NAMED], _("{count} more").format(count=len(silent) - MAX_NAMED)]
-    wrong = [*refusals, *untold]
+    problems = [*refusals, *untold]
     if silent:
-        words = ngettext("{robots} didn't reply", "{robots} didn't reply", len(silent))
-        wrong.append(words.format(robots=format_list(silent)))
-    left = len(wrong) - MAX_NAMED
-    if left > 0:
-        words = ngettext("{count} more may still move", "{count} more may still move", left)
-        wrong = [*wrong[:MAX_NAMED], words.format(count=left)]
-    return "; ".join(wrong)
+        template = ngettext("{robots} didn't reply", "{robots} didn't reply", len(silent))
+        problems.append(template.format(robots=format_list(silent)))
+    remaining = len(problems) - MAX_NAMED
+    if remaining > 0:
+        template = ngettext("{count} more may still move", "{count} more may still move", remaining)
+        problems = [*problems[:MAX_NAMED], template.format(count=remaining)]
+    return "; ".join(problems)
 
 
 def stop_text(robot: RobotStop, clock: str) -> str:

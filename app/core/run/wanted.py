@@ -69,10 +69,10 @@ class RequestedRun:
 
         Missing robots don't prevent a whole behaviour from running.
         """
-        wrong = {each.block_id: each.message for each in program.problems if each.severity == "error"}
-        found = {block: sentence for block, sentence in wrong.items() if block}
-        if self.stack is None or found:
-            return {block: sentence for block, sentence in found.items() if block != SHOW_BLOCK_ID}
+        errors = {each.block_id: each.message for each in program.problems if each.severity == "error"}
+        block_errors = {block: message for block, message in errors.items() if block}
+        if self.stack is None or block_errors:
+            return {block: message for block, message in block_errors.items() if block != SHOW_BLOCK_ID}
         return _missing_robot_errors(program, self.stack)
 
     def label(self, program: Program) -> str:

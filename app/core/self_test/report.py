@@ -70,7 +70,7 @@ def seconds_since_start() -> float:
 class Report:
     """Report of one self-test, written to disk at each change. Thread-safe."""
 
-    def __init__(self, path: Path, facts: dict[str, object]) -> None:
+    def __init__(self, path: Path, info: dict[str, object]) -> None:
         self._path = path
         self._lock = threading.RLock()
         self._offset_s = seconds_since_start() - time.monotonic()
@@ -84,7 +84,7 @@ class Report:
             "frozen": bool(getattr(sys, "frozen", False)),
             "program": sys.executable,
             "began": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
-            **facts,
+            **info,
         }
         self._why = ""
         self._over = False
@@ -105,10 +105,10 @@ class Report:
             newest = self._steps[-1] if self._steps else None
             return newest if newest is not None and newest.duration_ms is None else None
 
-    def add_computer_info(self, **facts: object) -> None:
+    def add_computer_info(self, **info: object) -> None:
         """Add facts about this computer."""
         with self._lock:
-            self._facts.update(facts)
+            self._facts.update(info)
 
     def record_time(self, name: str) -> None:
         """Record the current time under the key ``NAME_ms``.
@@ -118,37 +118,37 @@ class Report:
         with self._lock:
             self._marks.setdefault(f"{name}_ms", self.now_ms())
 
-    def start_step(self, name: str, words: str, bound_s: float) -> None:
+    def start_step(self, name: str, description: str, bound_s: float) -> None:
         """Start a step.
 
         Args:
             name: Name of the step.
-            words: Expected result, as a sentence for the report.
+            description: Expected result, as a sentence for the report.
             bound_s: Time limit in seconds.
         """
         with self._lock:
-            self._steps.append(StepReport(name, words, bound_s, self.now_ms()))
+            self._steps.append(StepReport(name, description, bound_s, self.now_ms()))
             self._write()
 
-    def record_success(self, said: str = "") -> None:
+    def record_success(self, details: str = "") -> None:
         """Record that the current step has succeeded.
 
         Args:
-            said: Details of the result.
+            details: Details of the result.
         """
         with self._lock:
             step = self.current_step
             if step is not None:
-                step.duration_ms, step.is_ok, step.details = self.now_ms(), True, said
+                step.duration_ms, step.is_ok, step.details = self.now_ms(), True, details
                 self._write()
 
-    def fail(self, why: str) -> None:
+    def fail(self, reason: str) -> None:
         """Record that the test has failed. Only the first reason is stored."""
         with self._lock:
             step = self.current_step
             if step is not None:
-                step.duration_ms, step.details = self.now_ms(), why
-            self._why = self._why or why
+                step.duration_ms, step.details = self.now_ms(), reason
+            self._why = self._why or reason
             self._write()
 
     def finish(self) -> bool:
@@ -160,15 +160,15 @@ class Report:
             return not self._why
 
     def _write(self) -> None:
-        step, why = self.current_step, self._why
-        if not why and not self._over:
+        step, failure = self.current_step, self._why
+        if not failure and not self._over:
             name = step.name if step is not None else (self._steps[-1].name if self._steps else "")
-            why = _("Studio exited during the self-test; its last step was “{step}”.").format(step=name)
+            failure = _("Studio exited during the self-test; its last step was “{step}”.").format(step=name)
         content = {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
             "ok": self._over and not self._why,
-            "why": why,
+            "why": failure,
             **self._facts,
             **{name: self._marks.get(name) for name in ("first_paint_ms", "editor_ready_ms", "total_ms")},
             "steps": [each.to_json() for each in self._steps],

@@ -77,13 +77,13 @@ def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -
     return surroundings
 
 
-def remove_home(made: TestEnvironment) -> None:
+def remove_home(environment: TestEnvironment) -> None:
     """Remove the home folder of the test. Files that exiting processes still use remain."""
-    for path in sorted(made.home.rglob("*"), reverse=True):
+    for path in sorted(environment.home.rglob("*"), reverse=True):
         with suppress(OSError):
             path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()
     with suppress(OSError):
-        made.home.rmdir()
+        environment.home.rmdir()
 
 
 def _free_port() -> int:

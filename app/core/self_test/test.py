@@ -28,15 +28,15 @@ KILL_TIMEOUT_S = 5.0
 class SelfTest:
     """Execution of the steps, and the watchdog. Thread-safe."""
 
-    def __init__(self, place: TestEnvironment, facts: dict[str, object]) -> None:
+    def __init__(self, environment: TestEnvironment, info: dict[str, object]) -> None:
         # Starts the watchdog: from now on the process ends in time, whatever its threads do.
-        self.place = place
-        self.report = Report(place.path(REPORT), {**facts, "bound_s": bounds.TOTAL_TIMEOUT_S})
+        self.place = environment
+        self.report = Report(environment.path(REPORT), {**info, "bound_s": bounds.TOTAL_TIMEOUT_S})
         self._changed = threading.Condition()
         self._all_until = time.monotonic() + bounds.TOTAL_TIMEOUT_S
         self._step_until = self._all_until
         self._awaited = ""
-        self._crash: TextIO = place.path(CRASH).open("w", encoding="utf-8")
+        self._crash: TextIO = environment.path(CRASH).open("w", encoding="utf-8")
         faulthandler.enable(self._crash)
         # This second watchdog needs neither Python code nor the GIL; it writes the stack of all threads.
         last_s = bounds.TOTAL_TIMEOUT_S + 2 * bounds.GRACE_S
@@ -45,28 +45,28 @@ class SelfTest:
 
     # -- steps --------------------------------------------------------------------------------------------
 
-    def start_step(self, name: str, words: str) -> None:
+    def start_step(self, name: str, description: str) -> None:
         """Start a step.
 
         Args:
             name: Name of the step, a key of `bounds.STEP_TIMEOUTS_S`.
-            words: Expected result, as a sentence for the report.
+            description: Expected result, as a sentence for the report.
         """
         bound_s = bounds.STEP_TIMEOUTS_S[name]
-        self.report.start_step(name, words, bound_s)
-        self._wait_until(time.monotonic() + bound_s + bounds.GRACE_S, words)
+        self.report.start_step(name, description, bound_s)
+        self._wait_until(time.monotonic() + bound_s + bounds.GRACE_S, description)
 
-    def record_success(self, said: str = "") -> None:
+    def record_success(self, details: str = "") -> None:
         """Record that the current step has succeeded.
 
         Args:
-            said: Details of the result.
+            details: Details of the result.
         """
-        self.report.record_success(said)
+        self.report.record_success(details)
 
-    def fail(self, why: str) -> None:
+    def fail(self, reason: str) -> None:
         """Record that the test has failed. Only the first reason is stored."""
-        self.report.fail(why)
+        self.report.fail(reason)
 
     def run(self, show: Callable[[], int]) -> int:
         """Run the test and clean up; return the exit code.
@@ -91,9 +91,9 @@ class SelfTest:
         if not self.report.failure:
             self.record_success()  # it has closed
         self._end_processes()
-        well = self.report.finish()
+        is_ok = self.report.finish()
         self._finish()
-        return 0 if well else FAILED_EXIT_CODE
+        return 0 if is_ok else FAILED_EXIT_CODE
 
     def _finish(self) -> None:
         # The watchdog continues until the process ends.
@@ -117,14 +117,18 @@ class SelfTest:
             kill_children()
             return
         self.start_step("processes", _("every process of the test exits"))
-        family = [each for each in children() if not is_web_process(each) and not is_windows_program(each)]
-        masters = [each for each in family if is_master_process(each)]
-        for each in masters:
+        family = [
+            process
+            for process in children()
+            if not is_web_process(process) and not is_windows_program(process)
+        ]
+        masters = [process for process in family if is_master_process(process)]
+        for process in masters:
             with suppress(psutil.Error):
-                each.terminate()
-        _gone, left = psutil.wait_procs(family, timeout=bounds.STEP_TIMEOUTS_S["processes"])
-        if left:
-            names = format_list([f"{each.pid} ({' '.join(command(each)[:4])})" for each in left])
+                process.terminate()
+        _gone, alive = psutil.wait_procs(family, timeout=bounds.STEP_TIMEOUTS_S["processes"])
+        if alive:
+            names = format_list([f"{process.pid} ({' '.join(command(process)[:4])})" for process in alive])
             self.fail(_("These processes didn't exit: {names}").format(names=names))
             kill_children()
         else:
@@ -132,18 +136,22 @@ class SelfTest:
 
     # -- watchdog -----------------------------------------------------------------------------------------
 
-    def _wait_until(self, until: float, what: str) -> None:
+    def _wait_until(self, until: float, description: str) -> None:
         with self._changed:
-            self._step_until, self._awaited = until, what
+            self._step_until, self._awaited = until, description
             self._changed.notify_all()
 
     def _watch(self) -> None:
         with self._changed:
-            while (left := min(self._step_until, self._all_until + bounds.GRACE_S) - time.monotonic()) > 0:
-                self._changed.wait(left)
-            what = self._awaited
+            while (
+                remaining_s := min(self._step_until, self._all_until + bounds.GRACE_S) - time.monotonic()
+            ) > 0:
+                self._changed.wait(remaining_s)
+            awaited = self._awaited
         self.fail(
-            _("Studio didn't respond in time and was stopped. It was waiting for: {what}").format(what=what)
+            _("Studio didn't respond in time and was stopped. It was waiting for: {what}").format(
+                what=awaited
+            )
         )
         self.report.finish()
         with suppress(OSError, ValueError):  # closed at the very end
@@ -170,8 +178,8 @@ def command(process: psutil.Process) -> list[str]:
 
 def is_master_process(process: psutil.Process) -> bool:
     """Return True if a process is a master with an owner process, after whose exit it exits as well."""
-    words = command(process)
-    return "master" in words and "--owner-pid" in words
+    arguments = command(process)
+    return "master" in arguments and "--owner-pid" in arguments
 
 
 def is_web_process(process: psutil.Process) -> bool:
@@ -201,7 +209,7 @@ def is_windows_program(process: psutil.Process, root: str = os.environ.get("SYST
 def kill_children() -> None:
     """Kill all descendants of this process."""
     family = children()
-    for each in family:
+    for process in family:
         with suppress(psutil.Error):
-            each.kill()
+            process.kill()
     psutil.wait_procs(family, timeout=KILL_TIMEOUT_S)

@@ -31,7 +31,9 @@ class CalculatedSamples:
     def advance(self) -> None:
         """Calculate all samples for which the inputs are available."""
         base = self._inputs[0]
-        changed = [each.earliest_change_s(seen) for each, seen in zip(self._inputs, self._seen, strict=True)]
+        changed = [
+            each.earliest_change_s(revision) for each, revision in zip(self._inputs, self._seen, strict=True)
+        ]
         self._seen = [each.rewritten for each in self._inputs]
         change_s = min((each for each in changed if each is not None), default=None)
         if change_s is not None:
@@ -57,9 +59,9 @@ class CalculatedSamples:
 class WindowCurve(CalculatedSamples):
     """Difference, derivative, integral or moving average of another curve."""
 
-    def __init__(self, kind: WindowFunction, of: Samples, window_s: float) -> None:
+    def __init__(self, kind: WindowFunction, source: Samples, window_s: float) -> None:
         # `window_s` applies only to "mean".
-        super().__init__([of])
+        super().__init__([source])
         self._kind, self._window_s = kind, window_s
 
     def _compute(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -108,8 +110,8 @@ class ExpressionCurve(CalculatedSamples):
         last_s = base.last_s
         if last_s is None:
             return 0
-        theirs = [-np.inf if each.last_s is None else each.last_s for each in self._inputs[1:]]
-        until_s = max(min(theirs, default=last_s), last_s - MAX_WAIT_S)
+        last_times = [-np.inf if each.last_s is None else each.last_s for each in self._inputs[1:]]
+        until_s = max(min(last_times, default=last_s), last_s - MAX_WAIT_S)
         return int(np.searchsorted(base.times, until_s, side="right"))
 
     def _compute(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -126,15 +128,15 @@ def held_values(samples: Samples, times: Floats) -> Floats:
     """
     if not len(samples):
         return np.full(len(times), np.nan)
-    places = np.searchsorted(samples.times, times, side="right") - 1
-    at = np.maximum(places, 0)
-    values: Floats = samples.values[at].copy()
-    age_s = times - samples.times[at]
-    after = np.minimum(at + 1, len(samples) - 1)
-    in_gap = samples.gaps[after] & (after > at) & (age_s > 0)
+    indexes = np.searchsorted(samples.times, times, side="right") - 1
+    clamped = np.maximum(indexes, 0)
+    values: Floats = samples.values[clamped].copy()
+    age_s = times - samples.times[clamped]
+    after = np.minimum(clamped + 1, len(samples) - 1)
+    in_gap = samples.gaps[after] & (after > clamped) & (age_s > 0)
     old = np.zeros(len(times), dtype=bool)
     if len(samples) > 1:
         usual_s = float(samples.times[-1] - samples.times[0]) / (len(samples) - 1)
         old = age_s > max(HOLDS_S, HOLDS * usual_s)
-    values[(places < 0) | in_gap | old] = np.nan
+    values[(indexes < 0) | in_gap | old] = np.nan
     return values

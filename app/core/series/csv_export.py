@@ -87,7 +87,7 @@ def _cells_of(column: CsvColumn, states: Floats, begin_s: float, end_s: float) -
     numbers = zip(column.times[first:last].tolist(), column.values[first:last].tolist(), strict=True)
     cells = {time_s: repr(value) for time_s, value in numbers}
     first, last = _index_range(states, begin_s, end_s)
-    return cells | {time_s: escape_formula(word) for time_s, word in column.states[first:last]}
+    return cells | {time_s: escape_formula(text) for time_s, text in column.states[first:last]}
 
 
 def _index_range(times: Floats, begin_s: float, end_s: float) -> tuple[int, int]:
@@ -97,7 +97,7 @@ def _index_range(times: Floats, begin_s: float, end_s: float) -> tuple[int, int]
 
 def _format_iso(stamp_ns: int) -> str:
     try:
-        at = datetime.fromtimestamp(stamp_ns // 10**9, timezone.utc)
+        time_utc = datetime.fromtimestamp(stamp_ns // 10**9, timezone.utc)
     except (OverflowError, ValueError, OSError):
         return ""
-    return f"{at:%Y-%m-%dT%H:%M:%S}.{stamp_ns % 10**9:09d}Z"
+    return f"{time_utc:%Y-%m-%dT%H:%M:%S}.{stamp_ns % 10**9:09d}Z"

@@ -135,8 +135,8 @@ class Curves:
             sources: Sources of the curves.
             text: Expression that the user typed.
         """
-        there = {each.text for each in self.all}
-        new = [each for each in sources if str(each) not in there]
+        existing = {each.text for each in self.all}
+        new = [each for each in sources if str(each) not in existing]
         if not sources:
             raise CurveError(_("{text} has no elements now").format(text=text))
         if len(self.all) + len(new) > MAX_CURVES:
@@ -171,8 +171,8 @@ class Curves:
 
     def payload_of(self, topic: str) -> object:
         """Return the payload of the newest message of a plotted topic; `MISSING` if there is none."""
-        known = self._topics.get(topic)
-        return known.payload if known is not None else MISSING
+        topic_series = self._topics.get(topic)
+        return topic_series.payload if topic_series is not None else MISSING
 
     def fields(self, topic: str) -> list[PlottableField]:
         """Return the plottable fields in the newest message of a plotted topic."""
@@ -204,13 +204,13 @@ class Curves:
     @property
     def newest_s(self) -> float | None:
         """Time in seconds of the newest sample or state of all curves; None if there is none."""
-        found = [
+        last_times = [
             last
             for curve in self.all
             for last in (curve.samples.last_s, curve.states.last_s if curve.states is not None else None)
             if last is not None
         ]
-        return max(found, default=None)
+        return max(last_times, default=None)
 
     def no_values_reason(self, curve: Curve) -> str:
         """Return a sentence about why a curve has no values; "" if it has values or may get some."""
@@ -219,15 +219,15 @@ class Curves:
         payload = self.payload_of(curve.series.topic)
         if payload is MISSING:
             return ""
-        found = curve.series.path.value_in(payload)
-        if kind_of_value(found) in {"number", "state"}:
+        value = curve.series.path.value_in(payload)
+        if kind_of_value(value) in {"number", "state"}:
             return ""
-        if found is MISSING:
-            near = nearest_field(curve.series.path, payload)
-            if near is None:
+        if value is MISSING:
+            nearest = nearest_field(curve.series.path, payload)
+            if nearest is None:
                 return _("{field} doesn't exist.").format(field=curve.text)
-            meant = FieldSource(curve.series.topic, FieldPath.parse(near))
-            return _("{field} doesn't exist. Did you mean {near}?").format(field=curve.text, near=meant)
+            suggestion = FieldSource(curve.series.topic, FieldPath.parse(nearest))
+            return _("{field} doesn't exist. Did you mean {near}?").format(field=curve.text, near=suggestion)
         return _("{field} isn't a number, text or boolean. Choose one of its fields.").format(
             field=curve.text
         )
@@ -251,8 +251,8 @@ class Curves:
         if isinstance(source, FieldSource):
             return self._create_field_samples(source)
         if isinstance(source, WindowSource):
-            of = self._acquire(source.source)
-            calculated: CalculatedSamples = WindowCurve(source.kind, of.samples, source.window_s)
+            shared = self._acquire(source.source)
+            calculated: CalculatedSamples = WindowCurve(source.kind, shared.samples, source.window_s)
             return _SharedSamples(
                 calculated.samples, dependencies=[str(source.source)], calculated=calculated
             )
@@ -278,8 +278,8 @@ class Curves:
         if shared.user_count > 0:
             return
         del self._shared[name]
-        for each in shared.dependencies:
-            self._release(each)
+        for dependency in shared.dependencies:
+            self._release(dependency)
         if shared.series is not None:
             topic = self._topics[shared.series.topic]
             topic.fields.remove(shared.series)

@@ -61,17 +61,17 @@ class SeriesFeed:
         """Return the current time of this computer in seconds since ``origin_ns``."""
         return (self._clock_ns() - self.origin_ns) / 1e9
 
-    def register(self, topic: str, taker: SeriesReceiver, *, deep: bool = True) -> None:
+    def register(self, topic: str, taker: SeriesReceiver, *, is_lossless: bool = True) -> None:
         """Add a receiver for the messages of a topic.
 
         Args:
             topic: Key of the topic.
             taker: Receiver.
-            deep: True to receive all messages, and the history of a recording. If False, messages may
+            is_lossless: True to receive all messages, and the history of a recording. If False, messages may
                 be dropped while the window is busy.
         """
         self._takers.setdefault(topic, []).append(taker)
-        if deep:
+        if is_lossless:
             deep_ones = self._deep.setdefault(topic, [])
             deep_ones.append(taker)
             if len(deep_ones) == 1:
@@ -81,15 +81,15 @@ class SeriesFeed:
 
     def unregister(self, topic: str, taker: SeriesReceiver) -> None:
         """Remove a receiver. Idempotent."""
-        takers, deep = self._takers.get(topic, []), self._deep.get(topic, [])
+        takers, lossless = self._takers.get(topic, []), self._deep.get(topic, [])
         if taker in takers:
             takers.remove(taker)
         if not takers and topic in self._watching:
             del self._takers[topic]
             self._watching.pop(topic).close()
-        if taker in deep:
-            deep.remove(taker)
-            if not deep:
+        if taker in lossless:
+            lossless.remove(taker)
+            if not lossless:
                 del self._deep[topic]
                 self._set_room(topic, None)
 

@@ -75,18 +75,20 @@ class FieldPath:
     def parse(cls, text: str) -> FieldPath:
         """Parse the text of a path. Raises `CurveError` if the path is invalid."""
         steps: list[Step] = []
-        at = 0
-        while at < len(text):
-            found = _STEP_PATTERN.match(text, at)
-            bare = found is not None and found["name"] is not None and bool(steps) and text[at] != "."
-            if found is None or bare or len(steps) >= MAX_STEPS or len(text) > MAX_LENGTH:
+        position = 0
+        while position < len(text):
+            match = _STEP_PATTERN.match(text, position)
+            is_bare = (
+                match is not None and match["name"] is not None and bool(steps) and text[position] != "."
+            )
+            if match is None or is_bare or len(steps) >= MAX_STEPS or len(text) > MAX_LENGTH:
                 raise CurveError(
                     _("'{path}' isn't a valid field path; use a path such as pose.x or joints[3]").format(
                         path=text[:80]
                     )
                 )
-            steps.append(_parse_step(found))
-            at = found.end()
+            steps.append(_parse_step(match))
+            position = match.end()
         if not steps:
             raise CurveError(_("the field after the topic is missing"))
         return cls(tuple(steps))
@@ -103,19 +105,19 @@ class FieldPath:
 
     def value_in(self, payload: object) -> object:
         """Return the value at the path in a decoded message; `MISSING` if there is none."""
-        here = payload
+        value = payload
         for step in self.steps:
             # `isinstance` with an ABC takes ten times as long
-            if type(here) is dict or isinstance(here, Mapping):
-                here = here.get(step, MISSING)
-            elif isinstance(step, int) and is_list(here):
-                few: Sequence[object] = here  # type: ignore[assignment]
-                here = few[step] if -len(few) <= step < len(few) else MISSING
-            elif self.steps == (BARE_VALUE_KEY,) and not is_list(here):
-                return here
+            if type(value) is dict or isinstance(value, Mapping):
+                value = value.get(step, MISSING)
+            elif isinstance(step, int) and is_list(value):
+                few: Sequence[object] = value  # type: ignore[assignment]
+                value = few[step] if -len(few) <= step < len(few) else MISSING
+            elif self.steps == (BARE_VALUE_KEY,) and not is_list(value):
+                return value
             else:
                 return MISSING
-        return here
+        return value
 
     def expanded(self, payload: object) -> list[FieldPath]:
         """Return the paths in which each `ALL` is replaced with the indices of the array in a message.
@@ -125,29 +127,29 @@ class FieldPath:
         """
         if not self.has_wildcard:
             return [self]
-        place = self.steps.index(ALL)
-        above = FieldPath(self.steps[:place]).value_in(payload) if place else payload
+        index = self.steps.index(ALL)
+        above = FieldPath(self.steps[:index]).value_in(payload) if index else payload
         count = min(len(above), MAX_EVERY) if is_list(above) else 0  # type: ignore[arg-type]
-        found: list[FieldPath] = []
+        paths: list[FieldPath] = []
         for number in range(count):
-            one = FieldPath((*self.steps[:place], number, *self.steps[place + 1 :]))
-            found += one.expanded(payload)
-        return found[:MAX_EVERY]
+            path = FieldPath((*self.steps[:index], number, *self.steps[index + 1 :]))
+            paths += path.expanded(payload)
+        return paths[:MAX_EVERY]
 
 
-def _parse_step(found: re.Match[str]) -> Step:
-    if found["name"] is not None:
-        return found["name"]
-    if found["index"] is not None:
-        return int(found["index"])
-    if found["every"] is not None:
+def _parse_step(match: re.Match[str]) -> Step:
+    if match["name"] is not None:
+        return match["name"]
+    if match["index"] is not None:
+        return int(match["index"])
+    if match["every"] is not None:
         return ALL
     try:
-        key = json.loads(found["key"])
+        key = json.loads(match["key"])
     except ValueError:
         raise CurveError(
             _("'{path}' isn't a valid field path; use a path such as pose.x or joints[3]").format(
-                path=found["key"][:80]
+                path=match["key"][:80]
             )
         ) from None
     return str(key)
@@ -178,33 +180,33 @@ class PlottableField:
     count: int = 1
 
 
-def fields_of(payload: object, most: int = MAX_FIELDS) -> Iterator[PlottableField]:
+def fields_of(payload: object, max_fields: int = MAX_FIELDS) -> Iterator[PlottableField]:
     """Yield the plottable values of a message, outermost first.
 
     The first elements of an array are included, and ``[*]`` for all its elements.
 
     Args:
         payload: Decoded message.
-        most: Maximum number of values.
+        max_fields: Maximum number of values.
     """
     waiting: list[tuple[tuple[Step, ...], object]] = [((), payload)]
     if not isinstance(payload, Mapping) and not is_list(payload):
         waiting = [((BARE_VALUE_KEY,), payload)]
     produced = 0
-    while waiting and produced < most:
-        steps, here = waiting.pop(0)
-        kind = kind_of_value(here)
+    while waiting and produced < max_fields:
+        steps, value = waiting.pop(0)
+        kind = kind_of_value(value)
         if kind is not None:
             produced += 1
-            count = len(here) if kind == "list" else 1  # type: ignore[arg-type]
-            yield PlottableField(FieldPath((*steps, ALL) if kind == "list" else steps), kind, here, count)
-        if len(steps) >= MAX_STEPS or len(waiting) > most:
+            count = len(value) if kind == "list" else 1  # type: ignore[arg-type]
+            yield PlottableField(FieldPath((*steps, ALL) if kind == "list" else steps), kind, value, count)
+        if len(steps) >= MAX_STEPS or len(waiting) > max_fields:
             continue
-        if isinstance(here, Mapping):
-            named = ((key, below) for key, below in here.items() if isinstance(key, str))
-            waiting += [((*steps, key), below) for key, below in islice(named, most)]
-        elif is_list(here):
-            waiting += [((*steps, place), below) for place, below in enumerate(islice(here, 4))]  # type: ignore[call-overload]
+        if isinstance(value, Mapping):
+            entries = ((key, below) for key, below in value.items() if isinstance(key, str))
+            waiting += [((*steps, key), below) for key, below in islice(entries, max_fields)]
+        elif is_list(value):
+            waiting += [((*steps, index), below) for index, below in enumerate(islice(value, 4))]  # type: ignore[call-overload]
 
 
 def kind_of_value(value: object) -> FieldKind | None:
@@ -223,20 +225,20 @@ def kind_of_value(value: object) -> FieldKind | None:
     return None
 
 
-def complete(text: str, known: Sequence[str]) -> str:
-    """Complete a text up to the next dot, bracket or slash that all matching entries of ``known`` share.
+def complete(text: str, candidates: Sequence[str]) -> str:
+    """Complete a text up to the next dot, bracket or slash that all matching entries of ``candidates`` share.
 
     Returns ``text`` unchanged if no entry starts with it.
     """
-    fitting = [each for each in known if each.startswith(text)]
-    if not fitting:
+    matching = [candidate for candidate in candidates if candidate.startswith(text)]
+    if not matching:
         return text
-    common = fitting[0]
-    for each in fitting[1:]:
-        while not each.startswith(common):
+    common = matching[0]
+    for candidate in matching[1:]:
+        while not candidate.startswith(common):
             common = common[:-1]
-    ends = [place for place in range(len(text) + 1, len(common)) if common[place] in ".[/"]
-    return common[: ends[0] + 1] if ends else common
+    boundaries = [index for index in range(len(text) + 1, len(common)) if common[index] in ".[/"]
+    return common[: boundaries[0] + 1] if boundaries else common
 
 
 def nearest_field(path: FieldPath, payload: object) -> str | None:

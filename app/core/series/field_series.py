@@ -75,8 +75,8 @@ class FieldSeries:
                 if has_states:
                     self.states.add(time_s, None)
             elif kind is str or kind is bool:
-                word = value if kind is str else "true" if value else "false"
-                self.states.add(time_s, str(word), gap=state_gap)
+                state = value if kind is str else "true" if value else "false"
+                self.states.add(time_s, str(state), gap=state_gap)
                 number_gap, state_gap, has_states = True, False, True
             else:
                 self.missing += 1
@@ -137,7 +137,7 @@ class TopicSeries:
     def process(self, batch: Batch, now_ns: int) -> None:
         """Add the messages received since the last tick."""
         # publishers, because dropped messages also appear as jumps of their sequence numbers
-        seen: set[int | None] = set()
+        seen_publishers: set[int | None] = set()
         lost = first_jumps = 0
         times: list[float] = []
         payloads: list[object] = []
@@ -145,8 +145,8 @@ class TopicSeries:
         pending = self._gap or batch.dropped > 0
         for message in batch.messages:
             jump, publisher = self._missing_count(message), message.publisher
-            if publisher not in seen:
-                seen.add(publisher)
+            if publisher not in seen_publishers:
+                seen_publishers.add(publisher)
                 first_jumps += jump
             elif jump:
                 lost += jump
@@ -194,8 +194,8 @@ class TopicSeries:
             stamp_ns = now_ns
         if not 0 <= stamp_ns < MAX_STAMP_NS:
             return None
-        known = message.kind.clock.difference
-        return (stamp_ns + (0 if known is None else known.offset_ns) - self._origin_ns) / 1e9
+        difference = message.kind.clock.difference
+        return (stamp_ns + (0 if difference is None else difference.offset_ns) - self._origin_ns) / 1e9
 
     def _read(self, message: Message) -> object:
         if message.size_bytes > LARGE_BYTES or message.codec == "image":

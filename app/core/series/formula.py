@@ -137,18 +137,18 @@ def parse(text: str, topics: Sequence[str]) -> Source:
     text = text.strip()
     if not text or len(text) > MAX_LENGTH:
         raise CurveError(_("enter a field, such as /odom.speed, or a formula with fields"))
-    found = parse_field(text, topics)
-    return found if found is not None else _Parser(text, topics).read()
+    field_source = parse_field(text, topics)
+    return field_source if field_source is not None else _Parser(text, topics).read()
 
 
 def _topic_at(text: str, topics: Sequence[str]) -> str | None:
     # Longest topic at the start of the text.
-    fitting = [name for name in topics if text.startswith(name) and _ends_at(text, len(name))]
-    return max(fitting, key=len, default=None)
+    matching = [name for name in topics if text.startswith(name) and _ends_at(text, len(name))]
+    return max(matching, key=len, default=None)
 
 
-def _ends_at(text: str, place: int) -> bool:
-    return place == len(text) or not (text[place].isalnum() or text[place] in "_/")
+def _ends_at(text: str, position: int) -> bool:
+    return position == len(text) or not (text[position].isalnum() or text[position] in "_/")
 
 
 class _Parser:
@@ -174,30 +174,30 @@ class _Parser:
     def _to_python(self) -> str:
         # As Python source: a name for each field, seconds for each duration.
         out: list[str] = []
-        place, wants_value = 0, True
-        while place < len(self._text):
-            letter = self._text[place]
-            if wants_value and (letter == "/" or _topic_at(self._text[place:], self._topics)):
-                end = self._parse_field(place)
+        position, wants_value = 0, True
+        while position < len(self._text):
+            letter = self._text[position]
+            if wants_value and (letter == "/" or _topic_at(self._text[position:], self._topics)):
+                end = self._parse_field(position)
                 out.append(f"_{len(self._fields) - 1}")
-                place, wants_value = end, False
+                position, wants_value = end, False
                 continue
-            duration = _DURATION_PATTERN.match(self._text, place) if wants_value else None
+            duration = _DURATION_PATTERN.match(self._text, position) if wants_value else None
             if duration is not None:
                 out.append(repr(float(duration[1]) * _UNIT_SECONDS[duration[2]]))
-                place, wants_value = duration.end(), False
+                position, wants_value = duration.end(), False
                 continue
             if letter == "_" and wants_value:
                 raise CurveError(_("'{text}' isn't a valid formula").format(text=self._text[:80]))
             out.append("**" if letter == "^" else letter)
             if not letter.isspace():
                 wants_value = letter in "(,+-*/%^"
-            place += 1
+            position += 1
         return "".join(out)
 
-    def _parse_field(self, place: int) -> int:
+    def _parse_field(self, position: int) -> int:
         # Adds the field at this position; returns its end.
-        rest = self._text[place:]
+        rest = self._text[position:]
         topic = _topic_at(rest, self._topics)
         if topic is None:
             unknown = _UNKNOWN_TOPIC_PATTERN.match(rest)
@@ -205,11 +205,11 @@ class _Parser:
         path = _FIELD_PATTERN.match(rest, len(topic))
         if path is None:
             raise CurveError(_("the field after {topic} is missing").format(topic=topic))
-        found = FieldSource(topic, FieldPath.parse(path[0].removeprefix(".")))
-        if found.path.has_wildcard:
+        field_source = FieldSource(topic, FieldPath.parse(path[0].removeprefix(".")))
+        if field_source.path.has_wildcard:
             raise CurveError(_("a formula can't use [*]; choose one element, such as [0]"))
-        self._fields.append(found)
-        return place + path.end()
+        self._fields.append(field_source)
+        return position + path.end()
 
     def _parse_source(self, node: ast.expr) -> Source | None:
         # None for a number.
@@ -226,14 +226,14 @@ class _Parser:
         return ExpressionSource(self._source_text(node), tuple(inputs), calculate) if inputs else None
 
     def _parse_window(self, node: ast.Call, kind: str) -> WindowSource:
-        wanted = 2 if kind == "mean" else 1
-        if len(node.args) != wanted or node.keywords:
+        arg_count = 2 if kind == "mean" else 1
+        if len(node.args) != arg_count or node.keywords:
             example = "mean(/odom.speed, 2 s)" if kind == "mean" else f"{kind}(/odom.speed)"
             raise CurveError(
                 _("wrong arguments for {name}; use {example}").format(name=kind, example=example)
             )
-        of = self._parse_source(node.args[0])
-        if of is None:
+        source = self._parse_source(node.args[0])
+        if source is None:
             raise CurveError(_("the formula has no field, so its value never changes"))
         window_s = 0.0
         if kind == "mean":
@@ -242,7 +242,7 @@ class _Parser:
                 window_s = float(window.value)  # type: ignore[arg-type]
             if not 0 < window_s <= MAX_WINDOW_S:
                 raise CurveError(_("the duration of a mean must be greater than 0 and at most 600 s"))
-        return WindowSource(next(each for each in WINDOW_FUNCTIONS if each == kind), of, window_s)
+        return WindowSource(next(each for each in WINDOW_FUNCTIONS if each == kind), source, window_s)
 
     def _parse_calculation(self, node: ast.expr, inputs: list[Source]) -> Calculation:
         # Adds the needed sources to `inputs`.
@@ -250,8 +250,8 @@ class _Parser:
             number = _constant(node.value)
             return lambda _arrays: number
         if isinstance(node, ast.Name) and node.id in CONSTANTS:
-            known = np.float64(CONSTANTS[node.id])
-            return lambda _arrays: known  # type: ignore[return-value]
+            constant = np.float64(CONSTANTS[node.id])
+            return lambda _arrays: constant  # type: ignore[return-value]
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
             inner = self._parse_calculation(node.operand, inputs)
             sign = -1.0 if isinstance(node.op, ast.USub) else 1.0
@@ -270,23 +270,23 @@ class _Parser:
         raise CurveError(_("'{text}' can't be evaluated").format(text=self._source_text(node)[:80]))
 
     def _parse_call(self, node: ast.Call, name: str, inputs: list[Source]) -> Calculation:
-        wanted, function = FUNCTIONS[name]
-        if len(node.args) != wanted or node.keywords:
-            raise CurveError(_("{name} needs {count} numbers").format(name=name, count=wanted))
-        given = [self._parse_calculation(each, inputs) for each in node.args]
-        return lambda arrays: function(*(each(arrays) for each in given))
+        arg_count, function = FUNCTIONS[name]
+        if len(node.args) != arg_count or node.keywords:
+            raise CurveError(_("{name} needs {count} numbers").format(name=name, count=arg_count))
+        arguments = [self._parse_calculation(each, inputs) for each in node.args]
+        return lambda arrays: function(*(each(arrays) for each in arguments))
 
     def _parse_input(self, node: ast.Name | ast.Call, inputs: list[Source]) -> Calculation:
         # A field, or a function that needs more than the samples of one time.
-        called = node.func if isinstance(node, ast.Call) else node
-        name = called.id if isinstance(called, ast.Name) else self._source_text(called)
+        function_node = node.func if isinstance(node, ast.Call) else node
+        name = function_node.id if isinstance(function_node, ast.Name) else self._source_text(function_node)
         is_field = isinstance(node, ast.Name) and re.fullmatch(r"_\d+", name)
         if not is_field and not (isinstance(node, ast.Call) and name in WINDOW_FUNCTIONS):
-            near = nearest(name, [*FUNCTIONS, *WINDOW_FUNCTIONS])
+            suggestion = nearest(name, [*FUNCTIONS, *WINDOW_FUNCTIONS])
             template = _("'{name}' doesn't exist; {hint}")
             hint = (
-                _("did you mean '{near}'?").format(near=near)
-                if near
+                _("did you mean '{near}'?").format(near=suggestion)
+                if suggestion
                 else _("topics begin with a slash, such as /odom.speed")
             )
             raise CurveError(template.format(name=name[:40], hint=hint))
@@ -294,8 +294,8 @@ class _Parser:
         assert source is not None  # noqa: S101  a field, or a function of one
         if source not in inputs:
             inputs.append(source)
-        place = inputs.index(source)
-        return lambda arrays: arrays[place]
+        index = inputs.index(source)
+        return lambda arrays: arrays[index]
 
     def _source_text(self, node: ast.expr) -> str:
         written = ast.unparse(node).replace("**", "^")
@@ -311,7 +311,9 @@ def _constant(value: object) -> Floats:
 
 def unknown_topic_error(name: str, topics: Sequence[str]) -> CurveError:
     """Return an error for an unknown topic, which suggests the existing topic with the most similar name."""
-    near = nearest(name, list(topics))
-    if near is None:
+    suggestion = nearest(name, list(topics))
+    if suggestion is None:
         return CurveError(_("topic {topic} doesn't exist").format(topic=name))
-    return CurveError(_("topic {topic} doesn't exist; did you mean {near}?").format(topic=name, near=near))
+    return CurveError(
+        _("topic {topic} doesn't exist; did you mean {near}?").format(topic=name, near=suggestion)
+    )

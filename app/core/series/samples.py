@@ -68,27 +68,27 @@ class _Level:
         self.low, self.high, self.total = np.empty(0), np.empty(0), np.empty(0)
 
     def build(self, values: Floats, count: int) -> None:
-        whole = count >> self.shift
-        if whole <= self.built:
+        bucket_count = count >> self.shift
+        if bucket_count <= self.built:
             return
-        if whole > len(self.low):
-            room = max(whole, 2 * len(self.low), 64)
+        if bucket_count > len(self.low):
+            room = max(bucket_count, 2 * len(self.low), 64)
             self.low, self.high, self.total = (
                 np.concatenate([each, np.empty(room - len(each))])
                 for each in (self.low, self.high, self.total)
             )
-        part = values[self.built << self.shift : whole << self.shift].reshape(-1, 1 << self.shift)
-        new = slice(self.built, whole)
+        part = values[self.built << self.shift : bucket_count << self.shift].reshape(-1, 1 << self.shift)
+        new = slice(self.built, bucket_count)
         self.low[new], self.high[new] = part.min(axis=1), part.max(axis=1)
         with np.errstate(over="ignore", invalid="ignore"):
             self.total[new] = part.sum(axis=1)
-        self.built = whole
+        self.built = bucket_count
 
     def discard(self, buckets: int) -> None:
-        kept = max(0, self.built - buckets)
-        for each in (self.low, self.high, self.total):
-            each[:kept] = each[buckets : buckets + kept].copy()
-        self.built = kept
+        remaining = max(0, self.built - buckets)
+        for array in (self.low, self.high, self.total):
+            array[:remaining] = array[buckets : buckets + remaining].copy()
+        self.built = remaining
 
 
 @dataclass(slots=True)
@@ -209,14 +209,14 @@ class Samples:
             values: Values.
             gaps: True for each sample that follows a gap.
         """
-        good = np.isfinite(times) & np.isfinite(values)
-        if not good.all():
-            gaps = _carry_gaps(gaps, good)
-            if not good.any():
+        finite = np.isfinite(times) & np.isfinite(values)
+        if not finite.all():
+            gaps = _carry_gaps(gaps, finite)
+            if not finite.any():
                 self._gap_pending = self._gap_pending or self._count > 0
                 return
-            trailing = not good[-1]
-            times, values, gaps = times[good], values[good], gaps[good]
+            trailing = not finite[-1]
+            times, values, gaps = times[finite], values[finite], gaps[finite]
         else:
             trailing = False
         if len(times) == 0:
@@ -251,37 +251,37 @@ class Samples:
 
     def _add_sample(self, time_s: float, value: float, *, gap: bool) -> None:
         last = self.last_s
-        one = np.array([time_s]), np.array([value]), np.array([gap])
+        sample = np.array([time_s]), np.array([value]), np.array([gap])
         if last is None or time_s >= last:
-            self._append(*one)
+            self._append(*sample)
         elif last - time_s > MAX_LATENESS_S:
             self.truncate(time_s)
             self.break_line()
-            self._append(*one)
+            self._append(*sample)
         else:
             self._insert(time_s, value)
 
     def _insert(self, time_s: float, value: float) -> None:
-        place = int(np.searchsorted(self.times, time_s, side="right"))
+        index = int(np.searchsorted(self.times, time_s, side="right"))
         self._reserve(1)
-        for each in (self._times, self._values, self._gaps):
-            each[place + 1 : self._count + 1] = each[place : self._count].copy()
-        self._times[place], self._values[place] = time_s, value
-        self._gaps[place] = self._gaps[place + 1]
-        self._gaps[place + 1] = False
+        for array in (self._times, self._values, self._gaps):
+            array[index + 1 : self._count + 1] = array[index : self._count].copy()
+        self._times[index], self._values[index] = time_s, value
+        self._gaps[index] = self._gaps[index + 1]
+        self._gaps[index + 1] = False
         self._count += 1
-        self._record_rewrite(place, time_s)
+        self._record_rewrite(index, time_s)
 
     def truncate(self, time_s: float) -> None:
         """Remove the samples at and after a time.
 
         Used when the clock was set back, or when a recording continues at that time.
         """
-        place = int(np.searchsorted(self.times, time_s, side="left"))
-        if place < self._count:
-            self.undone += self._count - place
-            self._count = place
-            self._record_rewrite(place, time_s)
+        index = int(np.searchsorted(self.times, time_s, side="left"))
+        if index < self._count:
+            self.undone += self._count - index
+            self._count = index
+            self._record_rewrite(index, time_s)
         self._gap_pending = self._gap_pending and self._count > 0
 
     def clear(self) -> None:
@@ -289,25 +289,25 @@ class Samples:
         self.truncate(-np.inf)
         self.begun = self.undone = 0
 
-    def _record_rewrite(self, place: int, time_s: float) -> None:
+    def _record_rewrite(self, index: int, time_s: float) -> None:
         for level in self._levels:
-            level.built = min(level.built, place >> level.shift)
+            level.built = min(level.built, index >> level.shift)
         self.rewritten += 1
         self._rewrites.append((self.rewritten, time_s))
 
-    def earliest_change_s(self, seen: int) -> float | None:
+    def earliest_change_s(self, revision: int) -> float | None:
         """Return the earliest time at which samples were changed, other than by appending.
 
         Returns None if there was no such change.
 
         Args:
-            seen: Value of ``rewritten`` up to which the caller knows the changes.
+            revision: Value of ``rewritten`` up to which the caller knows the changes.
         """
-        if seen == self.rewritten:
+        if revision == self.rewritten:
             return None
-        if not self._rewrites or self._rewrites[0][0] > seen + 1:
+        if not self._rewrites or self._rewrites[0][0] > revision + 1:
             return -np.inf
-        return min(time_s for number, time_s in self._rewrites if number > seen)
+        return min(time_s for number, time_s in self._rewrites if number > revision)
 
     def _reserve(self, more: int) -> None:
         need = self._count + more
@@ -334,14 +334,14 @@ class Samples:
         )
         if drop <= 0:
             return
-        kept = self._count - drop
+        remaining = self._count - drop
         for level in self._levels:
             level.build(self.values, self._count)
-        for each in (self._times, self._values, self._gaps):
-            each[:kept] = each[drop : self._count].copy()
+        for array in (self._times, self._values, self._gaps):
+            array[:remaining] = array[drop : self._count].copy()
         for level in self._levels:
             level.discard(drop >> level.shift)
-        self._count, self.begun = kept, self.begun + drop
+        self._count, self.begun = remaining, self.begun + drop
         self._shrink_arrays()
 
     # -- queries -----------------------------------------------------------------------------------
@@ -356,12 +356,12 @@ class Samples:
 
         Returns None before the first sample and in a gap.
         """
-        place = int(np.searchsorted(self.times, time_s, side="right")) - 1
-        if place < 0:
+        index = int(np.searchsorted(self.times, time_s, side="right")) - 1
+        if index < 0:
             return None
-        if place + 1 < self._count and self._gaps[place + 1] and self._times[place] < time_s:
+        if index + 1 < self._count and self._gaps[index + 1] and self._times[index] < time_s:
             return None
-        return float(self._times[place]), float(self._values[place])
+        return float(self._times[index]), float(self._values[index])
 
     def time_at_step(self, time_s: float, steps: int) -> float | None:
         """Return the time of the sample that is ``steps`` samples after a time, or before it if negative.
@@ -369,10 +369,10 @@ class Samples:
         Returns None if there is no such sample.
         """
         if steps > 0:
-            place = int(np.searchsorted(self.times, time_s, side="right")) + steps - 1
+            index = int(np.searchsorted(self.times, time_s, side="right")) + steps - 1
         else:
-            place = int(np.searchsorted(self.times, time_s, side="left")) + steps
-        return float(self._times[place]) if 0 <= place < self._count else None
+            index = int(np.searchsorted(self.times, time_s, side="left")) + steps
+        return float(self._times[index]) if 0 <= index < self._count else None
 
     def stats(self, begin_s: float, end_s: float) -> RangeStats:
         """Return the statistics of the samples in a time range."""
@@ -413,10 +413,10 @@ class Samples:
         until = np.minimum(times[alone] + pixel_s, np.append(times[1:], np.inf)[alone])
         broken = np.flatnonzero(gaps)
         broken = broken[broken > 0]
-        places = np.concatenate([alone + 1, broken])
+        indexes = np.concatenate([alone + 1, broken])
         return (
-            np.insert(times, places, np.concatenate([until, times[broken]])),
-            np.insert(values, places, np.concatenate([values[alone], np.full(len(broken), np.nan)])),
+            np.insert(times, indexes, np.concatenate([until, times[broken]])),
+            np.insert(values, indexes, np.concatenate([values[alone], np.full(len(broken), np.nan)])),
         )
 
     def _peak_line(self, begin_s: float, end_s: float, columns: int, part: tuple[int, int]) -> Polyline:
@@ -425,17 +425,17 @@ class Samples:
             width = float(np.float32(width))
         begin = float(np.floor(begin_s / width))
         first, end = begin - 1, begin + columns + 1  # one more pixel, so that the line reaches the edge
-        known = self._valid_pixels(width).part(first, end - 1)
-        if len(known.keys) and known.keys[0] == first:
-            pixels = _Pixels.join((known, self._pixels(width, (known.end, end), None, part[1])))
+        cached = self._valid_pixels(width).part(first, end - 1)
+        if len(cached.keys) and cached.keys[0] == first:
+            pixels = _Pixels.join((cached, self._pixels(width, (cached.end, end), None, part[1])))
         else:
-            place, inside = np.searchsorted(self.times, (width * first, width * begin))
-            alone = bool(place == inside)  # then the sample before the range is used instead
-            pixels = self._pixels(width, (first, end), max(0, int(place) - alone), part[1])
+            previous_index, first_index = np.searchsorted(self.times, (width * first, width * begin))
+            alone = bool(previous_index == first_index)  # then the sample before the range is used instead
+            pixels = self._pixels(width, (first, end), max(0, int(previous_index) - alone), part[1])
             first += alone
         sure = float(np.floor(self._times[self._count - 1] / width)) - 1  # later pixels may get more samples
-        kept = pixels.part(first, max(first, min(sure, end - 1)))
-        self._render_cache = _PixelCache(width, self.rewritten, self.begun, kept)
+        cacheable = pixels.part(first, max(first, min(sure, end - 1)))
+        self._render_cache = _PixelCache(width, self.rewritten, self.begun, cacheable)
         times, values = pixels.times, pixels.values
         broken = 2 * np.flatnonzero(pixels.gaps)
         broken = broken[broken > 0]
@@ -460,21 +460,21 @@ class Samples:
         # The last pixel includes all samples before `last`. `first` is the index of the first sample; None:
         # at the edge of the first pixel.
         edges = width * (keys[0] + np.arange(round(keys[1] - keys[0]) + 1))
-        places = np.searchsorted(self._times[:last], edges)
+        indexes = np.searchsorted(self._times[:last], edges)
         if first is not None:
-            places[0] = first
-        places[-1] = last
-        there = np.flatnonzero(places[1:] > places[:-1])
-        if not len(there):
+            indexes[0] = first
+        indexes[-1] = last
+        non_empty = np.flatnonzero(indexes[1:] > indexes[:-1])
+        if not len(non_empty):
             return _Pixels(*keys)
-        starts, ends = places[there], places[there + 1]
+        starts, ends = indexes[non_empty], indexes[non_empty + 1]
         low, high = self._min_and_max(starts, ends)
-        times, values = np.repeat(edges[there] + width / 2, 2), np.empty(2 * len(there))
+        times, values = np.repeat(edges[non_empty] + width / 2, 2), np.empty(2 * len(non_empty))
         rising = self._values[ends - 1] < self._values[starts]  # closer to the actual shape of the line
         values[0::2], values[1::2] = np.where(rising, high, low), np.where(rising, low, high)
         # otherwise a sample between two gaps would be invisible
         times[1::2] += np.where(low == high, width / 2, 0.0)
-        return _Pixels(*keys, keys[0] + there.astype(np.float64), times, values, self._gaps[starts])
+        return _Pixels(*keys, keys[0] + non_empty.astype(np.float64), times, values, self._gaps[starts])
 
     def _min_and_max(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats]:
         # Of each index range; none is empty.
@@ -487,18 +487,18 @@ class Samples:
     def _reduce_ranges(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats, Floats]:
         # Minimum, maximum and sum of each index range; none is empty. Exact: partial buckets use the samples.
         mean_count = float(np.mean(ends - starts))
-        fitting = [level for level in self._levels if 4**level.shift <= mean_count * 4]
-        if not fitting:
+        levels = [level for level in self._levels if 4**level.shift <= mean_count * 4]
+        if not levels:
             return _reduce(self._values, self._values, self._values, starts, ends)
-        level = fitting[-1]
+        level = levels[-1]
         level.build(self._values, self._count)
         firsts = -(-starts >> level.shift)
         lasts = np.maximum(firsts, np.minimum(ends >> level.shift, level.built))
-        inside = lasts > firsts
-        heads = np.where(inside, firsts << level.shift, ends)
-        low, high, total = _reduce(self._values, self._values, self._values, starts, heads)
-        tails = np.where(inside, lasts << level.shift, ends)
-        more = _reduce(level.low, level.high, level.total, firsts, np.where(inside, lasts, firsts))
+        has_buckets = lasts > firsts
+        head_ends = np.where(has_buckets, firsts << level.shift, ends)
+        low, high, total = _reduce(self._values, self._values, self._values, starts, head_ends)
+        tails = np.where(has_buckets, lasts << level.shift, ends)
+        more = _reduce(level.low, level.high, level.total, firsts, np.where(has_buckets, lasts, firsts))
         rest = _reduce(self._values, self._values, self._values, tails, ends)
         with np.errstate(over="ignore", invalid="ignore"):
             total = total + more[2] + rest[2]
@@ -512,28 +512,28 @@ def _reduce(
     # As `Samples._reduce_ranges`, but ranges may be empty: minimum inf, maximum -inf, sum 0.
     low, high = np.full(len(starts), np.inf), np.full(len(starts), -np.inf)
     total = np.zeros(len(starts))
-    there = ends > starts
-    if there.any():
-        lengths = (ends - starts)[there]
+    non_empty = ends > starts
+    if non_empty.any():
+        lengths = (ends - starts)[non_empty]
         offsets = np.concatenate([[0], np.cumsum(lengths)])
-        gather = np.arange(offsets[-1]) + np.repeat(starts[there] - offsets[:-1], lengths)
-        low[there] = np.minimum.reduceat(lows[gather], offsets[:-1])
-        high[there] = np.maximum.reduceat(highs[gather], offsets[:-1])
+        gather = np.arange(offsets[-1]) + np.repeat(starts[non_empty] - offsets[:-1], lengths)
+        low[non_empty] = np.minimum.reduceat(lows[gather], offsets[:-1])
+        high[non_empty] = np.maximum.reduceat(highs[gather], offsets[:-1])
         with np.errstate(over="ignore", invalid="ignore"):
-            total[there] = np.add.reduceat(totals[gather], offsets[:-1])
+            total[non_empty] = np.add.reduceat(totals[gather], offsets[:-1])
     return low, high, total
 
 
-def _carry_gaps(gaps: NDArray[np.bool_], good: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _carry_gaps(gaps: NDArray[np.bool_], finite: NDArray[np.bool_]) -> NDArray[np.bool_]:
     # Moves the gaps of skipped samples to the next one.
-    bad_before = np.concatenate([[False], ~good[:-1]])
+    bad_before = np.concatenate([[False], ~finite[:-1]])
     carried = gaps.copy()
     pending = False
-    for place in np.flatnonzero(~good | bad_before | gaps).tolist():
-        pending = pending or bool(gaps[place])
-        if not good[place]:
+    for index in np.flatnonzero(~finite | bad_before | gaps).tolist():
+        pending = pending or bool(gaps[index])
+        if not finite[index]:
             pending = True
         else:
-            carried[place] = pending or bool(bad_before[place])
+            carried[index] = pending or bool(bad_before[index])
             pending = False
     return carried

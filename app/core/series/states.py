@@ -39,14 +39,14 @@ class States:
     def __len__(self) -> int:
         return len(self._begins)
 
-    def add(self, time_s: float, word: str | None, *, gap: bool = False) -> None:
+    def add(self, time_s: float, value: str | None, *, gap: bool = False) -> None:
         """Add a value.
 
         Slightly late values are ignored; a very late value means that the clock was set back.
 
         Args:
             time_s: Time in seconds.
-            word: Value; None if the message has no value.
+            value: Value; None if the message has no value.
             gap: True if messages before this one are missing.
         """
         if self.last_s is not None and time_s < self.last_s:
@@ -54,16 +54,16 @@ class States:
                 return
             self._truncate(time_s)
             gap = True
-        word = word if word is None else word[:MAX_STATE_LENGTH]
+        value = value if value is None else value[:MAX_STATE_LENGTH]
         if gap and self._words and self._words[-1] is not None and self.last_s is not None:
             self._start_run(self.last_s, None)
-        if not self._words or self._words[-1] != word:
-            self._start_run(time_s, word)
+        if not self._words or self._words[-1] != value:
+            self._start_run(time_s, value)
         self.last_s = time_s
 
-    def _start_run(self, time_s: float, word: str | None) -> None:
+    def _start_run(self, time_s: float, value: str | None) -> None:
         self._begins.append(time_s)
-        self._words.append(word)
+        self._words.append(value)
         if len(self._begins) > self._limit:
             drop = len(self._begins) - self._limit * 3 // 4
             del self._begins[:drop], self._words[:drop]
@@ -77,9 +77,9 @@ class States:
         self.forgotten = self.undone = 0
 
     def _truncate(self, time_s: float) -> None:
-        place = bisect_left(self._begins, time_s)
-        self.undone += len(self._begins) - place
-        del self._begins[place:], self._words[place:]
+        index = bisect_left(self._begins, time_s)
+        self.undone += len(self._begins) - index
+        del self._begins[index:], self._words[index:]
         self.last_s = time_s if self._begins else None
 
     def runs(
@@ -93,46 +93,46 @@ class States:
             step_s: Time resolution; one run in each interval of this length is sufficient.
             without: Values to skip. If given, runs with unknown values are skipped too.
         """
-        place, end = self._index_range(begin_s, end_s)
-        while place < end:
-            at_s, word = self._begins[place], self._words[place]
-            if without is not None and (word is None or word in without):
-                place += 1
+        index, end = self._index_range(begin_s, end_s)
+        while index < end:
+            at_s, value = self._begins[index], self._words[index]
+            if without is not None and (value is None or value in without):
+                index += 1
                 continue
-            yield StateRun(at_s, self._end_of(place), word)
+            yield StateRun(at_s, self._end_of(index), value)
             # the last run that begins within the step may extend beyond it
-            place = max(place + 1, bisect_right(self._begins, at_s + step_s) - 1)
+            index = max(index + 1, bisect_right(self._begins, at_s + step_s) - 1)
 
     def values_in(self, begin_s: float, end_s: float) -> set[str]:
         """Return the distinct values in a time range."""
         first, end = self._index_range(begin_s, end_s)
-        return {word for word in set(self._words[first:end]) if word is not None}
+        return {value for value in set(self._words[first:end]) if value is not None}
 
     def _index_range(self, begin_s: float, end_s: float) -> tuple[int, int]:
         # Index range of the runs in a time range: first, and one behind the last.
         first = max(0, bisect_right(self._begins, begin_s) - 1)
         return first, bisect_right(self._begins, end_s)
 
-    def _end_of(self, place: int) -> float:
-        if place + 1 < len(self._begins):
-            return self._begins[place + 1]
-        return self._begins[place] if self.last_s is None else self.last_s
+    def _end_of(self, index: int) -> float:
+        if index + 1 < len(self._begins):
+            return self._begins[index + 1]
+        return self._begins[index] if self.last_s is None else self.last_s
 
     def at(self, time_s: float) -> str | None:
         """Return the value at a time; None if the value is unknown."""
-        place = bisect_right(self._begins, time_s) - 1
-        return self._words[place] if place >= 0 else None
+        index = bisect_right(self._begins, time_s) - 1
+        return self._words[index] if index >= 0 else None
 
     def change_count(self, begin_s: float, end_s: float) -> int:
         """Return the number of changes of the value in a time range."""
         first, end = self._index_range(begin_s, end_s)
-        words = [word for word in self._words[first:end] if word is not None]
-        return sum(one != other for one, other in pairwise(words))
+        values = [value for value in self._words[first:end] if value is not None]
+        return sum(previous != other for previous, other in pairwise(values))
 
-    def duration_s(self, word: str, begin_s: float, end_s: float) -> float:
-        """Return how long the field had the value ``word`` in a time range, in seconds."""
+    def duration_s(self, value: str, begin_s: float, end_s: float) -> float:
+        """Return how long the field had the value ``value`` in a time range, in seconds."""
         return sum(
-            max(0.0, min(self._end_of(place), end_s) - max(self._begins[place], begin_s))
-            for place in range(*self._index_range(begin_s, end_s))
-            if self._words[place] == word
+            max(0.0, min(self._end_of(index), end_s) - max(self._begins[index], begin_s))
+            for index in range(*self._index_range(begin_s, end_s))
+            if self._words[index] == value
         )

@@ -46,11 +46,11 @@ def read_regular_file(path: Path, most_bytes: int = MAX_BYTES) -> bytes:
     finally:
         os.close(handle)
     if about.st_size > most_bytes or len(data) > most_bytes:
-        size, most = max(about.st_size, len(data)) / 1e6, most_bytes / 1e6
+        size, limit_mb = max(about.st_size, len(data)) / 1e6, most_bytes / 1e6
         raise OSError(
             errno.EFBIG,
             _("the file is {size} MB; the limit is {most} MB").format(
-                size=number(size, ".1f"), most=number(most, ".0f")
+                size=number(size, ".1f"), most=number(limit_mb, ".0f")
             ),
             str(path),
         )
@@ -148,9 +148,9 @@ def _copy_mode(old: Path, new: Path) -> None:
     new.chmod(mode)
 
 
-def _default_mode(beside: Path) -> int:
+def _default_mode(sibling: Path) -> int:
     # Determined by creating a file: reading the umask would change it for all threads.
-    probe = beside.with_name(f"{beside.stem}.mode.part")  # removed with the others after a crash
+    probe = sibling.with_name(f"{sibling.stem}.mode.part")  # removed with the others after a crash
     os.close(os.open(probe, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     try:
         return stat.S_IMODE(probe.stat().st_mode)

@@ -48,9 +48,9 @@ def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> s
         return run_deep(lambda: json.dumps(value, ensure_ascii=ascii))
 
 
-def are_equal(one: object, other: object) -> bool:
+def are_equal(value: object, other: object) -> bool:
     """Return True if two values are equal. Supports deep nesting."""
-    return run_deep(lambda: one == other)
+    return run_deep(lambda: value == other)
 
 
 def start_deep(thread: threading.Thread) -> None:
@@ -63,14 +63,14 @@ def start_deep(thread: threading.Thread) -> None:
             threading.stack_size(size)
 
 
-def run_deep(work: Callable[[], T]) -> T:
-    """Call ``work`` and return its result.
+def run_deep(function: Callable[[], T]) -> T:
+    """Call ``function`` and return its result.
 
-    After a RecursionError, call it again in a thread with a larger stack. ``work`` must not have side
+    After a RecursionError, call it again in a thread with a larger stack. ``function`` must not have side
     effects, because it may be called twice.
     """
     try:
-        return work()
+        return function()
     except RecursionError:
         pass
     results: list[T] = []
@@ -78,7 +78,7 @@ def run_deep(work: Callable[[], T]) -> T:
 
     def run() -> None:
         try:
-            results.append(work())
+            results.append(function())
         except (ValueError, RecursionError) as error:
             failed.append(error)
 

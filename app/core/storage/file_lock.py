@@ -129,9 +129,9 @@ def locked(path: Path, within_s: float = 1.0) -> Iterator[bool]:
         yield False
         return
     with file:
-        held = _acquire(file, until)
+        is_locked = _acquire(file, until)
         try:
-            yield held
+            yield is_locked
         finally:
-            if held:
+            if is_locked:
                 _unlock(file)

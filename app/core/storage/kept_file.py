@@ -63,10 +63,10 @@ def read_stored(
 
 def _save_damaged(path: Path, reason: str, data: bytes | None = None) -> str:
     # With `data`, a copy is stored next to the file, whose readable part is used.
-    beside = path.with_name(f"{path.stem}.damaged{path.suffix}")
+    backup = path.with_name(f"{path.stem}.damaged{path.suffix}")
     with suppress(OSError):
         if data is None:
-            replace_file(path, beside)
+            replace_file(path, backup)
         else:
-            write_atomically(beside, data, durable=False, private=True)
-    return _("The file was saved as “{file}”: {reason}.").format(file=beside.name, reason=reason)
+            write_atomically(backup, data, durable=False, private=True)
+    return _("The file was saved as “{file}”: {reason}.").format(file=backup.name, reason=reason)

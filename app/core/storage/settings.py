@@ -36,8 +36,10 @@ T = TypeVar("T")
 
 def home() -> Path:
     """Return Studio's folder: ``$NEP_STUDIO_HOME``, else the system's configuration folder."""
-    chosen = os.environ.get("NEP_STUDIO_HOME")
-    return Path(chosen) if chosen else Path(platformdirs.user_config_dir("nep-studio", appauthor=False))
+    configured = os.environ.get("NEP_STUDIO_HOME")
+    return (
+        Path(configured) if configured else Path(platformdirs.user_config_dir("nep-studio", appauthor=False))
+    )
 
 
 def _is_file(path: Path) -> bool:
@@ -50,14 +52,16 @@ def _is_file(path: Path) -> bool:
 
 def data_home() -> Path:
     """Return the folder for large data: ``$NEP_STUDIO_HOME``, else the system's data folder."""
-    chosen = os.environ.get("NEP_STUDIO_HOME")
-    return Path(chosen) if chosen else Path(platformdirs.user_data_dir("nep-studio", appauthor=False))
+    configured = os.environ.get("NEP_STUDIO_HOME")
+    return Path(configured) if configured else Path(platformdirs.user_data_dir("nep-studio", appauthor=False))
 
 
 def state_home() -> Path:
     """Return the folder for runtime state: ``$NEP_STUDIO_HOME``, else the system's state folder."""
-    chosen = os.environ.get("NEP_STUDIO_HOME")
-    return Path(chosen) if chosen else Path(platformdirs.user_state_dir("nep-studio", appauthor=False))
+    configured = os.environ.get("NEP_STUDIO_HOME")
+    return (
+        Path(configured) if configured else Path(platformdirs.user_state_dir("nep-studio", appauthor=False))
+    )
 
 
 def closed_tabs_folder() -> Path:
@@ -73,12 +77,12 @@ def saved_language(folder: Path | None = None) -> str:
     Args:
         folder: Folder of the settings; default: `home`.
     """
-    place = folder if folder is not None else home()
-    values = _read_values(place / "settings.json")
+    settings_folder = folder if folder is not None else home()
+    values = _read_values(settings_folder / "settings.json")
     if _format_version(values) > FORMAT_VERSION:
-        values = _read_values(place / _OWN_FILE_NAME) or values
-    chosen = values.get("language")
-    return chosen if isinstance(chosen, str) else ""
+        values = _read_values(settings_folder / _OWN_FILE_NAME) or values
+    language = values.get("language")
+    return language if isinstance(language, str) else ""
 
 
 def _read_values(path: Path) -> dict[str, object]:
@@ -181,7 +185,7 @@ class Settings:
     @property
     def all_recent_files(self) -> list[RecentFile]:
         """Recent files, newest first, including files that are missing."""
-        found = []
+        recent_files = []
         entries: list[object] = self.get("recent", [])
         for entry in entries:
             if isinstance(entry, Mapping) and isinstance(entry.get("path"), str):
@@ -190,8 +194,8 @@ class Settings:
                 opened_s = float(when) if is_time else 0.0
                 if not isinstance(name, str) or path.parent != closed_tabs_folder():
                     name = path.stem
-                found.append(RecentFile(path, name, opened_s, _is_file(path)))
-        return found
+                recent_files.append(RecentFile(path, name, opened_s, _is_file(path)))
+        return recent_files
 
     def add_recent(self, path: Path, name: str | None = None) -> None:
         """Add a file at the top of the recent files, or move it there. Raises SettingsError.
@@ -202,16 +206,16 @@ class Settings:
         """
         path = path.resolve()
         self._values = self._merged_values()
-        kept = [file for file in self.all_recent_files if file.path != path]
-        self.set_recent([RecentFile(path, name or path.stem, self._clock()), *kept])
+        others = [file for file in self.all_recent_files if file.path != path]
+        self.set_recent([RecentFile(path, name or path.stem, self._clock()), *others])
 
     def rename_recent(self, old: Path, new: Path) -> None:
         """Rename a recent file without changing its position. Raises SettingsError."""
         old, new = old.resolve(), new.resolve()
         self._values = self._merged_values()
-        kept = [file for file in self.all_recent_files if file.path != new]
-        named = [replace(file, path=new, name=new.stem) if file.path == old else file for file in kept]
-        self.set_recent(named)
+        others = [file for file in self.all_recent_files if file.path != new]
+        renamed = [replace(file, path=new, name=new.stem) if file.path == old else file for file in others]
+        self.set_recent(renamed)
 
     def set_recent(self, files: Sequence[RecentFile]) -> None:
         """Set the list of recent files, newest first. Raises SettingsError."""
@@ -249,14 +253,14 @@ class Settings:
 
     def _switch_to_own_file(self, newer: dict[str, object]) -> dict[str, object]:
         # The file of a newer Studio stays unchanged; a file of this version is used in addition.
-        found = self.path.name
+        newer_name = self.path.name
         self.path = self._own_path()
         if self.path.exists():
             return self._read()
         self.notice = _(
             "The settings in “{file}” belong to a newer NEP Studio (format {format}) and are "
             "unchanged. Settings you change here are saved separately."
-        ).format(file=found, format=_format_version(newer))
+        ).format(file=newer_name, format=_format_version(newer))
         return {name: value for name, value in newer.items() if name != "format"}
 
     def _merged_values(self) -> dict[str, object]:
@@ -302,5 +306,5 @@ class Settings:
 
 def _format_version(values: Mapping[str, object]) -> int:
     # 1 for settings from before there were versions.
-    found = values.get("format", 1)
-    return found if isinstance(found, int) and not isinstance(found, bool) else 1
+    version = values.get("format", 1)
+    return version if isinstance(version, int) and not isinstance(version, bool) else 1

@@ -77,10 +77,10 @@ def parse_announcement(message: Message) -> Robot:
     """
     size = len(message.data)
     if size > MAX_BYTES:
-        said = _("it is {size} MB in size; the limit is {limit} MB").format(
+        problem = _("it is {size} MB in size; the limit is {limit} MB").format(
             size=number(size / 1000000.0, ".1f"), limit=number(MAX_BYTES / 1000000.0, ".0f")
         )
-        raise DescriptionError(message.topic, (said,))
+        raise DescriptionError(message.topic, (problem,))
     payload = message.payload
     if not isinstance(payload, Mapping):
         raise DescriptionError(message.topic, (_("a description must be a JSON object"),))
@@ -113,12 +113,12 @@ def thing_description(model: Mapping[str, object], name: str) -> dict[str, objec
     described = copy.deepcopy(dict(model))
     kind = object_member(described, "rb:robot")
     topics = default_topics(name, virtual=kind.get("virtual") is True)
-    kept = {
+    document = {
         key: value
         for key, value in described.items()
         if key not in {"titles", "actions", "properties", "events"}
     }
-    kept |= {
+    document |= {
         "@type": ["rb:Robot"],
         "title": name,
         "id": f"urn:nep:robot:{_INVALID_TOPIC_CHARACTERS.sub('_', name)}",
@@ -128,23 +128,23 @@ def thing_description(model: Mapping[str, object], name: str) -> dict[str, objec
         "rb:robot": {**kind, "title": text(kind.get("title")) or str(model["title"])},
         "rb:topics": _topics_json(topics),
     }
-    asked = _form(topics.command, "invokeaction", "cancelaction") | {"rb:answer": f"nep:{topics.reply}"}
-    kept["properties"] = {
+    action_form = _form(topics.command, "invokeaction", "cancelaction") | {"rb:answer": f"nep:{topics.reply}"}
+    document["properties"] = {
         leaf: {**as_object(sensor), "forms": [_sensor_form(topic_of(name, leaf), as_object(sensor))]}
         for leaf, sensor in object_member(described, "properties").items()
     }
-    kept["actions"] = {
-        leaf: {**as_object(action), "forms": [dict(asked)]}
+    document["actions"] = {
+        leaf: {**as_object(action), "forms": [dict(action_form)]}
         for leaf, action in object_member(described, "actions").items()
     }
-    kept["events"] = {
+    document["events"] = {
         leaf: {
             **as_object(event),
             "forms": [_form(topic_of(name, leaf), "subscribeevent", "unsubscribeevent")],
         }
         for leaf, event in object_member(described, "events").items()
     }
-    return kept
+    return document
 
 
 def _topics_json(topics: RobotTopics) -> dict[str, str]:

@@ -102,11 +102,11 @@ def format_number(value: float) -> str:
     return f"{value:.10g}"
 
 
-def closest_match(wrong: str, known: Iterable[str]) -> str:
+def closest_match(name: str, candidates: Iterable[str]) -> str:
     """Return the known word that is most similar to a wrong one; "" if none is similar."""
-    if len(wrong) > _MAX_WORD_LENGTH:
+    if len(name) > _MAX_WORD_LENGTH:
         return ""
-    return next(iter(difflib.get_close_matches(wrong, list(known), n=1)), "")
+    return next(iter(difflib.get_close_matches(name, list(candidates), n=1)), "")
 
 
 def parameter_of(name: str, data: Mapping[str, object], *, required: bool = False) -> Parameter:
@@ -119,8 +119,8 @@ def parameter_of(name: str, data: Mapping[str, object], *, required: bool = Fals
     """
     is_list = data.get("type") == "array"
     shortest, longest = (number(data.get(rule)) for rule in (_ITEM_COUNT_KEYS if is_list else _LENGTH_KEYS))
-    held = data.get("items") if is_list else data.get("additionalProperties")
-    places = held if isinstance(held, (list, tuple)) else ()
+    item_schema = data.get("items") if is_list else data.get("additionalProperties")
+    prefix_schemas = item_schema if isinstance(item_schema, (list, tuple)) else ()
     return Parameter(
         name=name,
         title=display_text(data) or translate("robot", name.replace("_", " ")),
@@ -139,8 +139,10 @@ def parameter_of(name: str, data: Mapping[str, object], *, required: bool = Fals
         widget=text(data.get("rb:widget")),
         is_bare_base64=data.get("contentEncoding") == "base64" and "format" not in data,
         nullable=data.get("rb:nullable") is True,
-        item=parameter_of("value", held) if isinstance(held, Mapping) and held else None,
-        prefix_items=tuple(parameter_of(f"value {at}", as_object(each)) for at, each in enumerate(places, 1)),
+        item=parameter_of("value", item_schema) if isinstance(item_schema, Mapping) and item_schema else None,
+        prefix_items=tuple(
+            parameter_of(f"value {index}", as_object(each)) for index, each in enumerate(prefix_schemas, 1)
+        ),
         fields=fields_of(data),
     )
 
@@ -174,9 +176,9 @@ def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
     pairs: list[tuple[object, str | None]] = []
     if isinstance(enum, (list, tuple)):
         pairs = [(value, None) for value in enum]
-    named = data.get("oneOf")
-    if isinstance(named, (list, tuple)):
-        pairs = [(as_object(item).get("const"), display_text(as_object(item))) for item in named]
+    one_of = data.get("oneOf")
+    if isinstance(one_of, (list, tuple)):
+        pairs = [(as_object(item).get("const"), display_text(as_object(item))) for item in one_of]
     return tuple(
         Choice(value, title or translate("robot", bounded_str(value).replace("_", " ")))
         for value, title in pairs
@@ -184,32 +186,32 @@ def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
     )
 
 
-def parse_value(parameter: Parameter, words: str) -> object:
+def parse_value(parameter: Parameter, typed: str) -> object:
     """Parse a list or object that the user typed, such as ``1, 2.5`` or JSON.
 
     Numbers with a decimal comma are separated by semicolons: ``1; 2,5``.
 
     Args:
         parameter: Parameter for the value.
-        words: Typed text.
+        typed: Typed text.
 
     Returns:
         The value, or the unchanged text if it is invalid or ambiguous such as ``0,2, 0,5``, so that the
         validation rejects it.
     """
-    if parameter.kind == "object" or words.lstrip().startswith(("[", "{")):
+    if parameter.kind == "object" or typed.lstrip().startswith(("[", "{")):
         try:
-            found: object = json.loads(words)
+            parsed: object = json.loads(typed)
         except (ValueError, RecursionError):
-            return words
-        return found
+            return typed
+        return parsed
     kinds = {each.kind for each in parameter.prefix_items or filter(None, (parameter.item,))}
     is_numeric = bool(kinds) and kinds <= NUMBER_KINDS
-    if is_numeric and re.search(r"\d,\d", words) and re.search(r",\s", words):
-        return words
-    if is_numeric and ";" in words:
-        words = words.replace(",", ".").replace(";", ",")
-    items = [word.strip() for word in words.split(",") if word.strip()]
+    if is_numeric and re.search(r"\d,\d", typed) and re.search(r",\s", typed):
+        return typed
+    if is_numeric and ";" in typed:
+        typed = typed.replace(",", ".").replace(";", ",")
+    items = [part.strip() for part in typed.split(",") if part.strip()]
     if parameter.prefix_items:
         return [
             _parse_item(each, item) for each, item in zip(parameter.prefix_items, items, strict=False)
@@ -220,157 +222,163 @@ def parse_value(parameter: Parameter, words: str) -> object:
 def format_for_editing(value: object) -> str:
     """Format a list or object for editing; the inverse of :func:`parse_value`."""
     if isinstance(value, (list, tuple)) and all(isinstance(item, (str, int, float)) for item in value):
-        words = [str(item).lower() if isinstance(item, bool) else str(item) for item in value]
-        if not any("," in word or not word.strip() or word.startswith(("[", "{")) for word in words):
-            return ", ".join(words)
+        parts = [str(item).lower() if isinstance(item, bool) else str(item) for item in value]
+        if not any("," in part or not part.strip() or part.startswith(("[", "{")) for part in parts):
+            return ", ".join(parts)
     return json.dumps(value, ensure_ascii=False)
 
 
-def _parse_item(parameter: Parameter, word: str) -> object:
-    known = [choice.value for choice in parameter.choices if word in {str(choice.value), choice.title}]
-    if known:
-        return known[0]
+def _parse_item(parameter: Parameter, typed: str) -> object:
+    matching = [choice.value for choice in parameter.choices if typed in {str(choice.value), choice.title}]
+    if matching:
+        return matching[0]
     if parameter.kind == "boolean":
-        return {"yes": True, "true": True, "no": False, "false": False}.get(word.lower(), word)
+        return {"yes": True, "true": True, "no": False, "false": False}.get(typed.lower(), typed)
     if parameter.kind not in NUMBER_KINDS:
-        return word
-    found = to_number(word)
-    if found is None:
-        return word
-    return int(found) if found.is_integer() and "." not in word else found
+        return typed
+    parsed = to_number(typed)
+    if parsed is None:
+        return typed
+    return int(parsed) if parsed.is_integer() and "." not in typed else parsed
 
 
-def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -> tuple[str, ...]:
+def check_input(action: str, parameters: tuple[Parameter, ...], values: object) -> tuple[str, ...]:
     """Return one message per problem of an input; empty if it is valid.
 
     Each message starts with the name of the action.
     """
-    return tuple(f"{action}: {problem.message}" for problem in input_problems(parameters, given))
+    return tuple(f"{action}: {problem.message}" for problem in input_problems(parameters, values))
 
 
-def input_problems(parameters: tuple[Parameter, ...], given: object) -> tuple[InputProblem, ...]:
+def input_problems(parameters: tuple[Parameter, ...], values: object) -> tuple[InputProblem, ...]:
     """Return the problems of an input; empty if it is valid.
 
     Unknown names come first, followed by problems of values in the order of the parameters.
     """
-    if not isinstance(given, Mapping):
+    if not isinstance(values, Mapping):
         return (InputProblem("", _("the input must be an object with named values")),)
-    known = {parameter.name: parameter for parameter in parameters}
-    unknown = [name for name in given if name not in known]
+    parameters_by_name = {parameter.name: parameter for parameter in parameters}
+    unknown = [name for name in values if name not in parameters_by_name]
     problems = []
     for name in unknown[:_MAX_UNKNOWN_REPORTED]:
-        close = closest_match(str(name), known)
-        words = _("unknown name “{word}”; did you mean “{close}”?") if close else _("unknown name “{word}”")
-        problems.append(InputProblem("", words.format(word=quotable(name), close=close)))
+        close = closest_match(str(name), parameters_by_name)
+        template = (
+            _("unknown name “{word}”; did you mean “{close}”?") if close else _("unknown name “{word}”")
+        )
+        problems.append(InputProblem("", template.format(word=quotable(name), close=close)))
     if len(unknown) > _MAX_UNKNOWN_REPORTED:
         count = len(unknown) - _MAX_UNKNOWN_REPORTED
-        words = ngettext("{count} more name is unknown", "{count} more names are unknown", count)
-        problems.append(InputProblem("", words.format(count=count)))
-    for name, parameter in known.items():
-        if name in given and given[name] is None and parameter.nullable:
+        template = ngettext("{count} more name is unknown", "{count} more names are unknown", count)
+        problems.append(InputProblem("", template.format(count=count)))
+    for name, parameter in parameters_by_name.items():
+        if name in values and values[name] is None and parameter.nullable:
             continue
-        if name in given:
-            wrong = value_problem(parameter, given[name])
-            if wrong is not None:
-                problems.append(InputProblem(name, wrong))
+        if name in values:
+            problem = value_problem(parameter, values[name])
+            if problem is not None:
+                problems.append(InputProblem(name, problem))
         elif parameter.required:
             problems.append(InputProblem(name, _("{place} is missing").format(place=parameter.title)))
     return tuple(problems)
 
 
-def value_problem(parameter: Parameter, value: object, place: str = "") -> str | None:
+def value_problem(parameter: Parameter, value: object, label: str = "") -> str | None:
     """Return an error message such as "speed must be a number"; None if the value is valid.
 
     Args:
         parameter: Parameter for the value.
         value: Value to check.
-        place: Name of the value in the message (default: the title of the parameter).
+        label: Name of the value in the message (default: the title of the parameter).
     """
-    place = place or parameter.title
+    label = label or parameter.title
     if parameter.choices:
         if any(_is_json_equal(choice.value, value) for choice in parameter.choices):
             return None
         return _("{place} must be {choices}").format(
-            place=place, choices=format_list([choice.title for choice in parameter.choices], "or")
+            place=label, choices=format_list([choice.title for choice in parameter.choices], "or")
         )
     if parameter.kind in {"number", "integer", "angle"}:
-        return _number_problem(parameter, value, place)
+        return _number_problem(parameter, value, label)
     if parameter.kind == "boolean":
-        return None if isinstance(value, bool) else _("{place} must be yes or no").format(place=place)
+        return None if isinstance(value, bool) else _("{place} must be yes or no").format(place=label)
     if parameter.kind == "colour":
-        good = isinstance(value, str) and _HEX_COLOUR.fullmatch(value) is not None
-        return None if good else _("{place} must be a colour such as #20c0e0").format(place=place)
+        is_valid = isinstance(value, str) and _HEX_COLOUR.fullmatch(value) is not None
+        return None if is_valid else _("{place} must be a colour such as #20c0e0").format(place=label)
     if parameter.kind == "list":
-        return _list_problem(parameter, value, place)
+        return _list_problem(parameter, value, label)
     if parameter.kind == "object":
-        return _object_problem(parameter, value, place)
-    return _text_problem(parameter, value, place)
+        return _object_problem(parameter, value, label)
+    return _text_problem(parameter, value, label)
 
 
-def _list_problem(parameter: Parameter, value: object, place: str) -> str | None:
+def _list_problem(parameter: Parameter, value: object, label: str) -> str | None:
     if not isinstance(value, (list, tuple)):
-        return _("{place} must be a list").format(place=place)
-    least, most = parameter.min_length, parameter.max_length
-    if least == most and len(value) != least:
-        words = ngettext("{place} must have {count} value", "{place} must have {count} values", least)
-        return words.format(place=place, count=least)
-    if len(value) < least:
-        words = ngettext(
-            "{place} must have at least {count} value", "{place} must have at least {count} values", least
+        return _("{place} must be a list").format(place=label)
+    min_length, max_length = parameter.min_length, parameter.max_length
+    if min_length == max_length and len(value) != min_length:
+        template = ngettext("{place} must have {count} value", "{place} must have {count} values", min_length)
+        return template.format(place=label, count=min_length)
+    if len(value) < min_length:
+        template = ngettext(
+            "{place} must have at least {count} value",
+            "{place} must have at least {count} values",
+            min_length,
         )
-        return words.format(place=place, count=least)
-    if most is not None and len(value) > most:
-        words = ngettext(
-            "{place} must have at most {count} value", "{place} must have at most {count} values", most
+        return template.format(place=label, count=min_length)
+    if max_length is not None and len(value) > max_length:
+        template = ngettext(
+            "{place} must have at most {count} value", "{place} must have at most {count} values", max_length
         )
-        return words.format(place=place, count=most)
-    for at, item in enumerate(value):
-        held = parameter.prefix_items[at] if at < len(parameter.prefix_items) else parameter.item
-        inner = _("{place} value {number}").format(place=place, number=at + 1)
-        wrong = None if held is None else value_problem(held, item, inner)
-        if held is None and not _is_json(item):
-            wrong = _("{place} can't be an item of a list").format(place=inner)
-        if wrong is not None:
-            return wrong
+        return template.format(place=label, count=max_length)
+    for index, item in enumerate(value):
+        item_parameter = (
+            parameter.prefix_items[index] if index < len(parameter.prefix_items) else parameter.item
+        )
+        inner = _("{place} value {number}").format(place=label, number=index + 1)
+        problem = None if item_parameter is None else value_problem(item_parameter, item, inner)
+        if item_parameter is None and not _is_json(item):
+            problem = _("{place} can't be an item of a list").format(place=inner)
+        if problem is not None:
+            return problem
     return None
 
 
-def _object_problem(parameter: Parameter, value: object, place: str) -> str | None:
+def _object_problem(parameter: Parameter, value: object, label: str) -> str | None:
     if not isinstance(value, Mapping):
-        return _("{place} must be an object with named values").format(place=place)
-    known = {field.name: field for field in parameter.fields}
-    for name, field in known.items():
+        return _("{place} must be an object with named values").format(place=label)
+    fields_by_name = {field.name: field for field in parameter.fields}
+    for name, field in fields_by_name.items():
         if name not in value and not field.required:
             continue
         if name in value and value[name] is None and field.nullable:
             continue
-        inner = _("{place} {inner}").format(place=place, inner=field.title)
+        inner = _("{place} {inner}").format(place=label, inner=field.title)
         if name not in value:
             return _("{place} is missing").format(place=inner)
-        wrong = value_problem(field, value[name], inner)
-        if wrong is not None:
-            return wrong
-    others = {name: item for name, item in value.items() if name not in known}
-    return _other_values_problem(parameter, others, place)
+        problem = value_problem(field, value[name], inner)
+        if problem is not None:
+            return problem
+    others = {name: item for name, item in value.items() if name not in fields_by_name}
+    return _other_values_problem(parameter, others, label)
 
 
-def _other_values_problem(parameter: Parameter, others: Mapping[str, object], place: str) -> str | None:
-    known = [field.name for field in parameter.fields]
+def _other_values_problem(parameter: Parameter, others: Mapping[str, object], label: str) -> str | None:
+    field_names = [field.name for field in parameter.fields]
     for name, item in others.items():
         if parameter.item is not None:
-            wrong = value_problem(
-                parameter.item, item, _("{place} “{name}”").format(place=place, name=quotable(name))
+            problem = value_problem(
+                parameter.item, item, _("{place} “{name}”").format(place=label, name=quotable(name))
             )
-            if wrong is not None:
-                return wrong
-        elif known:
-            close = closest_match(str(name), known)
-            words = (
+            if problem is not None:
+                return problem
+        elif field_names:
+            close = closest_match(str(name), field_names)
+            template = (
                 _("{place} has no “{word}”; did you mean “{close}”?")
                 if close
                 else _("{place} has no “{word}”")
             )
-            return words.format(place=place, word=quotable(name), close=close)
+            return template.format(place=label, word=quotable(name), close=close)
     return None
 
 
@@ -382,29 +390,29 @@ def _is_json(value: object, depth: int = 0) -> bool:
     return value is None or isinstance(value, (str, int, float))
 
 
-def _is_json_equal(allowed: object, given: object) -> bool:
+def _is_json_equal(allowed: object, value: object) -> bool:
     # 1 == True in Python, but they are different choices.
-    return allowed == given and isinstance(allowed, bool) == isinstance(given, bool)
+    return allowed == value and isinstance(allowed, bool) == isinstance(value, bool)
 
 
-def _number_problem(parameter: Parameter, value: object, place: str) -> str | None:
-    whole = parameter.kind == "integer"
+def _number_problem(parameter: Parameter, value: object, label: str) -> str | None:
+    is_integer = parameter.kind == "integer"
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not _is_finite(value):
-        words = _("{place} must be a whole number") if whole else _("{place} must be a number")
-        return words.format(place=place)
-    if whole and float(value) != int(value):
-        return _("{place} must be a whole number").format(place=place)
+        template = _("{place} must be a whole number") if is_integer else _("{place} must be a number")
+        return template.format(place=label)
+    if is_integer and float(value) != int(value):
+        return _("{place} must be a whole number").format(place=label)
     low, high = parameter.minimum, parameter.maximum
     if (low is None or value >= low) and (high is None or value <= high):
         return None
     unit = "" if parameter.unit is None else f" {parameter.unit}"
     if low is not None and high is not None:
-        words = _("{place} must be between {low} and {high}")
-        return words.format(place=place, low=_format_limit(low), high=f"{_format_limit(high)}{unit}")
+        template = _("{place} must be between {low} and {high}")
+        return template.format(place=label, low=_format_limit(low), high=f"{_format_limit(high)}{unit}")
     if low is not None:
-        return _("{place} must be at least {limit}").format(place=place, limit=f"{_format_limit(low)}{unit}")
+        return _("{place} must be at least {limit}").format(place=label, limit=f"{_format_limit(low)}{unit}")
     return _("{place} must be at most {limit}").format(
-        place=place, limit=f"{_format_limit(high or 0.0)}{unit}"
+        place=label, limit=f"{_format_limit(high or 0.0)}{unit}"
     )
 
 
@@ -415,23 +423,23 @@ def _is_finite(value: float) -> bool:
         return False
 
 
-def _text_problem(parameter: Parameter, value: object, place: str) -> str | None:
+def _text_problem(parameter: Parameter, value: object, label: str) -> str | None:
     if not isinstance(value, str):
-        return _("{place} must be text").format(place=place)
+        return _("{place} must be text").format(place=label)
     if len(value) < parameter.min_length:
-        words = (
+        template = (
             _("{place} must not be empty")
             if parameter.min_length == 1
             else _("{place} must be at least {count} characters long")
         )
-        return words.format(place=place, count=parameter.min_length)
+        return template.format(place=label, count=parameter.min_length)
     if parameter.max_length is not None and len(value) > parameter.max_length:
-        words = ngettext(
+        template = ngettext(
             "{place} must be at most {count} character long",
             "{place} must be at most {count} characters long",
             parameter.max_length,
         )
-        return words.format(place=place, count=parameter.max_length)
+        return template.format(place=label, count=parameter.max_length)
     return None
 
 

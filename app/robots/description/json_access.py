@@ -43,9 +43,9 @@ def display_text(owner: Mapping[str, object], member: str = "title") -> str | No
         owner: JSON object with the text.
         member: "title" or "description".
     """
-    words = object_member(owner, f"{member}s")
-    own = text(owner.get(member))
-    return text(words.get(language())) or (own and translate("robot", own))
+    translations = object_member(owner, f"{member}s")
+    original = text(owner.get(member))
+    return text(translations.get(language())) or (original and translate("robot", original))
 
 
 def number(value: object) -> float | None:
@@ -74,7 +74,7 @@ def finite_float(value: object) -> float | None:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
     try:
-        found = float(value)
+        result = float(value)
     except OverflowError:
         return None
-    return found if math.isfinite(found) else None
+    return result if math.isfinite(result) else None

@@ -63,21 +63,25 @@ class Action:
         """Return the parameter with this name, or None."""
         return next((found for found in self.parameters if found.name == name), None)
 
-    def check(self, given: object) -> tuple[str, ...]:
+    def check(self, values: object) -> tuple[str, ...]:
         """Return one message per problem of an input; empty if it is valid.
 
         Each message starts with the name of the action.
         """
-        return check_input(self.name, self.parameters, given)
+        return check_input(self.name, self.parameters, values)
 
-    def problems(self, given: object) -> tuple[InputProblem, ...]:
+    def problems(self, values: object) -> tuple[InputProblem, ...]:
         """Return the problems of an input, without the name of the action; empty if it is valid."""
-        return input_problems(self.parameters, given)
+        return input_problems(self.parameters, values)
 
-    def complete(self, given: Mapping[str, object]) -> dict[str, object]:
+    def complete(self, values: Mapping[str, object]) -> dict[str, object]:
         """Return an input with default values added for missing parameters."""
-        defaults = {found.name: found.default for found in self.parameters if found.default is not None}
-        return {**defaults, **given}
+        defaults = {
+            parameter.name: parameter.default
+            for parameter in self.parameters
+            if parameter.default is not None
+        }
+        return {**defaults, **values}
 
 
 @dataclass(frozen=True)

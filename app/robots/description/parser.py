@@ -20,13 +20,13 @@ def read(document: Mapping[str, object], topics: RobotTopics) -> Robot:
         document: Thing Model or Thing Description.
         topics: Topics that are used if the document doesn't contain any.
     """
-    own = object_member(document, "rb:topics")
+    topic_names = object_member(document, "rb:topics")
     topics = RobotTopics(
-        description=text(own.get("description")) or topics.description,
-        command=text(own.get("command")) or topics.command,
-        reply=text(own.get("answer")) or topics.reply,
-        state=text(own.get("state")) or topics.state,
-        world=text(own.get("world")) or topics.world,
+        description=text(topic_names.get("description")) or topics.description,
+        command=text(topic_names.get("command")) or topics.command,
+        reply=text(topic_names.get("answer")) or topics.reply,
+        state=text(topic_names.get("state")) or topics.state,
+        world=text(topic_names.get("world")) or topics.world,
     )
     name = str(document["title"])
     kind = object_member(document, "rb:robot")
@@ -66,9 +66,9 @@ def _safe_stop(stop: Mapping[str, object]) -> SafeStop:
 
 
 def _action(name: str, action: Mapping[str, object], topics: RobotTopics) -> Action:
-    given = object_member(action, "input")
-    required = names(given.get("required"))
-    parameters = _parameters(object_member(given, "properties"), required)
+    input_schema = object_member(action, "input")
+    required = names(input_schema.get("required"))
+    parameters = _parameters(object_member(input_schema, "properties"), required)
     block = object_member(action, "rb:block")
     risk = text(action.get("rb:risk"))
     title = _title(name, action)
@@ -128,7 +128,7 @@ def _event(name: str, event: Mapping[str, object], home: str) -> Event:
     fields = _parameters(object_member(object_member(event, "data"), "properties"), ())
     filters = names(event.get("rb:filter"))
     title = _title(name, event)
-    words = _block_text(block, "text") or f"when %robot {title}"
+    template = _block_text(block, "text") or f"when %robot {title}"
     return Event(
         name=name,
         title=title,
@@ -136,7 +136,7 @@ def _event(name: str, event: Mapping[str, object], home: str) -> Event:
         category=_category(block, "Events"),
         fields=fields,
         filters=filters,
-        text=_with_robot_placeholder(words),
+        text=_with_robot_placeholder(template),
         topic=_topic(event, f"{home}/{name}"),
     )
 
@@ -146,7 +146,7 @@ def _parameters(data: Mapping[str, object], required: tuple[str, ...]) -> tuple[
 
 
 def _fields(owner: Mapping[str, object]) -> tuple[DataField, ...]:
-    parts = ((name, as_object(found)) for name, found in object_member(owner, "properties").items())
+    parts = ((name, as_object(schema)) for name, schema in object_member(owner, "properties").items())
     return tuple(
         DataField(name, _title(name, each), kind_of(each), display_unit(text(each.get("unit"))))
         for name, each in parts
@@ -158,30 +158,32 @@ def _title(name: str, owner: Mapping[str, object]) -> str:
 
 
 def _category(block: Mapping[str, object], otherwise: str) -> str:
-    found = (text(block.get("category")) or otherwise).strip()
-    return found[:1].upper() + found[1:]
+    category = (text(block.get("category")) or otherwise).strip()
+    return category[:1].upper() + category[1:]
 
 
 def _block_text(block: Mapping[str, object], kind: str) -> str:
-    words = object_member(block, kind)
-    english = text(words.get(ENGLISH)) or next((str(word) for word in words.values()), "")
+    translations = object_member(block, kind)
+    english = text(translations.get(ENGLISH)) or next(
+        (str(translation) for translation in translations.values()), ""
+    )
     return (
-        text(words.get(language())) or translate("robot", english.strip().removeprefix("%robot "))
+        text(translations.get(language())) or translate("robot", english.strip().removeprefix("%robot "))
     ).strip()
 
 
 def _default_text(title: str, parameters: tuple[Parameter, ...]) -> str:
-    shown = [parameter for parameter in parameters if not parameter.advanced]
-    values = [f"%{p.name}{' ' + p.unit if p.unit else ''}" for p in shown]
+    visible = [parameter for parameter in parameters if not parameter.advanced]
+    values = [f"%{p.name}{' ' + p.unit if p.unit else ''}" for p in visible]
     return " ".join([title, *values])
 
 
-def _with_robot_placeholder(words: str) -> str:
-    if not words or "%robot" in words:
-        return words
-    if words.startswith("when "):
-        return f"when %robot {words.removeprefix('when ')}"
-    return f"%robot {words}"
+def _with_robot_placeholder(template: str) -> str:
+    if not template or "%robot" in template:
+        return template
+    if template.startswith("when "):
+        return f"when %robot {template.removeprefix('when ')}"
+    return f"%robot {template}"
 
 
 def _topic(owner: Mapping[str, object], otherwise: str, member: str = "href") -> str:

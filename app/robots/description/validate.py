@@ -80,37 +80,39 @@ def without_control_characters(document: Mapping[str, object]) -> dict[str, obje
     would also reorder the text after it, such as the question whether the robot may move.
     """
 
-    def clean(value: object, place: str) -> object:
-        if place in _VALUE_MEMBERS:
+    def clean(value: object, member: str) -> object:
+        if member in _VALUE_MEMBERS:
             return value
         if isinstance(value, Mapping):
-            return {key: clean(item, place if place == _BLOCK_MEMBER else key) for key, item in value.items()}
+            return {
+                key: clean(item, member if member == _BLOCK_MEMBER else key) for key, item in value.items()
+            }
         if isinstance(value, (list, tuple)):
             return [clean(item, "") for item in value]
-        return strip_controls(value) if isinstance(value, str) and place in _TEXT_MEMBERS else value
+        return strip_controls(value) if isinstance(value, str) and member in _TEXT_MEMBERS else value
 
     return {key: clean(item, "" if key == "title" else key) for key, item in document.items()}
 
 
-def _json_problem(value: object, seen: Iterator[int], path: str = "", depth: int = 0) -> str | None:
+def _json_problem(value: object, counter: Iterator[int], path: str = "", depth: int = 0) -> str | None:
     # Also rejects `$ref`, unusable numbers, and more than `MAX_VALUES` values, counted by `seen`.
-    if next(seen) > MAX_VALUES or depth > _MAX_DEPTH:
+    if next(counter) > MAX_VALUES or depth > _MAX_DEPTH:
         if depth > _MAX_DEPTH:
             return _("{place} is nested too deeply").format(place=path)
         return _("the description has more than {count} values").format(count=MAX_VALUES)
     if isinstance(value, dict):
         for key, item in value.items():
-            found = _key_problem(key, path or _(DESCRIPTION_LABEL)) or _json_problem(
-                item, seen, f"{path}.{key}" if path else str(key), depth + 1
+            problem = _key_problem(key, path or _(DESCRIPTION_LABEL)) or _json_problem(
+                item, counter, f"{path}.{key}" if path else str(key), depth + 1
             )
-            if found is not None:
-                return found
+            if problem is not None:
+                return problem
         return None
     if isinstance(value, list):
         found_items = (
-            _json_problem(item, seen, f"{path}[{index}]", depth + 1) for index, item in enumerate(value)
+            _json_problem(item, counter, f"{path}[{index}]", depth + 1) for index, item in enumerate(value)
         )
-        return next((found for found in found_items if found is not None), None)
+        return next((problem for problem in found_items if problem is not None), None)
     if isinstance(value, (int, float)) and not -_MAX_NUMBER <= value <= _MAX_NUMBER:
         return _("{place} isn't a finite number, or is too large").format(place=path)
     if value is None or isinstance(value, (str, bool, int, float)):
@@ -118,11 +120,13 @@ def _json_problem(value: object, seen: Iterator[int], path: str = "", depth: int
     return _("{place} isn't JSON: {kind}").format(place=path, kind=type(value).__name__)
 
 
-def _key_problem(key: object, place: str) -> str | None:
+def _key_problem(key: object, location: str) -> str | None:
     if not isinstance(key, str):
-        return _("{place} has a name that isn't text: {name}").format(place=place, name=repr(key))
+        return _("{place} has a name that isn't text: {name}").format(place=location, name=repr(key))
     if key == "$ref":
-        return _("{place} uses $ref, which isn't supported; write the definition inline").format(place=place)
+        return _("{place} uses $ref, which isn't supported; write the definition inline").format(
+            place=location
+        )
     return None
 
 
@@ -158,25 +162,25 @@ DESCRIPTION_LABEL = lazy("the description")
 
 
 def _error_message(error: ValidationError) -> str:
-    place = ".".join(str(part) for part in error.absolute_path) or _(DESCRIPTION_LABEL)
+    location = ".".join(str(part) for part in error.absolute_path) or _(DESCRIPTION_LABEL)
     rule = str(error.validator)
     limit: object = error.validator_value
     if rule == "required":  # jsonschema names the missing property only in its message
-        return _("{place} has no '{name}'").format(place=place, name=error.message.split("'")[1])
+        return _("{place} has no '{name}'").format(place=location, name=error.message.split("'")[1])
     if rule == "type":
         kinds = limit if isinstance(limit, list) else [limit]
-        words = format_list([_(_TYPE_NAMES.get(str(kind), str(kind))) for kind in kinds], "or")
-        return _("{place} must be {kinds}").format(place=place, kinds=words)
+        type_names = format_list([_(_TYPE_NAMES.get(str(kind), str(kind))) for kind in kinds], "or")
+        return _("{place} must be {kinds}").format(place=location, kinds=type_names)
     if rule == "enum":
-        return _("{place} must be one of {names}").format(place=place, names=", ".join(names(limit)))
+        return _("{place} must be one of {names}").format(place=location, names=", ".join(names(limit)))
     if rule == "const":
-        return _("{place} must be {value}").format(place=place, value=limit)
+        return _("{place} must be {value}").format(place=location, value=limit)
     if rule == "pattern":
-        shown = _shorten_and_quote(error.instance)
+        quoted = _shorten_and_quote(error.instance)
         return _("{place}: {value} isn't allowed; use letters, digits, - and _ without spaces").format(
-            place=place, value=shown
+            place=location, value=quoted
         )
-    return _(_RULE_MESSAGES.get(rule, INVALID_MESSAGE)).format(place=place, limit=limit)
+    return _(_RULE_MESSAGES.get(rule, INVALID_MESSAGE)).format(place=location, limit=limit)
 
 
 def _shorten_and_quote(value: object) -> str:
@@ -229,10 +233,10 @@ def _action_contradictions(
             yield _("actions.{name}.input requires '{field}', which it doesn't define").format(
                 name=name, field=field
             )
-    for used in names(action.get("rb:uses")):
-        if used not in resources_named:
+    for resource in names(action.get("rb:uses")):
+        if resource not in resources_named:
             yield _("actions.{name}.rb:uses names '{used}', which isn't in rb:resources").format(
-                name=name, used=used
+                name=name, used=resource
             )
     for field, data in fields.items():
         source = as_object(data).get("rb:optionsFrom")
@@ -243,39 +247,39 @@ def _action_contradictions(
     yield from _text_contradictions(f"actions.{name}", action, fields)
 
 
-def _field_contradictions(place: str, fields: Mapping[str, object]) -> Iterator[str]:
+def _field_contradictions(location: str, fields: Mapping[str, object]) -> Iterator[str]:
     for name, data in fields.items():
         if name == "robot":
-            yield _("{place}: the name 'robot' is reserved; use another one").format(place=place)
-        yield from _data_contradictions(f"{place}.{name}", as_object(data))
+            yield _("{place}: the name 'robot' is reserved; use another one").format(place=location)
+        yield from _data_contradictions(f"{location}.{name}", as_object(data))
 
 
-def _data_contradictions(place: str, data: Mapping[str, object]) -> Iterator[str]:
+def _data_contradictions(location: str, data: Mapping[str, object]) -> Iterator[str]:
     low, high = data.get("minimum"), data.get("maximum")
     if isinstance(low, (int, float)) and isinstance(high, (int, float)) and low > high:
         yield _("{place}: minimum {low} is greater than maximum {high}").format(
-            place=place, low=low, high=high
+            place=location, low=low, high=high
         )
     elif data.get("default") is not None:
-        default = _("{place}: the default").format(place=place)
-        wrong = value_problem(parameter_of(place, data), data["default"], default)
-        if wrong is not None:
-            yield wrong
+        default = _("{place}: the default").format(place=location)
+        problem = value_problem(parameter_of(location, data), data["default"], default)
+        if problem is not None:
+            yield problem
 
 
 def _text_contradictions(
-    place: str, owner: Mapping[str, object], fields: Mapping[str, object]
+    location: str, owner: Mapping[str, object], fields: Mapping[str, object]
 ) -> Iterator[str]:
     block = object_member(owner, "rb:block")
     for kind in ("text", "says"):
         for language, text in object_member(block, kind).items():
-            used = PLACEHOLDER.findall(str(text))
-            for name in used:
+            placeholders = PLACEHOLDER.findall(str(text))
+            for name in placeholders:
                 if name != "robot" and name not in fields:
                     yield _("{place}.rb:block.{kind}.{language} uses %{name}, which isn't defined").format(
-                        place=place, kind=kind, language=language, name=name
+                        place=location, kind=kind, language=language, name=name
                     )
-            if kind == "text" and len(used) != len(set(used)):
+            if kind == "text" and len(placeholders) != len(set(placeholders)):
                 yield _("{place}.rb:block.text.{language} uses a value twice").format(
-                    place=place, language=language
+                    place=location, language=language
                 )

@@ -145,7 +145,7 @@ class Link(Protocol):
             Function that publishes a message.
         """
 
-    def run(self, work: Awaitable[object]) -> object:
+    def run(self, awaitable: Awaitable[object]) -> object:
         """Run an awaitable in the robot's event loop and wait for the result.
 
         The robot's ``async def`` actions run in the same event loop.
@@ -199,18 +199,18 @@ class Call:
         if self._canceling is not None:
             self._canceling.join(_JOIN_TIMEOUT_S)
 
-    def on_cancel(self, tell: Callable[[], object]) -> None:
+    def on_cancel(self, callback: Callable[[], object]) -> None:
         """Register a callback for cancellation, such as one that aborts a blocking library call.
 
         Args:
-            tell: Called once, in another thread; called immediately in this thread if the action is already
-                cancelled.
+            callback: Called once, in another thread; called immediately in this thread if the action is
+                already cancelled.
         """
         with self._lock:
             if not self._ended.is_set():
-                self._on_cancel.append(tell)
+                self._on_cancel.append(callback)
                 return
-        tell()
+        callback()
 
     def wait(self, seconds: float) -> None:
         """Wait for a number of seconds, or until the action is cancelled.
@@ -227,11 +227,13 @@ class Call:
         if self.clock.wait(self._ended, seconds):
             raise Canceled
 
-    def until(self, done: Callable[[], bool], *, for_s: float | None = None, every_s: float = 1 / 30) -> bool:
+    def until(
+        self, condition: Callable[[], bool], *, for_s: float | None = None, every_s: float = 1 / 30
+    ) -> bool:
         """Poll a condition until it is true.
 
         Args:
-            done: Condition.
+            condition: Condition.
             for_s: Timeout in seconds; None for no limit.
             every_s: Interval in seconds between two polls.
 
@@ -242,7 +244,7 @@ class Call:
             Canceled: The action was cancelled.
         """
         limit = None if for_s is None else self.clock.now() + for_s
-        while not done():
+        while not condition():
             if limit is not None and self.clock.now() >= limit:
                 return False
             self.wait(every_s)

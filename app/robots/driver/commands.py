@@ -40,7 +40,7 @@ class CommandHandler:
         specs: Declarations of the actions by name.
         tasks: Tasks of the robot.
         publish: Publishes a reply.
-        done: Waits for the return value of an action if it is awaitable, and returns the result.
+        resolve: Waits for the return value of an action if it is awaitable, and returns the result.
     """
 
     def __init__(
@@ -50,10 +50,10 @@ class CommandHandler:
         specs: Mapping[str, ActionSpec],
         tasks: Tasks,
         publish: Publish,
-        done: Resolve,
+        resolve: Resolve,
     ) -> None:
         self._robot, self._body, self._specs = robot, body, specs
-        self._tasks, self._publish, self._done = tasks, publish, done
+        self._tasks, self._publish, self._done = tasks, publish, resolve
         self._open_ids: set[str] = set()
         self._ended_programs: deque[str] = deque(maxlen=_MAX_ENDED_PROGRAMS)
 
@@ -71,11 +71,11 @@ class CommandHandler:
         ended = text(message.get("ends"))
         if ended is not None:
             self._ended_programs.append(program_of(ended))
-        wanted, operation = _id_of(message), message.get("op")
-        if wanted is None or (operation == "invoke" and wanted in self._open_ids):
+        command_id, operation = _id_of(message), message.get("op")
+        if command_id is None or (operation == "invoke" and command_id in self._open_ids):
             self._tasks.stop(None)
         else:
-            self._tasks.stop(self._reply_callback(wanted, str(operation), self._robot.safe_stop.action))
+            self._tasks.stop(self._reply_callback(command_id, str(operation), self._robot.safe_stop.action))
 
     def receive(self, command: object, publisher: int | None = None, epoch: int | None = None) -> None:
         """Handle a message of the command topic. Replies only if the command has an id.
@@ -87,47 +87,47 @@ class CommandHandler:
             epoch: Value of `Tasks.epoch` when the message was received.
         """
         message = as_object(command)
-        wanted = _id_of(message)
+        command_id = _id_of(message)
         try:
             if self.is_stop(message):
                 self.stop(message)
             else:
-                self._handle(message, wanted, publisher, epoch)
+                self._handle(message, command_id, publisher, epoch)
         except Exception as error:
-            if wanted is not None and wanted not in self._open_ids:
-                words = _("{robot} can't handle this command: {error}").format(
+            if command_id is not None and command_id not in self._open_ids:
+                problem = _("{robot} can't handle this command: {error}").format(
                     robot=self._robot.name, error=quotable(error)
                 )
-                self._reply_callback(wanted, quotable(message.get("op")), "")(
-                    TaskReply("failed", error=words)
+                self._reply_callback(command_id, quotable(message.get("op")), "")(
+                    TaskReply("failed", error=problem)
                 )
             raise
 
-    def reject(self, wanted: str, operation: str, error: str) -> None:
+    def reject(self, command_id: str, operation: str, error: str) -> None:
         """Reply with an error to a command that was not decoded.
 
         There is no reply if another pending command has the same id.
 
         Args:
-            wanted: Id of the command.
+            command_id: Id of the command.
             operation: Operation of the command, such as "invoke".
             error: Error message.
         """
-        if wanted not in self._open_ids:
-            self._reply_callback(wanted, operation, "")(TaskReply("failed", error=error))
+        if command_id not in self._open_ids:
+            self._reply_callback(command_id, operation, "")(TaskReply("failed", error=error))
 
     def _handle(
         self,
         message: Mapping[str, object],
-        wanted: str | None,
+        command_id: str | None,
         publisher: int | None,
         epoch: int | None,
     ) -> None:
         operation, name = message.get("op"), text(message.get("from"))
         if name is not None and len(name) > _MAX_ID_LENGTH:
-            if wanted is not None:
+            if command_id is not None:
                 self.reject(
-                    wanted,
+                    command_id,
                     quotable(operation),
                     _("“from” is longer than {count} characters").format(count=_MAX_ID_LENGTH),
                 )
@@ -135,17 +135,17 @@ class CommandHandler:
         program = None if name is None else ProgramId(name, publisher)
         if program is not None:
             self._tasks.record_heartbeat(program, watch=operation == "invoke")
-        if operation == "alive" or wanted is None:
+        if operation == "alive" or command_id is None:
             return
         if operation == "cancel":
-            self._cancel(wanted, quotable(message.get("action") or ""), publisher)
+            self._cancel(command_id, quotable(message.get("action") or ""), publisher)
         elif operation == "invoke":
-            self._invoke(wanted, message, program, publisher, epoch)
+            self._invoke(command_id, message, program, publisher, epoch)
         else:
             error = _("unknown operation “{operation}”; use invoke, cancel, stop or alive").format(
                 operation=quotable(operation)
             )
-            self._reply_callback(wanted, quotable(operation), "")(TaskReply("failed", error=error))
+            self._reply_callback(command_id, quotable(operation), "")(TaskReply("failed", error=error))
 
     def publish_heartbeat(
         self, not_ended: Sequence[str] = (), error: str | None = None, rejected: int = 0
@@ -157,17 +157,17 @@ class CommandHandler:
             error: Message about these actions.
             rejected: Number of messages to the robot that were not handled.
         """
-        told: dict[str, object] = {"op": "alive", "id": "", "action": "", "state": "running"}
-        told |= {"not_ended": list(not_ended), "error": _replace_surrogates(error)}
+        heartbeat: dict[str, object] = {"op": "alive", "id": "", "action": "", "state": "running"}
+        heartbeat |= {"not_ended": list(not_ended), "error": _replace_surrogates(error)}
         counts = {"rejected": rejected, "errors": self._tasks.failures}
-        self._publish(told | {name: count for name, count in counts.items() if count})
+        self._publish(heartbeat | {name: count for name, count in counts.items() if count})
 
     def create_task(
         self,
-        wanted: str,
+        command_id: str,
         action: Action,
-        given: Mapping[str, object],
-        answer: Callable[[TaskReply], None],
+        values: Mapping[str, object],
+        reply: Callable[[TaskReply], None],
         program: ProgramId | None = None,
         *,
         publisher: int | None = None,
@@ -176,16 +176,16 @@ class CommandHandler:
         """Create the task that runs an action with a valid input.
 
         Args:
-            wanted: Id of the command.
+            command_id: Id of the command.
             action: Description of the action.
-            given: Input of the action; defaults are added.
-            answer: Publishes the replies.
+            values: Input of the action; defaults are added.
+            reply: Publishes the replies.
             program: Requesting program.
             publisher: Id of the publisher of the command.
             epoch: Value of `Tasks.epoch` when the command was received.
         """
         spec = self._specs[action.name]
-        complete = action.complete(given)
+        complete = action.complete(values)
         function: Callable[..., object] = getattr(self._body, action.name)
 
         def run(call: Call) -> Mapping[str, object]:
@@ -200,10 +200,10 @@ class CommandHandler:
                 ) from error
 
         return Task(
-            id=wanted,
+            id=command_id,
             action=action.name,
             run=run,
-            reply=answer,
+            reply=reply,
             uses=action.uses,
             on_busy=action.on_busy,
             timeout_s=action.timeout_s,
@@ -218,82 +218,87 @@ class CommandHandler:
     def unknown_action_message(self, name: str) -> str:
         """Return the error message for an unknown action."""
         close = closest_match(name, [each.name for each in self._robot.actions])
-        words = (
+        template = (
             _("{robot} can't “{action}”; did you mean “{close}”?") if close else _("{robot} can't “{action}”")
         )
-        return words.format(robot=self._robot.name, action=quotable(name), close=close)
+        return template.format(robot=self._robot.name, action=quotable(name), close=close)
 
     def _invoke(
         self,
-        wanted: str,
+        command_id: str,
         message: Mapping[str, object],
         program: ProgramId | None,
         publisher: int | None,
         epoch: int | None,
     ) -> None:
-        if wanted in self._open_ids:
+        if command_id in self._open_ids:
             return  # duplicate command
-        name, given = message.get("action"), message.get("input")
-        answer = self._reply_callback(wanted, "invoke", quotable(name or ""))
+        name, values = message.get("action"), message.get("input")
+        reply = self._reply_callback(command_id, "invoke", quotable(name or ""))
         if program is not None and program.name in self._ended_programs:
             # sent before its program was ended, received after the stop: must not move the robot
-            answer(TaskReply("canceled", error=_("its program was stopped")))
+            reply(TaskReply("canceled", error=_("its program was stopped")))
             return
         action = self._robot.action(name) if isinstance(name, str) else None
         if action is None:
-            answer(TaskReply("failed", error=self.unknown_action_message(bounded_str(name or ""))))
+            reply(TaskReply("failed", error=self.unknown_action_message(bounded_str(name or ""))))
             return
         if action.name == self._robot.safe_stop.action:
-            self._tasks.stop(answer)
+            self._tasks.stop(reply)
             return
-        sentences = action.check({} if given is None else given)
-        if sentences:
-            answer(TaskReply("failed", error="; ".join(sentences)))
+        problems = action.check({} if values is None else values)
+        if problems:
+            reply(TaskReply("failed", error="; ".join(problems)))
             return
         task = self.create_task(
-            wanted, action, as_object(given), answer, program, publisher=publisher, epoch=epoch
+            command_id, action, as_object(values), reply, program, publisher=publisher, epoch=epoch
         )
-        self._open_ids.add(wanted)
+        self._open_ids.add(command_id)
         try:
             self._tasks.submit(task)
         except BaseException:
-            self._open_ids.discard(wanted)
+            self._open_ids.discard(command_id)
             raise
 
-    def _cancel(self, wanted: str, name: str, publisher: int | None) -> None:
-        error = self._tasks.cancel(lambda task: task.id == wanted and task.publisher == publisher)
-        if error is not None and wanted in self._open_ids and error == NO_SUCH_TASK_MESSAGE:
+    def _cancel(self, command_id: str, name: str, publisher: int | None) -> None:
+        error = self._tasks.cancel(lambda task: task.id == command_id and task.publisher == publisher)
+        if error is not None and command_id in self._open_ids and error == NO_SUCH_TASK_MESSAGE:
             error = _(
                 "only the program that started “{action}” can cancel it; any program can stop the robot"
-            ).format(action=name or wanted)
+            ).format(action=name or command_id)
         if error is not None:
             error = _(error) if error == NO_SUCH_TASK_MESSAGE else error
-            self._reply_callback(wanted, "cancel", name)(TaskReply("failed", error=error))
+            self._reply_callback(command_id, "cancel", name)(TaskReply("failed", error=error))
 
-    def _reply_callback(self, wanted: str, operation: str, name: str) -> Callable[[TaskReply], None]:
-        def reply(given: TaskReply) -> None:
-            if given.is_final and operation == "invoke":
-                self._open_ids.discard(wanted)
-            told: dict[str, object] = {"id": wanted, "op": operation, "action": name, "state": given.state}
-            told |= {
-                "output": dict(given.output),
-                "feedback": dict(given.feedback),
-                "error": _replace_surrogates(given.error),
+    def _reply_callback(self, command_id: str, operation: str, name: str) -> Callable[[TaskReply], None]:
+        def reply(task_reply: TaskReply) -> None:
+            if task_reply.is_final and operation == "invoke":
+                self._open_ids.discard(command_id)
+            message: dict[str, object] = {
+                "id": command_id,
+                "op": operation,
+                "action": name,
+                "state": task_reply.state,
             }
-            if given.waits_for:
-                told["waits_for"] = list(given.waits_for)
-            if given.replaces:
-                told["replaces"] = list(given.replaces)
-            self._publish(told)
+            message |= {
+                "output": dict(task_reply.output),
+                "feedback": dict(task_reply.feedback),
+                "error": _replace_surrogates(task_reply.error),
+            }
+            if task_reply.waits_for:
+                message["waits_for"] = list(task_reply.waits_for)
+            if task_reply.replaces:
+                message["replaces"] = list(task_reply.replaces)
+            self._publish(message)
 
         return reply
 
 
 def _id_of(message: Mapping[str, object]) -> str | None:
-    wanted = text(message.get("id"))
-    if wanted is None or len(wanted) > _MAX_ID_LENGTH or bounded_str(wanted) != wanted:
+    command_id = text(message.get("id"))
+    if command_id is None or len(command_id) > _MAX_ID_LENGTH or bounded_str(command_id) != command_id:
         return None
-    return wanted
+    return command_id
 
 
 def _replace_surrogates(error: str | None) -> str | None:

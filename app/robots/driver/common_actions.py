@@ -38,7 +38,7 @@ def drives(
         rize: Name of RIZE's primitive.
         from_rize: Converts RIZE's input and options to the action's input.
     """
-    made: Mapping[str, object] = {"moved": Annotated[float, Range(unit=unit)]} if moved else {}
+    output: Mapping[str, object] = {"moved": Annotated[float, Range(unit=unit)]} if moved else {}
     return action(
         text,
         MOVEMENT,
@@ -49,8 +49,8 @@ def drives(
         on_busy="replace",
         timeout_s=DRIVE_TIMEOUT_S,
         risk="locomotes",
-        feedback={**made, "to_go": Annotated[float, Range(unit=unit), Title("to go")]},
-        output=made or None,
+        feedback={**output, "to_go": Annotated[float, Range(unit=unit), Title("to go")]},
+        output=output or None,
         rize=rize,
         from_rize=from_rize,
     )
@@ -122,5 +122,5 @@ def distance_sensor(most_m: float) -> SensorSpec:
     Args:
         most_m: Maximum distance in m.
     """
-    ahead = Annotated[float, Range(0, most_m, unit="m")]
-    return sensor(ahead, title="distance", text="distance", icon="ruler", rate_hz=10)
+    distance = Annotated[float, Range(0, most_m, unit="m")]
+    return sensor(distance, title="distance", text="distance", icon="ruler", rate_hz=10)

@@ -111,8 +111,8 @@ class action:  # noqa: N801 - used as a decorator
                 returns,
             )
         except (TypeError, NameError) as error:
-            where = line_of(function)
-            raise DeclarationError(function.__name__, str(error), str(where or "")) from error
+            source_line = line_of(function)
+            raise DeclarationError(function.__name__, str(error), str(source_line or "")) from error
         setattr(function, _ACTION_ATTRIBUTE, spec)
         return function
 
@@ -164,9 +164,9 @@ class ReturnSpec:
 
     def to_output(self, value: object) -> Mapping[str, object]:
         """Convert the return value of a function to the result. Raises RobotValueError for a wrong type."""
-        made = self._to_output(value)
-        check_encodable(made)
-        return made
+        output = self._to_output(value)
+        check_encodable(output)
+        return output
 
     def _to_output(self, value: object) -> Mapping[str, object]:
         if self.fields:
@@ -176,10 +176,10 @@ class ReturnSpec:
             if only and not isinstance(value, Mapping):
                 value = {only[0]: value}
             return fields_to_json(self.fields, value)
-        found = any_to_json(value) if self.kind is None else to_json(self.kind, value)
-        if isinstance(found, dict):
-            return found
-        return {} if found is None else {"value": found}
+        converted = any_to_json(value) if self.kind is None else to_json(self.kind, value)
+        if isinstance(converted, dict):
+            return converted
+        return {} if converted is None else {"value": converted}
 
 
 @dataclass(frozen=True)
@@ -384,11 +384,14 @@ class Kind:
 
     def __post_init__(self) -> None:
         lines = lines_of(self.body) if isinstance(self.body, type) else {}
-        made = self._thing_model()
-        problems = (*self._duplicate_problems(lines), *(_with_line(each, lines) for each in validate(made)))
+        thing_model = self._thing_model()
+        problems = (
+            *self._duplicate_problems(lines),
+            *(_with_line(each, lines) for each in validate(thing_model)),
+        )
         if problems:
             raise DescriptionError(self.model, problems)
-        object.__setattr__(self, "thing_model", made)
+        object.__setattr__(self, "thing_model", thing_model)
 
     @property
     def actions(self) -> dict[str, ActionSpec]:
@@ -412,30 +415,32 @@ class Kind:
     @property
     def stop(self) -> tuple[str, StopSpec]:
         """Name and declaration of the stop method. Raises DescriptionError unless there is exactly one."""
-        found = [
+        stops = [
             (name, getattr(m, _STOP_ATTRIBUTE)) for name, m in self._members() if hasattr(m, _STOP_ATTRIBUTE)
         ]
-        if len(found) != 1:
+        if len(stops) != 1:
             raise DescriptionError(self.model, (_("exactly one method must be marked with safe_stop"),))
-        return found[0]
+        return stops[0]
 
     def _duplicate_problems(self, lines: Mapping[str, list[SourceLine]]) -> list[str]:
         declared = {*self.actions, *self.sensors, *self.events, self.stop[0]}
-        twice = [(name, found) for name, found in lines.items() if len(found) > 1 and name in declared]
+        twice = [
+            (name, locations) for name, locations in lines.items() if len(locations) > 1 and name in declared
+        ]
         return [
             _("{found}: '{name}' is defined twice, first in line {number}").format(
-                found=found[-1], name=name, number=found[0].number
+                found=locations[-1], name=name, number=locations[0].number
             )
-            for name, found in twice
+            for name, locations in twice
         ]
 
     def _members(self) -> list[tuple[str, object]]:
         if not isinstance(self.body, type):
             raise DescriptionError(self.model, (_("a robot must be declared as a class"),))
-        found: dict[str, object] = {}
+        members: dict[str, object] = {}
         for owner in reversed(self.body.__mro__):
-            found.update(vars(owner))
-        return list(found.items())
+            members.update(vars(owner))
+        return list(members.items())
 
     def _thing_model(self) -> Schema:
         stop, timing = self.stop
@@ -443,7 +448,7 @@ class Kind:
         stopping: Schema = {"category": "Movement", "icon": "octagon-x", "text": {"en": "stop moving"}}
         actions[stop] = {"title": "stop", "synchronous": True, "idempotent": True, "rb:cancel": False}
         actions[stop] |= {"rb:uses": [], "rb:block": stopping | {"says": {"en": "stops"}}}
-        used = (name for part in actions.values() for name in _string_list(part.get("rb:uses")))
+        resources = (name for part in actions.values() for name in _string_list(part.get("rb:uses")))
         about: Schema = {"model": self.model, "title": self.title, "virtual": self.virtual}
         about |= {"kinds": list(self.kinds), "driver": self.driver, "dialect": "native"}
         return {
@@ -454,7 +459,7 @@ class Kind:
             "version": {"model": "1.0.0"},
             "rb:profile": 1,
             "rb:robot": about,
-            "rb:resources": list(dict.fromkeys(used)),
+            "rb:resources": list(dict.fromkeys(resources)),
             "rb:beat": HEARTBEAT_INTERVAL_S,
             "rb:safeStop": {
                 "action": stop,
@@ -487,22 +492,24 @@ def _declared_schema(schema: Callable[[DeclaredType], Schema], kind: DeclaredTyp
         frame = sys._getframe(1)  # noqa: SLF001 - documented way to get the caller
         while frame.f_back is not None and frame.f_code.co_filename == __file__:
             frame = frame.f_back
-        where = SourceLine(Path(frame.f_code.co_filename).name, frame.f_lineno)
-        raise DeclarationError("", str(error), str(where)) from error
+        location = SourceLine(Path(frame.f_code.co_filename).name, frame.f_lineno)
+        raise DeclarationError("", str(error), str(location)) from error
 
 
 def _string_list(value: object) -> list[str]:
     return [str(item) for item in value] if isinstance(value, list) else []
 
 
-def _without_none(found: Mapping[str, object]) -> Schema:
-    return {name: value for name, value in found.items() if value is not None}
+def _without_none(values: Mapping[str, object]) -> Schema:
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def _with_line(problem: str, lines: Mapping[str, list[SourceLine]]) -> str:
     path = problem.replace(":", ".").split(" ")[0].split(".")
-    found = lines.get(path[1]) if len(path) > 1 and path[0] in {"actions", "properties", "events"} else None
-    return f"{found[-1]}: {problem}" if found else problem
+    source_lines = (
+        lines.get(path[1]) if len(path) > 1 and path[0] in {"actions", "properties", "events"} else None
+    )
+    return f"{source_lines[-1]}: {problem}" if source_lines else problem
 
 
 @dataclass(frozen=True)
@@ -533,18 +540,18 @@ def lines_of(body: type) -> dict[str, list[SourceLine]]:
         tree = parse_module(textwrap.dedent("".join(lines)))
     except (OSError, TypeError, SyntaxError, ValueError):
         return {}
-    found: dict[str, list[SourceLine]] = {}
+    lines_by_name: dict[str, list[SourceLine]] = {}
     (declared,) = tree.body
     for statement in declared.body if isinstance(declared, ast.ClassDef) else ():
         for name in _bound_names(statement):
-            found.setdefault(name, []).append(SourceLine(file, first + statement.lineno - 1))
-    return found
+            lines_by_name.setdefault(name, []).append(SourceLine(file, first + statement.lineno - 1))
+    return lines_by_name
 
 
 def _bound_names(statement: ast.stmt) -> Iterator[str]:
     if isinstance(statement, (ast.FunctionDef, ast.AsyncFunctionDef)):
-        again = (_decorator_name(each) for each in statement.decorator_list)
-        if not {"setter", "getter", "deleter", "overload"} & set(again):
+        decorators = (_decorator_name(each) for each in statement.decorator_list)
+        if not {"setter", "getter", "deleter", "overload"} & set(decorators):
             yield statement.name
     elif isinstance(statement, ast.Assign):
         yield from (each.id for each in statement.targets if isinstance(each, ast.Name))

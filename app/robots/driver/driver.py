@@ -116,7 +116,7 @@ class Driver:
     def _start_commands(self, body: object) -> None:
         stop, timing = self.kind.stop
         stop_function: Callable[[], object] = getattr(body, stop)
-        answer = partial(self._publish, self.robot.topics.reply)
+        publish_reply = partial(self._publish, self.robot.topics.reply)
 
         def publish_heartbeat(not_ended: tuple[str, ...], error: str | None) -> None:
             desk.publish_heartbeat(
@@ -131,7 +131,7 @@ class Driver:
             watchdog_s=timing.watchdog_s,
             beat=publish_heartbeat,
         )
-        desk = CommandHandler(self.robot, body, self.kind.actions, tasks, answer, self._resolve)
+        desk = CommandHandler(self.robot, body, self.kind.actions, tasks, publish_reply, self._resolve)
         dialect = RizeDialect(
             self.robot, self.kind.actions, desk, tasks, partial(self._publish, RIZE_ANSWERS)
         )
@@ -184,11 +184,11 @@ class Driver:
         """
         spec = self.kind.sensors[sensor]
         try:
-            told = spec.to_json(value)
+            encoded = spec.to_json(value)
         except RobotValueError as error:
-            words = lazy("{robot}'s sensor '{sensor}': {error}")
-            raise RobotValueError(words, robot=self.name, sensor=sensor, error=error) from error
-        self._publish(topic_of(self.name, sensor), told)
+            message = lazy("{robot}'s sensor '{sensor}': {error}")
+            raise RobotValueError(message, robot=self.name, sensor=sensor, error=error) from error
+        self._publish(topic_of(self.name, sensor), encoded)
 
     def happen(self, event: str, **data: object) -> None:
         """Publish an event; if it can be converted, also on RIZE's blackboard.
@@ -201,13 +201,13 @@ class Driver:
         try:
             data = fields_to_json(spec.fields, data)
         except RobotValueError as error:
-            words = lazy("{robot}'s event '{event}': {error}")
-            raise RobotValueError(words, robot=self.name, event=event, error=error) from error
+            message = lazy("{robot}'s event '{event}': {error}")
+            raise RobotValueError(message, robot=self.name, event=event, error=error) from error
         self._publish(topic_of(self.name, event), data)
         if spec.to_rize is not None:
-            primitive, given = spec.to_rize(data)
+            primitive, rize_input = spec.to_rize(data)
             self._publish(
-                BLACKBOARD_TOPIC, {"primitive": primitive, "input": dict(given), "robot": self.name}
+                BLACKBOARD_TOPIC, {"primitive": primitive, "input": dict(rize_input), "robot": self.name}
             )
 
     def event_problems(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
@@ -240,12 +240,12 @@ class Driver:
         publisher = self._publishers.get(topic_of(self.name, leaf))
         return 0 if publisher is None else publisher.subscribers
 
-    def run(self, work: Awaitable[object]) -> object:
+    def run(self, awaitable: Awaitable[object]) -> object:
         """Run an awaitable in the robot's event loop and wait for the result.
 
         The robot's ``async def`` actions run in the same event loop.
         """
-        return self._loop.run(work)
+        return self._loop.run(awaitable)
 
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
         """Call ``changed`` with the payload of each message on ``/<name>/world``, in a background thread.
@@ -321,12 +321,12 @@ class EventLoop:
         self._closed = False
 
     def run(
-        self, work: Awaitable[object], call: Call | None = None, *, within_s: float | None = None
+        self, awaitable: Awaitable[object], call: Call | None = None, *, within_s: float | None = None
     ) -> object:
         """Run an awaitable in the loop and wait for it; return its result or raise its exception.
 
         Args:
-            work: Awaitable.
+            awaitable: Awaitable.
             call: Call whose cancellation cancels the awaitable; None if it can't be cancelled.
             within_s: Timeout in seconds, after which the awaitable is cancelled; None for no limit.
 
@@ -335,7 +335,7 @@ class EventLoop:
             TimeoutError: The timeout has elapsed.
             RuntimeError: The loop is closed, or the caller runs in the loop.
         """
-        loop, waited = self._running_loop(work), _PendingAwaitable(work)
+        loop, waited = self._running_loop(awaitable), _PendingAwaitable(awaitable)
         self._call_soon(partial(waited.start, loop, f"{self._name}: {call.action if call else 'run'}"))
         if call is not None:
             call.on_cancel(partial(self._call_soon, waited.cancel))
@@ -358,11 +358,11 @@ class EventLoop:
         if thread.is_alive():
             _log.warning("%s: an async function holds the event loop up; it was left behind", self._name)
 
-    def _running_loop(self, work: Awaitable[object]) -> asyncio.AbstractEventLoop:
+    def _running_loop(self, awaitable: Awaitable[object]) -> asyncio.AbstractEventLoop:
         with self._lock:
             if self._closed or threading.current_thread() is self._thread:
-                if asyncio.iscoroutine(work):
-                    work.close()
+                if asyncio.iscoroutine(awaitable):
+                    awaitable.close()
                 if self._closed:
                     raise RuntimeError(_("can't run the coroutine: the robot's driver is closed"))
                 raise RuntimeError(_("can't block in the event loop; use await"))
@@ -375,11 +375,11 @@ class EventLoop:
                 self._thread.start()
             return self._loop
 
-    def _call_soon(self, what: Callable[[], object]) -> None:
+    def _call_soon(self, callback: Callable[[], object]) -> None:
         loop = self._loop
         try:
             if loop is not None:
-                loop.call_soon_threadsafe(what)
+                loop.call_soon_threadsafe(callback)
         except RuntimeError:  # the loop has ended
             return
 
@@ -390,11 +390,11 @@ class _PendingAwaitable:
     Until `ended` is set, its other attributes belong to the loop's thread.
     """
 
-    def __init__(self, work: Awaitable[object]) -> None:
+    def __init__(self, awaitable: Awaitable[object]) -> None:
         self.ended = threading.Event()
         self.result: object = None
         self.error: BaseException | None = Canceled()
-        self._work = work
+        self._work = awaitable
         self._task: asyncio.Task[None] | None = None
 
     def start(self, loop: asyncio.AbstractEventLoop, name: str) -> None:
@@ -429,11 +429,11 @@ def _run_loop(loop: asyncio.AbstractEventLoop, is_closed: Callable[[], bool]) ->
                 loop.run_forever()
             except BaseException:  # noqa: BLE001 - e.g. SystemExit of a driver's task; an async stop needs the loop
                 _log.error("a coroutine ended the event loop; it goes on", exc_info=True)
-        left = asyncio.all_tasks(loop)
-        for task in left:
+        remaining = asyncio.all_tasks(loop)
+        for task in remaining:
             task.cancel()
-        if left:
-            loop.run_until_complete(asyncio.wait(left, timeout=_JOIN_TIMEOUT_S / 2))
+        if remaining:
+            loop.run_until_complete(asyncio.wait(remaining, timeout=_JOIN_TIMEOUT_S / 2))
         loop.run_until_complete(loop.shutdown_asyncgens())
     finally:
         asyncio.set_event_loop(None)

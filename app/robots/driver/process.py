@@ -48,16 +48,16 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--name", default=kind.title, help=_("robot name, used as the prefix of its topics"))
     parser.add_argument("--master", default=None, help=_("master address (default: $NEP_MASTER)"))
     parser.add_argument("--owner-pid", type=int, default=None, help=_("exit when this process has ended"))
-    chosen = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     ended = threading.Event()
     enable_crash_trace()
     _handle_signals(ended)
     with Terminal(sys.stderr) as terminal:  # a blocked stderr must not block the robot's threads
         log_to(terminal, logging.INFO)
         try:
-            run(kind, chosen.name, ended, master=chosen.master, owner_pid=chosen.owner_pid)
+            run(kind, options.name, ended, master=options.master, owner_pid=options.owner_pid)
         except (Failed, AppError, nep.NepError) as error:  # Failed: raised by the robot's __init__
-            _print(f"{chosen.name}: {error}", terminal)
+            _print(f"{options.name}: {error}", terminal)
             return 1
     return 0
 
@@ -100,16 +100,16 @@ def run(
     with Terminal(sys.stdout) as output, nep.node(name, master=master) as node, _forward_log(node):
         driver = Driver(kind, name, node)
 
-        def print_progress(sentence: str) -> None:
+        def print_progress(text: str) -> None:
             if owner is None:
-                _print(sentence, output)
+                _print(text, output)
 
-        words = (
+        message = (
             _("{robot}: virtual robot, model {model}; topics: {topics}")
             if kind.virtual
             else _("{robot}: robot, model {model}; topics: {topics}")
         )
-        print_progress(words.format(robot=name, model=kind.model, topics=topic_of(name, "...")))
+        print_progress(message.format(robot=name, model=kind.model, topics=topic_of(name, "...")))
         try:
             if not _wait_for_master(
                 driver, name, master_address(master), print_progress, lambda: _has_ended(ended, owner)
@@ -122,28 +122,28 @@ def run(
 
 
 def _wait_for_master(
-    driver: Driver, name: str, address: str, say: Callable[[str], object], is_over: Callable[[], bool]
+    driver: Driver, name: str, address: str, log: Callable[[str], object], is_over: Callable[[], bool]
 ) -> bool:
     has_waited = False
     while not _try_start(driver):
         if not has_waited:
-            words = _("{robot}: no master at {address}; waiting for one. Start Studio or `nep master`")
-            say(words.format(robot=name, address=address))
+            message = _("{robot}: no master at {address}; waiting for one. Start Studio or `nep master`")
+            log(message.format(robot=name, address=address))
         has_waited = True
         if is_over():
             return False
-    words = (
+    message = (
         _("{robot}: found the master at {address}; the robot is ready, press Ctrl+C to stop it")
         if has_waited
         else _("{robot}: the master is at {address}; the robot is ready, press Ctrl+C to stop it")
     )
-    say(words.format(robot=name, address=address))
+    log(message.format(robot=name, address=address))
     return True
 
 
-def _print(words: str, terminal: Terminal) -> None:
+def _print(text: str, terminal: Terminal) -> None:
     # Terminal drops lines instead of blocking: a full pipe must not stop the robot.
-    terminal.write(escaped(words) + "\n")
+    terminal.write(escaped(text) + "\n")
 
 
 @contextmanager

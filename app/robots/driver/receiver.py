@@ -46,11 +46,11 @@ class Dialect(Protocol):
             epoch: Value of `Tasks.epoch` when the message was received.
         """
 
-    def reject(self, wanted: str, operation: str, error: str) -> None:
+    def reject(self, command_id: str, operation: str, error: str) -> None:
         """Reply with an error to a command that was not decoded. Called in the thread of the robot's `Tasks`.
 
         Args:
-            wanted: Id of the command.
+            command_id: Id of the command.
             operation: Operation of the command, such as "invoke".
             error: Error message.
         """
@@ -170,18 +170,20 @@ class CommandReceiver:
     ) -> None:
         self._tasks, self._dialect, self._queues_stops = tasks, dialect, queues_stops
         self._queue = MessageQueue(topic, tasks.call_soon, rejected, MAX_COMMAND_BYTES)
-        self._needles = sorted({json.dumps(word)[1:-1].encode() for word in stop_words if word})
+        self._needles = sorted(
+            {json.dumps(stop_word)[1:-1].encode() for stop_word in stop_words if stop_word}
+        )
 
     def process(self, messages: Sequence[Message]) -> None:
         """Process received messages. Called in the network's thread; never raises."""
-        stops = [at for at, message in enumerate(messages) if self._is_stop(message)]
+        stops = [index for index, message in enumerate(messages) if self._is_stop(message)]
         older_epoch = self._tasks.epoch
-        for at in stops:
-            self._stop(messages[at])
+        for index in stops:
+            self._stop(messages[index])
         epoch, last_stop, handled = self._tasks.epoch, max(stops, default=-1), frozenset(stops)
-        for at, message in enumerate(messages):
-            if self._queues_stops or at not in handled:
-                self._enqueue(message, epoch if at >= last_stop else older_epoch)
+        for index, message in enumerate(messages):
+            if self._queues_stops or index not in handled:
+                self._enqueue(message, epoch if index >= last_stop else older_epoch)
 
     def _is_stop(self, message: Message) -> bool:
         if message.size_bytes > MAX_COMMAND_BYTES:
@@ -203,10 +205,10 @@ class CommandReceiver:
     def _enqueue(self, message: Message, epoch: int) -> None:
         if self._queue.put(message, partial(self._receive, message.publisher, epoch)):
             return
-        wanted, operation = _search(_ID_PATTERN, message), _search(_OPERATION_PATTERN, message)
-        if wanted and operation == "invoke" and self._tasks.backlog < _MAX_BACKLOG:
+        command_id, operation = _search(_ID_PATTERN, message), _search(_OPERATION_PATTERN, message)
+        if command_id and operation == "invoke" and self._tasks.backlog < _MAX_BACKLOG:
             error = self._queue.too_large_message(message)
-            self._tasks.call_soon(partial(self._dialect.reject, wanted, operation, error))
+            self._tasks.call_soon(partial(self._dialect.reject, command_id, operation, error))
 
     def _receive(self, publisher: int | None, epoch: int, command: object) -> None:
         self._dialect.receive(command, publisher, epoch)
@@ -214,7 +216,7 @@ class CommandReceiver:
 
 def _search(pattern: re.Pattern[bytes], message: Message) -> str:
     data = message.data
-    found = pattern.search(bytes(data[:_SEARCH_WINDOW_BYTES])) or pattern.search(
+    match = pattern.search(bytes(data[:_SEARCH_WINDOW_BYTES])) or pattern.search(
         bytes(data[-_SEARCH_WINDOW_BYTES:])
     )
-    return "" if found is None else found[1].decode()
+    return "" if match is None else match[1].decode()

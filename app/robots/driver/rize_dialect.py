@@ -92,7 +92,7 @@ class RizeDialect:
         elif command.get("node") == "action":
             self._run(command, epoch)
 
-    def reject(self, wanted: str, operation: str, error: str) -> None:
+    def reject(self, command_id: str, operation: str, error: str) -> None:
         """Do nothing, because a reply of RIZE's dialect would have to repeat the whole command."""
 
     def _is_for_robot(self, command: Mapping[str, object]) -> bool:
@@ -112,36 +112,36 @@ class RizeDialect:
         for primitive in primitives:
             self._start(as_object(primitive), lambda answer: self._record_reply(group, answer), epoch)
 
-    def _record_reply(self, group: _PrimitiveGroup, answer: TaskReply) -> None:
-        if not answer.is_final:
+    def _record_reply(self, group: _PrimitiveGroup, reply: TaskReply) -> None:
+        if not reply.is_final:
             return
         group.open_count -= 1
-        group.states.append(answer.state)
+        group.states.append(reply.state)
         if group.open_count == 0:
-            good = all(state == "succeeded" for state in group.states)
-            self._publish({**group.command, "state": "success" if good else "failure"})
+            has_succeeded = all(state == "succeeded" for state in group.states)
+            self._publish({**group.command, "state": "success" if has_succeeded else "failure"})
 
     def _start(
-        self, primitive: Mapping[str, object], answer: Callable[[TaskReply], None], epoch: int | None
+        self, primitive: Mapping[str, object], on_reply: Callable[[TaskReply], None], epoch: int | None
     ) -> None:
-        name, given = text(primitive.get("primitive")) or "", _as_text(primitive.get("input"))
-        wanted = f"{_TASK_ID_PREFIX}{next(self._numbers)}"
-        known, spec = self._specs.get(name, (name, None))
-        action = self._robot.action(known)
+        name, input_text = text(primitive.get("primitive")) or "", _as_text(primitive.get("input"))
+        task_id = f"{_TASK_ID_PREFIX}{next(self._numbers)}"
+        action_name, spec = self._specs.get(name, (name, None))
+        action = self._robot.action(action_name)
         if action is not None and action.name == self._robot.safe_stop.action:
-            self._tasks.stop(answer)
+            self._tasks.stop(on_reply)
             return
         task = None
         if action is not None:
-            meant = _parsed_input(
-                action, spec, given, as_object(primitive.get("options"))
+            task_input = _parsed_input(
+                action, spec, input_text, as_object(primitive.get("options"))
             )  # options may be "none"
-            if meant is not None and not action.check(meant):
-                task = self._commands.create_task(wanted, action, meant, answer, epoch=epoch)
+            if task_input is not None and not action.check(task_input):
+                task = self._commands.create_task(task_id, action, task_input, on_reply, epoch=epoch)
         elif name == "wait":
-            task = _wait_task(wanted, given, answer, epoch)
+            task = _wait_task(task_id, input_text, on_reply, epoch)
         if task is None:
-            answer(TaskReply("failed"))
+            on_reply(TaskReply("failed"))
         else:
             self._tasks.submit(task)
 
@@ -150,8 +150,8 @@ _TASK_ID_PREFIX = "rize:"
 
 
 def _primitives(command: Mapping[str, object]) -> Sequence[object]:
-    given = command.get("primitives")
-    return given if isinstance(given, list) else [given]
+    primitives = command.get("primitives")
+    return primitives if isinstance(primitives, list) else [primitives]
 
 
 def _as_text(value: object) -> str:
@@ -159,12 +159,12 @@ def _as_text(value: object) -> str:
 
 
 def _wait_task(
-    wanted: str, given: str, answer: Callable[[TaskReply], None], epoch: int | None
+    task_id: str, input_text: str, on_reply: Callable[[TaskReply], None], epoch: int | None
 ) -> Task | None:
-    seconds = to_number(given)
+    seconds = to_number(input_text)
     if seconds is None or not 0 <= seconds <= _MAX_WAIT_S:
         return None
-    return Task(wanted, "wait", lambda call: _wait(call, seconds), answer, epoch=epoch)
+    return Task(task_id, "wait", lambda call: _wait(call, seconds), on_reply, epoch=epoch)
 
 
 def _wait(call: Call, seconds: float) -> None:
@@ -172,26 +172,26 @@ def _wait(call: Call, seconds: float) -> None:
 
 
 def _parsed_input(
-    action: Action, spec: ActionSpec | None, given: str, options: Mapping[str, object]
+    action: Action, spec: ActionSpec | None, input_text: str, options: Mapping[str, object]
 ) -> Mapping[str, object] | None:
     if spec is None or spec.from_rize is None:
-        return _input_by_name(action, given, options)
+        return _input_by_name(action, input_text, options)
     try:
-        return spec.from_rize(given, options)
+        return spec.from_rize(input_text, options)
     except (ValueError, KeyError, TypeError, OverflowError):
         return None
 
 
-def _input_by_name(action: Action, given: str, options: Mapping[str, object]) -> dict[str, object]:
-    meant: dict[str, object] = {}
-    if action.parameters and given:
+def _input_by_name(action: Action, input_text: str, options: Mapping[str, object]) -> dict[str, object]:
+    task_input: dict[str, object] = {}
+    if action.parameters and input_text:
         first = action.parameters[0]
-        meant[first.name] = _convert_to_kind(first, given)
+        task_input[first.name] = _convert_to_kind(first, input_text)
     for name, value in options.items():
         parameter = action.parameter(name)
         if parameter is not None:
-            meant[name] = _convert_to_kind(parameter, value)
-    return meant
+            task_input[name] = _convert_to_kind(parameter, value)
+    return task_input
 
 
 def _convert_to_kind(parameter: Parameter, value: object) -> object:

@@ -110,10 +110,12 @@ def schema_of(annotation: object) -> Schema:
     return _schema_of(annotation, ())
 
 
-def _schema_of(annotation: object, inside: tuple[object, ...]) -> Schema:
+def _schema_of(annotation: object, enclosing: tuple[object, ...]) -> Schema:
     annotation, notes = split_annotated(annotation)
     optional, may_be_none = split_optional(annotation)
-    schema = _type_schema(annotation, inside) if optional is annotation else _schema_of(optional, inside)
+    schema = (
+        _type_schema(annotation, enclosing) if optional is annotation else _schema_of(optional, enclosing)
+    )
     if may_be_none:
         schema["rb:nullable"] = True
     for note in notes:
@@ -121,7 +123,7 @@ def _schema_of(annotation: object, inside: tuple[object, ...]) -> Schema:
     return schema
 
 
-def _type_schema(annotation: object, inside: tuple[object, ...]) -> Schema:
+def _type_schema(annotation: object, enclosing: tuple[object, ...]) -> Schema:
     if isinstance(annotation, type) and annotation in _TYPES:
         return {"type": _TYPES[annotation]}
     choices = choices_in(annotation)
@@ -129,24 +131,29 @@ def _type_schema(annotation: object, inside: tuple[object, ...]) -> Schema:
         return _choice_schema(annotation, choices)
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin in {list, Sequence} and len(arguments) == 1:
-        return {"type": "array", "items": _element_schema(arguments[0], inside)}
+        return {"type": "array", "items": _element_schema(arguments[0], enclosing)}
     if origin is tuple and len(arguments) == 2 and arguments[1] is Ellipsis:
-        return {"type": "array", "items": _element_schema(arguments[0], inside)}
+        return {"type": "array", "items": _element_schema(arguments[0], enclosing)}
     if origin is tuple and arguments:
-        places = [_element_schema(each, inside) for each in arguments]
-        return {"type": "array", "items": places, "minItems": len(places), "maxItems": len(places)}
+        element_schemas = [_element_schema(each, enclosing) for each in arguments]
+        return {
+            "type": "array",
+            "items": element_schemas,
+            "minItems": len(element_schemas),
+            "maxItems": len(element_schemas),
+        }
     if origin in {dict, Mapping} and len(arguments) == 2 and arguments[0] is str:
         free = arguments[1] in (Any, object)
         return {"type": "object"} | (
-            {} if free else {"additionalProperties": _element_schema(arguments[1], inside)}
+            {} if free else {"additionalProperties": _element_schema(arguments[1], enclosing)}
         )
-    if annotation in inside:
+    if annotation in enclosing:
         raise TypeError(
             _("recursive types aren't supported: {annotation}").format(annotation=format_type(annotation))
         )
     fields = fields_of(annotation)
     if fields is not None:
-        return _object_schema(fields, (*inside, annotation))
+        return _object_schema(fields, (*enclosing, annotation))
     raise TypeError(
         _(
             "unsupported type {annotation}; use float, int, bool, str, list[...], tuple[...], "
@@ -155,7 +162,7 @@ def _type_schema(annotation: object, inside: tuple[object, ...]) -> Schema:
     )
 
 
-def _element_schema(annotation: object, inside: tuple[object, ...]) -> Schema:
+def _element_schema(annotation: object, enclosing: tuple[object, ...]) -> Schema:
     # Elements of a list or map: None is not allowed.
     if split_optional(split_annotated(annotation)[0])[1]:
         raise TypeError(
@@ -163,7 +170,7 @@ def _element_schema(annotation: object, inside: tuple[object, ...]) -> Schema:
                 annotation=format_type(annotation)
             )
         )
-    return _schema_of(annotation, inside)
+    return _schema_of(annotation, enclosing)
 
 
 def _choice_schema(annotation: object, choices: tuple[tuple[object, object, str | None], ...]) -> Schema:
@@ -176,20 +183,20 @@ def _choice_schema(annotation: object, choices: tuple[tuple[object, object, str 
         )
     texts = [isinstance(value, str) for value in values]
     schema: Schema = {} if any(texts) and not all(texts) else {"type": "string" if all(texts) else "number"}
-    if any(word is not None for _, _, word in choices):
-        return schema | {"oneOf": [{"const": value, "title": word} for value, _, word in choices]}
+    if any(title is not None for _, _, title in choices):
+        return schema | {"oneOf": [{"const": value, "title": title} for value, _, title in choices]}
     return schema | {"enum": values}
 
 
-def _object_schema(fields: Mapping[str, tuple[object, bool]], inside: tuple[object, ...]) -> Schema:
+def _object_schema(fields: Mapping[str, tuple[object, bool]], enclosing: tuple[object, ...]) -> Schema:
     properties = {
-        name: {"title": name.replace("_", " "), **_schema_of(kind, inside)}
+        name: {"title": name.replace("_", " "), **_schema_of(kind, enclosing)}
         for name, (kind, _) in fields.items()
     }
     required = [
         name
-        for name, (kind, must) in fields.items()
-        if must and not split_optional(split_annotated(kind)[0])[1]
+        for name, (kind, is_required) in fields.items()
+        if is_required and not split_optional(split_annotated(kind)[0])[1]
     ]
     return _without_none({"type": "object", "required": required or None, "properties": properties})
 
@@ -198,15 +205,19 @@ def _annotation_schema(note: object, schema: Schema) -> Schema:
     if isinstance(note, Range):
         _check_unit(note.unit)
         step = "multipleOf" if schema.get("type") == "integer" else "rb:step"
-        found = {"minimum": note.minimum, "maximum": note.maximum, step: note.step, "unit": note.unit}
-        return _without_none(found | {"rb:widget": note.widget})
+        keywords = {"minimum": note.minimum, "maximum": note.maximum, step: note.step, "unit": note.unit}
+        return _without_none(keywords | {"rb:widget": note.widget})
     if isinstance(note, Text):
         return _without_none({"minLength": note.min_length or None, "maxLength": note.max_length})
     if isinstance(note, Words):
         values = schema.pop("enum", None)
         if values is None:
-            named = schema.get("oneOf")
-            values = [as_object(each).get("const") for each in named] if isinstance(named, list) else []
+            titled_choices = schema.get("oneOf")
+            values = (
+                [as_object(each).get("const") for each in titled_choices]
+                if isinstance(titled_choices, list)
+                else []
+            )
         names = values if isinstance(values, list) else []
         return {"oneOf": [{"const": value, "title": note.labels.get(value, str(value))} for value in names]}
     if isinstance(note, Title):
@@ -222,8 +233,8 @@ def _annotation_schema(note: object, schema: Schema) -> Schema:
     raise TypeError(_("{note} isn't a valid annotation for a robot's value").format(note=repr(note)))
 
 
-def _without_none(found: Mapping[str, object]) -> Schema:
-    return {name: value for name, value in found.items() if value is not None}
+def _without_none(keywords: Mapping[str, object]) -> Schema:
+    return {name: value for name, value in keywords.items() if value is not None}
 
 
 def _check_unit(unit: object) -> None:
@@ -251,9 +262,9 @@ def input_types(function: Callable[..., object]) -> dict[str, object]:
         TypeError: A parameter has no type, or is variadic or positional-only.
     """
     hints: dict[str, Any] = get_type_hints(function, include_extras=True)
-    found: dict[str, object] = {}
+    types_by_name: dict[str, object] = {}
     parameters = list(inspect.signature(function).parameters.values())
-    for place, parameter in enumerate(parameters):
+    for index, parameter in enumerate(parameters):
         name = parameter.name
         if name in {"self", "call"}:
             continue
@@ -267,14 +278,14 @@ def input_types(function: Callable[..., object]) -> dict[str, object]:
         if parameter.kind is parameter.POSITIONAL_ONLY:
             raise TypeError(_("'{name}' can't be positional-only; remove the '/'").format(name=name))
         if name not in hints:
-            words = (
+            message = (
                 _("{function}: '{value}' has no type; the first parameter after 'self' must be 'call: Call'")
-                if place < 2 and "call" not in {each.name for each in parameters}
+                if index < 2 and "call" not in {each.name for each in parameters}
                 else _("{function}: '{value}' needs a type annotation")
             )
-            raise TypeError(words.format(function=function.__qualname__, value=name))
-        found[name] = hints[name]
-    return found
+            raise TypeError(message.format(function=function.__qualname__, value=name))
+        types_by_name[name] = hints[name]
+    return types_by_name
 
 
 def return_type(function: Callable[..., object]) -> object:
@@ -286,9 +297,9 @@ def return_type(function: Callable[..., object]) -> object:
     kind = get_type_hints(function, include_extras=True).get("return")
     if get_origin(kind) in {Awaitable, Coroutine}:
         kind = get_args(kind)[-1]
-    plain, _ = split_annotated(kind)
-    free = plain in (None, type(None), Any, object, dict, Mapping, NoReturn)
-    return None if free or get_args(plain)[1:] in ((object,), (Any,)) else kind
+    bare_type, _ = split_annotated(kind)
+    free = bare_type in (None, type(None), Any, object, dict, Mapping, NoReturn)
+    return None if free or get_args(bare_type)[1:] in ((object,), (Any,)) else kind
 
 
 def input_schema(function: Callable[..., object]) -> Schema | None:

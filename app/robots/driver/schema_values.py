@@ -30,8 +30,8 @@ _MAX_DEPTH = 40
 def split_annotated(annotation: object) -> tuple[object, tuple[object, ...]]:
     """Split an ``Annotated`` type into the type and its annotations."""
     if get_origin(annotation) is Annotated:
-        plain, *notes = get_args(annotation)
-        return plain, tuple(notes)
+        bare_type, *notes = get_args(annotation)
+        return bare_type, tuple(notes)
     return annotation, ()
 
 
@@ -74,11 +74,15 @@ def fields_of(annotation: object) -> Mapping[str, tuple[object, bool]] | None:
     return None
 
 
-def _field_type(kind: object, must: bool) -> tuple[object, bool]:
+def _field_type(kind: object, is_required: bool) -> tuple[object, bool]:
     # Required and NotRequired take precedence over `__required_keys__`, which misses them in modules with
     # string annotations.
-    word = str(get_origin(kind))
-    return (get_args(kind)[0], "Not" not in word) if word.endswith("Required") else (kind, must)
+    origin_name = str(get_origin(kind))
+    return (
+        (get_args(kind)[0], "Not" not in origin_name)
+        if origin_name.endswith("Required")
+        else (kind, is_required)
+    )
 
 
 def choices_in(annotation: object) -> tuple[tuple[object, object, str | None], ...] | None:
@@ -94,11 +98,12 @@ def choices_in(annotation: object) -> tuple[tuple[object, object, str | None], .
     if not (isinstance(annotation, type) and issubclass(annotation, Enum)):
         return None
     members = list(annotation)
-    plain = all(isinstance(each.value, (str, int, float)) for each in members)
-    plain = plain and not any(isinstance(each.value, bool) for each in members)
-    words = [each.name.lower().replace("_", " ") for each in members]
+    has_plain_values = all(isinstance(each.value, (str, int, float)) for each in members)
+    has_plain_values = has_plain_values and not any(isinstance(each.value, bool) for each in members)
+    titles = [each.name.lower().replace("_", " ") for each in members]
     return tuple(
-        (each.value if plain else each.name, each, word) for each, word in zip(members, words, strict=True)
+        (each.value if has_plain_values else each.name, each, title)
+        for each, title in zip(members, titles, strict=True)
     )
 
 
@@ -132,11 +137,17 @@ def from_json(annotation: object, value: object) -> object:
         return int(value)
     fields = fields_of(kind)
     if fields is not None and isinstance(value, Mapping):
-        made = {name: from_json(each, value[name]) for name, (each, _must) in fields.items() if name in value}
+        arguments_by_name = {
+            name: from_json(each, value[name]) for name, (each, _must) in fields.items() if name in value
+        }
         if not dataclasses.is_dataclass(kind):
-            return made
-        absent = {name: None for name, (each, must) in fields.items() if must and name not in made}
-        return kind(**absent, **made)  # type: ignore[operator]  # a dataclass that fields_of took is a class
+            return arguments_by_name
+        absent = {
+            name: None
+            for name, (each, is_required) in fields.items()
+            if is_required and name not in arguments_by_name
+        }
+        return kind(**absent, **arguments_by_name)  # type: ignore[operator]  # a dataclass that fields_of took is a class
     arguments = get_args(kind)
     if isinstance(value, (list, tuple)) and arguments:
         if get_origin(kind) is tuple and arguments[1:] != (Ellipsis,):
@@ -167,15 +178,15 @@ def to_json(annotation: object, value: object) -> object:
     value = _from_numpy(value)
     choices = choices_in(kind)
     if choices is not None:
-        found = [json for json, python, _title in choices if python is value or is_json_equal(json, value)]
-        if not found:
-            words = [str(json) for json, _python, _title in choices]
+        matches = [json for json, python, _title in choices if python is value or is_json_equal(json, value)]
+        if not matches:
+            choice_texts = [str(json) for json, _python, _title in choices]
             raise RobotValueError(
                 lazy("{place} must be {choices}, not {value}"),
-                choices=format_list(words, "or"),
+                choices=format_list(choice_texts, "or"),
                 value=_format_value(value),
             )
-        return found[0]
+        return matches[0]
     if kind in (float, int, bool, str):
         return _scalar_to_json(kind, value)
     fields = fields_of(kind)
@@ -202,27 +213,27 @@ def fields_to_json(
         RobotValueError: A field is invalid or missing; the error names the field.
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
+        value = {item.name: getattr(value, item.name) for item in dataclasses.fields(value)}
     if not isinstance(value, Mapping):
-        wanted = format_list(list(kinds)) or _("named values")
+        names = format_list(list(kinds)) or _("named values")
         raise RobotValueError(
             lazy("{place} must be an object with {names}, not {value}"),
-            names=wanted,
+            names=names,
             value=_format_value(value),
         )
-    made: dict[str, object] = {}
-    for name, each in value.items():
+    encoded: dict[str, object] = {}
+    for name, item in value.items():
         try:
-            is_unknown = each is None and name not in required
-            made[str(name)] = (
-                to_json(kinds[name], each) if name in kinds and not is_unknown else any_to_json(each)
+            is_unknown = item is None and name not in required
+            encoded[str(name)] = (
+                to_json(kinds[name], item) if name in kinds and not is_unknown else any_to_json(item)
             )
         except RobotValueError as error:
             raise error.nested_in(str(name)) from error
     for name in required:
-        if name not in made:
+        if name not in encoded:
             raise RobotValueError(lazy("{place} is missing"), name)
-    return made
+    return encoded
 
 
 def any_to_json(value: object, depth: int = 0) -> object:
@@ -267,16 +278,16 @@ def is_json_equal(allowed: object, value: object) -> bool:
 
 
 def _scalar_to_json(kind: object, value: object) -> object:
-    wanted, words = next((each, words) for each, words in _TYPE_MESSAGES.items() if each is kind)
-    if wanted is bool or wanted is str:
-        good = isinstance(value, wanted)
+    expected, message = next((each, message) for each, message in _TYPE_MESSAGES.items() if each is kind)
+    if expected is bool or expected is str:
+        is_valid = isinstance(value, expected)
     else:
-        found = _number(value)
-        good = found is not None and (wanted is float or float(found).is_integer())
-        if good and found is not None:
-            return found if wanted is float else int(found)
-    if not good:
-        raise RobotValueError(words, value=_format_value(value))
+        number = _number(value)
+        is_valid = number is not None and (expected is float or float(number).is_integer())
+        if is_valid and number is not None:
+            return number if expected is float else int(number)
+    if not is_valid:
+        raise RobotValueError(message, value=_format_value(value))
     return value
 
 
@@ -302,25 +313,27 @@ def _collection_to_json(kind: object, value: object) -> object:
                 lazy("{place} must have {count} values, not {given}"), count=len(arguments), given=len(value)
             )
         return [
-            _element_to_json(each, item, place)
-            for place, (each, item) in enumerate(zip(arguments, value, strict=True), 1)
+            _element_to_json(each, item, position)
+            for position, (each, item) in enumerate(zip(arguments, value, strict=True), 1)
         ]
-    return [_element_to_json(arguments[0], item, place) for place, item in enumerate(value, 1)]
+    return [_element_to_json(arguments[0], item, position) for position, item in enumerate(value, 1)]
 
 
-def _element_to_json(kind: object, value: object, place: int | str) -> object:
+def _element_to_json(kind: object, value: object, location: int | str) -> object:
     try:
         return to_json(kind, value)
     except RobotValueError as error:
-        named = f"“{place}”" if isinstance(place, str) else _("value {number}").format(number=place)
-        raise error.nested_in(named) from error
+        location_text = (
+            f"“{location}”" if isinstance(location, str) else _("value {number}").format(number=location)
+        )
+        raise error.nested_in(location_text) from error
 
 
 def _required_names(fields: Mapping[str, tuple[object, bool]]) -> list[str]:
     return [
         name
-        for name, (kind, must) in fields.items()
-        if must and not split_optional(split_annotated(kind)[0])[1]
+        for name, (kind, is_required) in fields.items()
+        if is_required and not split_optional(split_annotated(kind)[0])[1]
     ]
 
 
@@ -331,5 +344,5 @@ def _from_numpy(value: object) -> object:
 
 
 def _format_value(value: object) -> str:
-    words = repr(value) if isinstance(value, (str, int, float, bool, type(None))) else type(value).__name__
-    return words if len(words) <= _MAX_DISPLAYED_LENGTH else f"{words[:_MAX_DISPLAYED_LENGTH]}…"
+    text = repr(value) if isinstance(value, (str, int, float, bool, type(None))) else type(value).__name__
+    return text if len(text) <= _MAX_DISPLAYED_LENGTH else f"{text[:_MAX_DISPLAYED_LENGTH]}…"

@@ -104,10 +104,10 @@ class StopThread:
         try:
             self._stop()
         except Failed as failed:
-            why = bounded_str(failed, MAX_ERROR_LENGTH)
+            reason = bounded_str(failed, MAX_ERROR_LENGTH)
         except BaseException as failed:  # noqa: BLE001 - also SystemExit: a stop must always be answered
             _log.warning("%s: its stop broke off", self._name, exc_info=True)
-            why = _("the stop command failed: {error}").format(error=bounded_str(failed, MAX_ERROR_LENGTH))
+            reason = _("the stop command failed: {error}").format(error=bounded_str(failed, MAX_ERROR_LENGTH))
         else:
             return None
-        return _(MAY_MOVE_MESSAGE).format(robot=self._name, why=why)
+        return _(MAY_MOVE_MESSAGE).format(robot=self._name, why=reason)

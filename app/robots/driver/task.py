@@ -111,8 +111,8 @@ class Task:
         if self.call is not None:
             self.call.cancel()
 
-    def finish(self, answer: TaskReply) -> None:
+    def finish(self, reply: TaskReply) -> None:
         """Send the final reply, unless a final reply was already sent."""
         if not self.has_replied:
             self.has_replied = True
-            self.reply(answer)
+            self.reply(reply)

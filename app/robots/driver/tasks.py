@@ -69,8 +69,8 @@ class Watchdog:
 
     def record_start(self, task: Task) -> None:
         """Record that a task has started, which ends earlier motions that use the same resources."""
-        for used in task.uses:
-            self._going_on.pop(used, None)
+        for resource in task.uses:
+            self._going_on.pop(resource, None)
 
     def record_success(self, task: Task) -> None:
         """Record that a task has succeeded, after which its motion may continue.
@@ -87,7 +87,11 @@ class Watchdog:
 
     def deadlines(self) -> list[float]:
         """Return the times on the clock at which the monitored programs count as silent."""
-        return [] if self.patience_s is None else [seen + self.patience_s for seen in self._heard.values()]
+        return (
+            []
+            if self.patience_s is None
+            else [heard_at + self.patience_s for heard_at in self._heard.values()]
+        )
 
     def check_expired(self, now: float, acting: Collection[ProgramId | None]) -> bool:
         """Return True if a silent program has a task or a continuing motion, so that the robot must stop.
@@ -100,7 +104,7 @@ class Watchdog:
         """
         if self.patience_s is None:
             return False
-        silent = [name for name, seen in self._heard.items() if now - seen >= self.patience_s]
+        silent = [name for name, heard_at in self._heard.items() if now - heard_at >= self.patience_s]
         for name in silent:
             del self._heard[name]
         return any(name in acting or name in self._going_on.values() for name in silent)
@@ -170,9 +174,9 @@ class Tasks:
         self._stop_thread.start()
         self._dispatcher.start()
 
-    def call_soon(self, what: Callable[[], object]) -> None:
+    def call_soon(self, callback: Callable[[], object]) -> None:
         """Run a callback in the thread of the tasks. Thread-safe."""
-        self._dispatcher.post(what)
+        self._dispatcher.post(callback)
 
     @property
     def backlog(self) -> int:
@@ -189,14 +193,14 @@ class Tasks:
         """Number of stops so far. Commands received before the last stop are not executed."""
         return self._epoch
 
-    def stop(self, answer: Callable[[TaskReply], None] | None, why: str = "stopped") -> None:
+    def stop(self, on_reply: Callable[[TaskReply], None] | None, reason: str = "stopped") -> None:
         """Stop the robot immediately, end all tasks and increment `epoch`. Thread-safe; does not block.
 
         Args:
-            answer: Called in the thread of the tasks when the robot stands still and every function has
+            on_reply: Called in the thread of the tasks when the robot stands still and every function has
                 ended. Functions that don't end within STOP_ANSWER_S are named in the reply, and no task is
                 accepted until they have ended. None for no reply.
-            why: Reason in the replies to the tasks.
+            reason: Reason in the replies to the tasks.
         """
         with self._lock:
             self._epoch += 1
@@ -207,9 +211,9 @@ class Tasks:
         run = self._stop_thread.reserve()
         try:
             if self._dispatcher.is_current:
-                self._start_stop(run, answer, why)
+                self._start_stop(run, on_reply, reason)
             elif self._dispatcher.urgent_backlog < _MAX_PENDING_STOPS:
-                self._dispatcher.post_urgent(partial(self._start_stop, run, answer, why))
+                self._dispatcher.post_urgent(partial(self._start_stop, run, on_reply, reason))
         finally:
             self._stop_thread.wake()
 
@@ -217,8 +221,8 @@ class Tasks:
         """Stop the robot, end all tasks and join the threads; a function that doesn't end is abandoned."""
         stopped = threading.Event()
 
-        def take(answer: TaskReply) -> None:
-            self._record_unrequested_stop(answer)
+        def take(reply: TaskReply) -> None:
+            self._record_unrequested_stop(reply)
             stopped.set()
 
         self.stop(take, _("the driver is shutting down"))
@@ -281,14 +285,14 @@ class Tasks:
         Args:
             wanted: Returns True for a task to cancel.
         """
-        found = [task for task in (*self._running, *self._queue) if wanted(task)]
-        if not found:
+        matching = [task for task in (*self._running, *self._queue) if wanted(task)]
+        if not matching:
             return NO_SUCH_TASK_MESSAGE
-        stubborn = [task for task in found if task in self._running and not task.cancellable]
+        stubborn = [task for task in matching if task in self._running and not task.cancellable]
         if stubborn:
             return _("{action} can't be cancelled; it ends on its own").format(action=stubborn[0].action)
-        self._drop_queued([task for task in found if task in self._queue], TaskReply("canceled"))
-        for task in found:
+        self._drop_queued([task for task in matching if task in self._queue], TaskReply("canceled"))
+        for task in matching:
             self._end_task(task, TaskReply("canceled"))
         return None
 
@@ -303,12 +307,12 @@ class Tasks:
 
     # ---- the deciding thread ----------------------------------------------------------------------
 
-    def _start_stop(self, run: int, answer: Callable[[TaskReply], None] | None, why: str) -> None:
+    def _start_stop(self, run: int, on_reply: Callable[[TaskReply], None] | None, reason: str) -> None:
         limit = self._clock.now() + self._patience_s
-        if answer is not None:
-            self._pending_stops.append(_PendingStop(run, limit, answer))
+        if on_reply is not None:
+            self._pending_stops.append(_PendingStop(run, limit, on_reply))
         self._watchdog.reset()
-        ended = TaskReply("canceled", error=why)
+        ended = TaskReply("canceled", error=reason)
         self._drop_queued(list(self._queue), ended)
         for task in self._running:
             if task.final_reply is None:
@@ -323,8 +327,8 @@ class Tasks:
     def _on_restart(self) -> None:
         self.stop(self._record_unrequested_stop, _("its driver had an internal error"))
 
-    def _send_reply(self, answer: Callable[[TaskReply], None], told: TaskReply) -> None:
-        self._dispatcher.call(partial(answer, told))
+    def _send_reply(self, on_reply: Callable[[TaskReply], None], reply: TaskReply) -> None:
+        self._dispatcher.call(partial(on_reply, reply))
 
     def _next_due(self) -> float | None:
         due = [task.deadline_s for task in self._running if task.deadline_s is not None]
@@ -366,10 +370,10 @@ class Tasks:
         if self._beat is None:
             return
         now = self._clock.now()
-        told = self._unfinished_report()
-        if (self._needs_heartbeat and now >= self._next_beat_s) or told != self._reported_not_ended:
-            self._next_beat_s, self._reported_not_ended = now + HEARTBEAT_INTERVAL_S, told
-            self._beat(*told)
+        report = self._unfinished_report()
+        if (self._needs_heartbeat and now >= self._next_beat_s) or report != self._reported_not_ended:
+            self._next_beat_s, self._reported_not_ended = now + HEARTBEAT_INTERVAL_S, report
+            self._beat(*report)
 
     def _tick(self) -> None:
         for step in (
@@ -408,11 +412,11 @@ class Tasks:
                 ),
             )
 
-    def _record_unrequested_stop(self, answer: TaskReply) -> None:
-        if answer.state == "failed":
-            if answer.error != self._unasked_stop_error:  # log repeated failures once
-                _log.error("%s", answer.error)
-            self._unasked_stop_error = answer.error
+    def _record_unrequested_stop(self, reply: TaskReply) -> None:
+        if reply.state == "failed":
+            if reply.error != self._unasked_stop_error:  # log repeated failures once
+                _log.error("%s", reply.error)
+            self._unasked_stop_error = reply.error
 
     def _end_task(self, task: Task, how: TaskReply) -> None:
         # A function that keeps running is reported after `_GRACE_S`.
@@ -433,9 +437,9 @@ class Tasks:
             )
             return
         task.deadline_s = None
-        why = "" if task.is_stopped or task.final_reply.error is None else f" ({task.final_reply.error})"
+        details = "" if task.is_stopped or task.final_reply.error is None else f" ({task.final_reply.error})"
         goes_on = still_moving_message(self._name, [task.action])
-        self._send_reply(task.finish, TaskReply("failed", error=f"{goes_on}{why}"))
+        self._send_reply(task.finish, TaskReply("failed", error=f"{goes_on}{details}"))
 
     def _drop_queued(self, tasks: list[Task], how: TaskReply) -> None:
         self._queue = [task for task in self._queue if task not in tasks]
@@ -443,12 +447,12 @@ class Tasks:
             self._send_reply(task.finish, how)
 
     def _start_ready(self) -> None:
-        taken = {used for task in self._running for used in task.uses}
+        busy_resources = {resource for task in self._running for resource in task.uses}
         for task in list(self._queue):
-            if not taken & set(task.uses):
+            if not busy_resources & set(task.uses):
                 self._queue.remove(task)
                 self._start(task)
-            taken |= set(task.uses)  # waiting tasks keep their place in the queue
+            busy_resources |= set(task.uses)  # waiting tasks keep their place in the queue
 
     def _start(self, task: Task) -> None:
         def report(values: Mapping[str, object]) -> None:
@@ -479,12 +483,12 @@ class Tasks:
             self._send_reply(task.reply, TaskReply("running", feedback=values))
 
     def _run_task(self, task: Task, call: Call) -> None:
-        done = TaskReply("failed", error=task.action)
+        reply = TaskReply("failed", error=task.action)
         try:
-            done = self._outcome(task, call)
+            reply = self._outcome(task, call)
             call.close()
         finally:
-            self.call_soon(partial(self._finish_task, task, done))
+            self.call_soon(partial(self._finish_task, task, reply))
 
     def _outcome(self, task: Task, call: Call) -> TaskReply:
         try:
@@ -505,12 +509,12 @@ class Tasks:
             action=task.action, error=bounded_str(error, MAX_ERROR_LENGTH)
         )
 
-    def _finish_task(self, task: Task, done: TaskReply) -> None:
+    def _finish_task(self, task: Task, reply: TaskReply) -> None:
         if task.thread is not None:
             task.thread.join(_JOIN_TIMEOUT_S)
         with self._lock:
             self._running.remove(task)
-        if done.state == "succeeded" and task.final_reply is None:
+        if reply.state == "succeeded" and task.final_reply is None:
             self._watchdog.record_success(task)
         if task.is_stopped and not self._is_stopping:
             # It may have moved the robot after the stop, so the robot is stopped again.
@@ -520,7 +524,7 @@ class Tasks:
             self._pending_stops = [pending._replace(run=run) for pending in self._pending_stops]
         # A function that was asked to end may return normally; the requested ending counts.
         self._send_reply(
-            task.finish, done if task.final_reply is None or done.state == "failed" else task.final_reply
+            task.finish, reply if task.final_reply is None or reply.state == "failed" else task.final_reply
         )
         self._start_ready()
         self._complete_stops()
@@ -569,6 +573,6 @@ def still_moving_message(name: str, actions: Sequence[str]) -> str:
         name: Name of the robot.
         actions: Names of the functions' actions.
     """
-    why = ngettext("{actions} is still running", "{actions} are still running", len(actions))
-    told = ", ".join(_(STOP_LABEL) if each == STOP_LABEL else each for each in actions)
-    return _(MAY_MOVE_MESSAGE).format(robot=name, why=why.format(actions=told))
+    reason = ngettext("{actions} is still running", "{actions} are still running", len(actions))
+    action_names = ", ".join(_(STOP_LABEL) if each == STOP_LABEL else each for each in actions)
+    return _(MAY_MOVE_MESSAGE).format(robot=name, why=reason.format(actions=action_names))

@@ -128,20 +128,20 @@ class SimulatedActions(SensorDeclarations):
     def _head_angles_to(self, target: str) -> tuple[float, float]:
         if target in _HEAD_ANGLES:
             return _HEAD_ANGLES[target]
-        found = self._simulation.seen.get("faces" if target == "face" else "balls", [])
-        if not found:
+        visible_objects = self._simulation.seen.get("faces" if target == "face" else "balls", [])
+        if not visible_objects:
             raise Failed(
                 _("look at: no face in the picture")
                 if target == "face"
                 else _("look at: no ball in the picture")
             )
-        left, down = angles_to(lens_of(self._simulation.body), found[0].centre)
+        left, down = angles_to(lens_of(self._simulation.body), visible_objects[0].centre)
         body = self._simulation.body
         return body.head_yaw.angle + left, body.head_pitch.angle + down
 
-    def _wait_until(self, call: Call, done: Callable[[], bool], halt: Callable[[], None]) -> None:
+    def _wait_until(self, call: Call, is_done: Callable[[], bool], halt: Callable[[], None]) -> None:
         try:
-            call.until(done)
+            call.until(is_done)
         except Canceled:
             with self._simulation.changed:
                 halt()

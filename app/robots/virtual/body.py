@@ -71,8 +71,8 @@ class Speech:
     def word(self) -> str:
         """Word that is currently spoken; "" for an empty text."""
         words = self.text.split()
-        place = int(len(words) * min(0.999, self.spoken_s / self.duration_s))
-        return words[place] if words else ""
+        index = int(len(words) * min(0.999, self.spoken_s / self.duration_s))
+        return words[index] if words else ""
 
 
 @dataclass
@@ -212,8 +212,8 @@ class Body:
         self.theta_deg = START_POSE[2]
         self.eyes, self.shoulders = DEFAULT_EYE_COLOUR, DEFAULT_SHOULDER_COLOUR
         self.touched = dict.fromkeys(self.touched, MIN_TOUCH_S)
-        for place in sorted(self.touched):
-            self.touch(place, down=False)
+        for part in sorted(self.touched):
+            self.touch(part, down=False)
         self.stand()
 
     @property
@@ -244,48 +244,48 @@ class Body:
     @property
     def distance(self) -> float:
         """Distance in m from the edge of the base to the next obstacle ahead, at most 5 m."""
-        ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
-        return min(MAX_DISTANCE_M, max(0.0, ahead))
+        distance_m = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
+        return min(MAX_DISTANCE_M, max(0.0, distance_m))
 
     # ---- the user's actions ------------------------------------------------------------------------
 
-    def touch(self, place: str, *, down: bool) -> None:
+    def touch(self, part: str, *, down: bool) -> None:
         """Start or end a touch, which lasts at least `MIN_TOUCH_S`.
 
         Args:
-            place: Touched part, such as "head".
+            part: Touched part, such as "head".
             down: True to start the touch, False to end it.
         """
         if down:
-            self._ending_touches.discard(place)
-            if place not in self.touched:
-                self.touched[place] = 0.0
-                self.events.append(BodyEvent("touched", {"place": place}))
-        elif place in self.touched:
-            self._ending_touches.add(place)
+            self._ending_touches.discard(part)
+            if part not in self.touched:
+                self.touched[part] = 0.0
+                self.events.append(BodyEvent("touched", {"place": part}))
+        elif part in self.touched:
+            self._ending_touches.add(part)
             self._end_touches()
 
     def _end_touches(self) -> None:
         # Ends touches that have lasted long enough.
-        for place in sorted(self._ending_touches):
-            if self.touched[place] >= MIN_TOUCH_S:
-                self._ending_touches.discard(place)
-                del self.touched[place]
-                self.events.append(BodyEvent("released", {"place": place}))
+        for part in sorted(self._ending_touches):
+            if self.touched[part] >= MIN_TOUCH_S:
+                self._ending_touches.discard(part)
+                del self.touched[part]
+                self.events.append(BodyEvent("released", {"place": part}))
 
-    def set_lifted(self, *, held: bool) -> None:
+    def set_lifted(self, *, is_lifted: bool) -> None:
         """Lift the robot or put it down; interrupted movements continue after that.
 
         Args:
-            held: True to lift the robot.
+            is_lifted: True to lift the robot.
         """
-        self.is_lifted = held
+        self.is_lifted = is_lifted
 
     def carry(self, x: float, y: float) -> None:
         """Move the lifted robot to a position in m, limited by walls; it stays in place if blocked."""
-        place = self.room.carried_position(x, y, RADIUS, (self.x, self.y))
-        if place is not None:
-            self.set_position(*place)
+        position = self.room.carried_position(x, y, RADIUS, (self.x, self.y))
+        if position is not None:
+            self.set_position(*position)
 
     def set_position(self, x: float, y: float) -> None:
         """Set the position of the robot in m; overlapping balls are pushed aside."""
@@ -324,7 +324,7 @@ class Body:
         self._waves = [wave for wave in self._waves if not wave.done]
         for joint in self._joints():
             joint.step(dt)
-        self.touched = {place: for_s + dt for place, for_s in self.touched.items()}
+        self.touched = {part: for_s + dt for part, for_s in self.touched.items()}
         self._end_touches()
         if self._speech is not None:
             self._speech.spoken_s += dt
@@ -337,19 +337,19 @@ class Body:
         self.battery = max(0.0, self.battery - dt * (_DRAIN_PER_S if self.is_still else _DRAIN_MOVING_PER_S))
 
     def _advance_base(self, motion: Motion, dt: float) -> None:
-        way = motion.step(dt)
+        delta = motion.step(dt)
         if self._is_turning:
-            self.theta_deg = _wrap_angle(self.theta_deg + way)
-        elif way:
-            x = self.x + way * math.cos(math.radians(self.theta_deg))
-            y = self.y + way * math.sin(math.radians(self.theta_deg))
+            self.theta_deg = _wrap_angle(self.theta_deg + delta)
+        elif delta:
+            x = self.x + delta * math.cos(math.radians(self.theta_deg))
+            y = self.y + delta * math.sin(math.radians(self.theta_deg))
             if self.room.is_free(x, y, RADIUS, (self.x, self.y)):
                 self.x, self.y = x, y
                 self.room = self.room.with_pushed_ball(x, y, RADIUS)
             else:
-                motion.moved -= way
+                motion.moved -= delta
                 motion.block()
-                self.events.append(BodyEvent("bumped", {"side": "front" if way > 0 else "back"}))
+                self.events.append(BodyEvent("bumped", {"side": "front" if delta > 0 else "back"}))
         if motion.done:
             self._base_motion = None
 

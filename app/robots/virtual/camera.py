@@ -57,39 +57,39 @@ class Camera:
         canvas = Canvas(lens)
         self._paint_shell(canvas, room)
         self._paint_shadows(canvas, room)
-        ahead = [thing for thing in _things(room) if _is_ahead(thing, lens)]
-        for thing in sorted(ahead, key=lambda one: -_distance(one, lens)):
-            if isinstance(thing, Box):
-                _paint_furniture(canvas, thing)
-            elif isinstance(thing, Ball):
-                self._paint_ball(canvas, thing)
-            elif isinstance(thing, Marker):
-                self._paint_marker_stand(canvas, thing)
+        visible = [drawable for drawable in _things(room) if _is_ahead(drawable, lens)]
+        for drawable in sorted(visible, key=lambda one: -_distance(one, lens)):
+            if isinstance(drawable, Box):
+                _paint_furniture(canvas, drawable)
+            elif isinstance(drawable, Ball):
+                self._paint_ball(canvas, drawable)
+            elif isinstance(drawable, Marker):
+                self._paint_marker_stand(canvas, drawable)
             else:
-                self._paint_figure(canvas, thing)
+                self._paint_figure(canvas, drawable)
         if canvas.picture.shape == self._light.shape:
             cv2.multiply(canvas.picture, self._light, dst=canvas.picture, scale=1 / 255)
         return canvas.picture
 
     def _paint_shell(self, canvas: Canvas, room: Room) -> None:
         x0, x1, y0, y1, top = room.x_min, room.x_max, room.y_min, room.y_max, room.height
-        wide, deep = x1 - x0, y1 - y0
-        canvas.draw_texture(self._ceiling, (x0, y0, top), (wide, 0, 0), (0, deep, 0))
-        canvas.draw_texture(self._floor, (x0, y0, 0), (wide, 0, 0), (0, deep, 0))
-        canvas.draw_texture(self._walls["north"], (x0, y1, top), (wide, 0, 0), (0, 0, -top))
-        canvas.draw_texture(self._walls["south"], (x1, y0, top), (-wide, 0, 0), (0, 0, -top))
-        canvas.draw_texture(self._walls["east"], (x1, y1, top), (0, -deep, 0), (0, 0, -top))
-        canvas.draw_texture(self._walls["west"], (x0, y0, top), (0, deep, 0), (0, 0, -top))
+        width, depth = x1 - x0, y1 - y0
+        canvas.draw_texture(self._ceiling, (x0, y0, top), (width, 0, 0), (0, depth, 0))
+        canvas.draw_texture(self._floor, (x0, y0, 0), (width, 0, 0), (0, depth, 0))
+        canvas.draw_texture(self._walls["north"], (x0, y1, top), (width, 0, 0), (0, 0, -top))
+        canvas.draw_texture(self._walls["south"], (x1, y0, top), (-width, 0, 0), (0, 0, -top))
+        canvas.draw_texture(self._walls["east"], (x1, y1, top), (0, -depth, 0), (0, 0, -top))
+        canvas.draw_texture(self._walls["west"], (x0, y0, top), (0, depth, 0), (0, 0, -top))
         for card in room.markers:
             if card.facing_deg is not None:
                 facing = math.radians(card.facing_deg)
                 self._paint_card(canvas, card, np.array([-math.sin(facing), math.cos(facing), 0.0]))
 
-    def _paint_card(self, canvas: Canvas, card: Marker, across: Matrix) -> None:
+    def _paint_card(self, canvas: Canvas, card: Marker, right: Matrix) -> None:
         half = card.size * scenery.MARKER_CARD_SCALE / 2
-        corner = np.array([card.x, card.y, card.z + half]) - across * half
+        corner = np.array([card.x, card.y, card.z + half]) - right * half
         canvas.draw_texture(
-            self._marker(card.id), corner.tolist(), (across * 2 * half).tolist(), (0, 0, -2 * half)
+            self._marker(card.id), corner.tolist(), (right * 2 * half).tolist(), (0, 0, -2 * half)
         )
 
     def _paint_marker_stand(self, canvas: Canvas, card: Marker) -> None:
@@ -101,32 +101,37 @@ class Camera:
         spots += [(person.x, person.y, 0.34, 0.34) for person in room.people]
         spots += [(other.x, other.y, other.radius * 1.4, other.radius * 1.4) for other in room.other_robots]
         spots += [(box.x, box.y, box.width * 0.72, box.depth * 0.72) for box in room.boxes]
-        for x, y, wide, deep in spots:
-            canvas.draw_texture(self._shadow, (x - wide, y - deep, 0), (2 * wide, 0, 0), (0, 2 * deep, 0))
-
-    def _paint_figure(self, canvas: Canvas, one: Person | OtherRobot) -> None:
-        across = right_vector(canvas.lens, one.x, one.y)
-        if isinstance(one, Person):
-            picture, wide = self._person, one.height * scenery.FIGURE_ASPECT_RATIO
-        else:
-            picture, wide = (
-                self._robot(one.figure == "turtle", faces=_is_facing_camera(one, canvas.lens)),
-                one.radius * 2.6,
+        for x, y, half_width, half_depth in spots:
+            canvas.draw_texture(
+                self._shadow,
+                (x - half_width, y - half_depth, 0),
+                (2 * half_width, 0, 0),
+                (0, 2 * half_depth, 0),
             )
-        corner = np.array([one.x, one.y, one.height]) - across * wide / 2
-        canvas.draw_texture(picture, corner.tolist(), (across * wide).tolist(), (0, 0, -one.height))
+
+    def _paint_figure(self, canvas: Canvas, figure: Person | OtherRobot) -> None:
+        right = right_vector(canvas.lens, figure.x, figure.y)
+        if isinstance(figure, Person):
+            picture, width = self._person, figure.height * scenery.FIGURE_ASPECT_RATIO
+        else:
+            picture, width = (
+                self._robot(figure.figure == "turtle", faces=_is_facing_camera(figure, canvas.lens)),
+                figure.radius * 2.6,
+            )
+        corner = np.array([figure.x, figure.y, figure.height]) - right * width / 2
+        canvas.draw_texture(picture, corner.tolist(), (right * width).tolist(), (0, 0, -figure.height))
 
     def _paint_ball(self, canvas: Canvas, ball: Ball) -> None:
         middle = np.array([ball.x, ball.y, ball.z])
         sight = middle - np.asarray(canvas.lens.position)
         sight /= np.linalg.norm(sight)
-        across = right_vector(canvas.lens, ball.x, ball.y)
-        down = np.cross(sight, across)
-        corner = middle - (across + down) * ball.radius
+        right = right_vector(canvas.lens, ball.x, ball.y)
+        down = np.cross(sight, right)
+        corner = middle - (right + down) * ball.radius
         canvas.draw_texture(
             self._ball(ball.colour),
             corner.tolist(),
-            (across * 2 * ball.radius).tolist(),
+            (right * 2 * ball.radius).tolist(),
             (down * 2 * ball.radius).tolist(),
         )
 
@@ -135,8 +140,8 @@ _Drawable: TypeAlias = Box | Person | Ball | Marker | OtherRobot
 
 
 def _things(room: Room) -> list[_Drawable]:
-    stands = [card for card in room.markers if card.facing_deg is None]
-    return [*room.boxes, *room.people, *room.balls, *stands, *room.other_robots]
+    standing_markers = [card for card in room.markers if card.facing_deg is None]
+    return [*room.boxes, *room.people, *room.balls, *standing_markers, *room.other_robots]
 
 
 def _is_facing_camera(other: OtherRobot, lens: Lens) -> bool:
@@ -145,16 +150,16 @@ def _is_facing_camera(other: OtherRobot, lens: Lens) -> bool:
     return to_x * math.cos(theta) + to_y * math.sin(theta) > 0
 
 
-def _is_ahead(thing: _Drawable, lens: Lens) -> bool:
-    half = math.hypot(thing.width, thing.depth) / 2 if isinstance(thing, Box) else 0.5
+def _is_ahead(drawable: _Drawable, lens: Lens) -> bool:
+    half = math.hypot(drawable.width, drawable.depth) / 2 if isinstance(drawable, Box) else 0.5
     forward = lens.rotation[2]
     flat = math.hypot(float(forward[0]), float(forward[1]))
-    along = (thing.x - lens.position[0]) * forward[0] + (thing.y - lens.position[1]) * forward[1]
+    along = (drawable.x - lens.position[0]) * forward[0] + (drawable.y - lens.position[1]) * forward[1]
     return bool(along > -half * flat - abs(float(forward[2])) * 2.0)
 
 
-def _distance(thing: _Drawable, lens: Lens) -> float:
-    return math.hypot(thing.x - lens.position[0], thing.y - lens.position[1])
+def _distance(drawable: _Drawable, lens: Lens) -> float:
+    return math.hypot(drawable.x - lens.position[0], drawable.y - lens.position[1])
 
 
 def right_vector(lens: Lens, x: float, y: float) -> Matrix:
@@ -182,16 +187,16 @@ def _paint_table(canvas: Canvas, box: Box) -> None:
         _paint_block(canvas, (x, y, 0.0), (0.06, 0.06, box.height - 0.06), "#6d4c34")
     _paint_block(canvas, (box.x, box.y, box.height - 0.06), (box.width, box.depth, 0.06), "#8a6244")
     _paint_block(canvas, (box.x, box.y + 0.2, box.height), (0.16, 0.16, 0.18), "#3f8a75")
-    for turn in range(7):
-        lean = math.radians(turn * 360 / 7)
+    for index in range(7):
+        lean = math.radians(index * 360 / 7)
         _paint_leaf(canvas, (box.x, box.y + 0.2, box.height + 0.18), lean, 0.13, 0.3)
 
 
-def _paint_leaf(canvas: Canvas, foot: tuple[float, float, float], lean: float, out: float, up: float) -> None:
-    start = np.array(foot)
-    tip = np.array([foot[0] + out * math.cos(lean), foot[1] + out * math.sin(lean), foot[2] + up])
+def _paint_leaf(canvas: Canvas, base: tuple[float, float, float], lean: float, out: float, up: float) -> None:
+    start = np.array(base)
+    tip = np.array([base[0] + out * math.cos(lean), base[1] + out * math.sin(lean), base[2] + up])
     middle = (start + tip) / 2
-    side = right_vector(canvas.lens, foot[0], foot[1]) * 0.045
+    side = right_vector(canvas.lens, base[0], base[1]) * 0.045
     shade = "#4f9a5f" if math.sin(lean) > 0 else "#5fae6e"
     canvas.fill(np.array([start, middle + side, tip, middle - side]), scenery.to_bgr(shade))
 
@@ -207,32 +212,32 @@ def _paint_shelf(canvas: Canvas, box: Box) -> None:
         high = low + (box.height - 0.12) / levels - 0.06
         left, right = box.x - box.width / 2 + 0.05, box.x + box.width / 2 - 0.05
         _paint_upright(canvas, front, (left, right), (low, high), "#6f563d")
-        for place in range(11):
-            book = left + 0.02 + place * (right - left - 0.04) / 11
-            tall = high - 0.03 - 0.035 * ((place * 7 + level * 3) % 4)
+        for index in range(11):
+            book = left + 0.02 + index * (right - left - 0.04) / 11
+            tall = high - 0.03 - 0.035 * ((index * 7 + level * 3) % 4)
             _paint_upright(
                 canvas,
                 front + 0.002,
                 (book, book + 0.07),
                 (low, tall),
-                _BOOK_COLOURS[(place * 5 + level) % len(_BOOK_COLOURS)],
+                _BOOK_COLOURS[(index * 5 + level) % len(_BOOK_COLOURS)],
             )
 
 
 def _paint_upright(
-    canvas: Canvas, y: float, across: tuple[float, float], up: tuple[float, float], colour: str
+    canvas: Canvas, y: float, x_range: tuple[float, float], up: tuple[float, float], colour: str
 ) -> None:
-    (left, right), (low, high) = across, up
+    (left, right), (low, high) = x_range, up
     corners = [(left, y, low), (right, y, low), (right, y, high), (left, y, high)]
     canvas.fill(np.array(corners), scenery.to_bgr(colour))
 
 
 def _paint_block(
-    canvas: Canvas, foot: tuple[float, float, float], size: tuple[float, float, float], colour: str
+    canvas: Canvas, base: tuple[float, float, float], size: tuple[float, float, float], colour: str
 ) -> None:
-    (x, y, z), (wide, deep, high) = foot, size
+    (x, y, z), (width, depth, height) = base, size
     eye = canvas.lens.position
-    x0, x1, y0, y1, z1 = x - wide / 2, x + wide / 2, y - deep / 2, y + deep / 2, z + high
+    x0, x1, y0, y1, z1 = x - width / 2, x + width / 2, y - depth / 2, y + depth / 2, z + height
     faces = [
         (eye[0] > x1, 0.86, [(x1, y0, z), (x1, y1, z), (x1, y1, z1), (x1, y0, z1)]),
         (eye[0] < x0, 0.92, [(x0, y0, z), (x0, y1, z), (x0, y1, z1), (x0, y0, z1)]),
@@ -240,8 +245,8 @@ def _paint_block(
         (eye[1] < y0, 0.74, [(x0, y0, z), (x1, y0, z), (x1, y0, z1), (x0, y0, z1)]),
         (eye[2] > z1, 1.08, [(x0, y0, z1), (x1, y0, z1), (x1, y1, z1), (x0, y1, z1)]),
     ]
-    for seen, shade, corners in faces:
-        if seen:
+    for is_visible, shade, corners in faces:
+        if is_visible:
             b, g, r = (min(255, round(part * shade)) for part in scenery.to_bgr(colour))
             canvas.fill(np.array(corners), (b, g, r))
 

@@ -71,17 +71,17 @@ class Canvas:
             cv2.fillConvexPoly(self.picture, _to_fixed_point(outline), colour, cv2.LINE_AA, _SHIFT)
 
     def draw_texture(
-        self, texture: Texture, corner: Sequence[float], across: Sequence[float], along: Sequence[float]
+        self, texture: Texture, corner: Sequence[float], top_edge: Sequence[float], along: Sequence[float]
     ) -> None:
         """Draw a texture on a parallelogram.
 
         Args:
             texture: Texture.
             corner: Upper left corner in room coordinates.
-            across: Vector of the upper side in m.
+            top_edge: Vector of the upper side in m.
             along: Vector of the left side in m.
         """
-        start, right, down = (np.asarray(vector, dtype=np.float64) for vector in (corner, across, along))
+        start, right, down = (np.asarray(vector, dtype=np.float64) for vector in (corner, top_edge, along))
         outline = self.lens.outline(np.stack([start, start + right, start + right + down, start + down]))
         box = self._clipped_bounds(outline)
         if box is None:
@@ -115,10 +115,10 @@ class Canvas:
         return (x0, y0, x1, y1) if x1 > x0 and y1 > y0 else None
 
 
-def _blend(target: Picture, over: Picture) -> None:
-    through = cv2.merge([255 - over[:, :, 3]] * 3)
+def _blend(target: Picture, overlay: Picture) -> None:
+    through = cv2.merge([255 - overlay[:, :, 3]] * 3)
     under = cv2.multiply(target, through, scale=1 / 255)
-    cv2.add(under, over[:, :, :3], dst=target)
+    cv2.add(under, overlay[:, :, :3], dst=target)
 
 
 def _to_fixed_point(outline: Matrix) -> NDArray[np.int32]:

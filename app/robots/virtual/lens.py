@@ -49,13 +49,15 @@ class Lens:
 
     def to_camera(self, points: Matrix) -> Matrix:
         """Transform points (n, 3) from room to camera coordinates: right, down and forward in m."""
-        seen: Matrix = (points - np.asarray(self.position)) @ self.rotation.T
-        return seen
+        camera_points: Matrix = (points - np.asarray(self.position)) @ self.rotation.T
+        return camera_points
 
-    def to_pixels(self, seen: Matrix) -> Matrix:
+    def to_pixels(self, points: Matrix) -> Matrix:
         """Project points (n, 3) in camera coordinates, all in front of the camera, to pixels (n, 2)."""
-        scale = self.focal / seen[:, 2]
-        return np.stack([seen[:, 0] * scale + self.width / 2, seen[:, 1] * scale + self.height / 2], axis=1)
+        scale = self.focal / points[:, 2]
+        return np.stack(
+            [points[:, 0] * scale + self.width / 2, points[:, 1] * scale + self.height / 2], axis=1
+        )
 
     def outline(self, points: Matrix) -> Matrix:
         """Project a flat polygon to pixels, clipped to the space in front of the camera.
@@ -70,33 +72,33 @@ class Lens:
         return self.to_pixels(clipped) if len(clipped) else np.empty((0, 2))
 
     def texture_to_pixels(
-        self, corner: Matrix, across: Matrix, along: Matrix, size: tuple[int, int]
+        self, corner: Matrix, top_edge: Matrix, along: Matrix, size: tuple[int, int]
     ) -> Matrix:
         """Return the homography from the pixels of a texture on a parallelogram in the room to image pixels.
 
         Args:
             corner: Upper left corner in room coordinates.
-            across: Vector of the upper side in m.
+            top_edge: Vector of the upper side in m.
             along: Vector of the left side in m.
             size: Width and height of the texture in pixels.
         """
-        columns = [across / size[0], along / size[1], corner - np.asarray(self.position)]
-        seen = self.rotation @ np.stack(columns, axis=1)
+        columns = [top_edge / size[0], along / size[1], corner - np.asarray(self.position)]
+        camera_columns = self.rotation @ np.stack(columns, axis=1)
         half = np.array([[self.focal, 0, self.width / 2], [0, self.focal, self.height / 2], [0, 0, 1]])
-        made: Matrix = half @ seen
-        return made
+        homography: Matrix = half @ camera_columns
+        return homography
 
 
-def _clip_to_near_plane(seen: Matrix) -> Matrix:
-    if seen[:, 2].min() >= NEAR_PLANE_M:
-        return seen
-    if seen[:, 2].max() < NEAR_PLANE_M:
+def _clip_to_near_plane(points: Matrix) -> Matrix:
+    if points[:, 2].min() >= NEAR_PLANE_M:
+        return points
+    if points[:, 2].max() < NEAR_PLANE_M:
         return np.empty((0, 3))
-    kept = []
-    for here, there in zip(seen, np.roll(seen, -1, axis=0), strict=True):
-        if here[2] >= NEAR_PLANE_M:
-            kept.append(here)
-        if (here[2] >= NEAR_PLANE_M) != (there[2] >= NEAR_PLANE_M):
-            part = (NEAR_PLANE_M - here[2]) / (there[2] - here[2])
-            kept.append(here + part * (there - here))
-    return np.array(kept)
+    clipped = []
+    for start, end in zip(points, np.roll(points, -1, axis=0), strict=True):
+        if start[2] >= NEAR_PLANE_M:
+            clipped.append(start)
+        if (start[2] >= NEAR_PLANE_M) != (end[2] >= NEAR_PLANE_M):
+            part = (NEAR_PLANE_M - start[2]) / (end[2] - start[2])
+            clipped.append(start + part * (end - start))
+    return np.array(clipped)

@@ -93,15 +93,15 @@ class Motion:
         else:
             fast_enough_to_end = math.sqrt(2 * self.acceleration * abs(self.remaining))
             self._velocity = min(self.speed, self._velocity + self.acceleration * dt, fast_enough_to_end)
-        way = math.copysign(min(self._velocity * dt, abs(self.remaining)), self.remaining)
+        delta = math.copysign(min(self._velocity * dt, abs(self.remaining)), self.remaining)
         # Snap to the target: the speed approaches 0 with the remaining distance.
-        if abs(self.remaining - way) < 0.002 * max(1.0, abs(self.acceleration)):
-            way = self.remaining if not self._is_halting else way
+        if abs(self.remaining - delta) < 0.002 * max(1.0, abs(self.acceleration)):
+            delta = self.remaining if not self._is_halting else delta
             self.done = True
-        self.moved += way
+        self.moved += delta
         if self.done:
             self._velocity = 0.0
-        return way
+        return delta
 
 
 @dataclass
@@ -137,9 +137,11 @@ class Joint:
 
     def step(self, dt: float) -> None:
         """Advance the joint by ``dt`` seconds."""
-        way = self.target - self.angle
-        reach = self.speed * dt
-        self.angle = self.target if abs(way) <= reach else self.angle + math.copysign(reach, way)
+        difference = self.target - self.angle
+        max_step = self.speed * dt
+        self.angle = (
+            self.target if abs(difference) <= max_step else self.angle + math.copysign(max_step, difference)
+        )
 
 
 @dataclass

@@ -39,13 +39,13 @@ class Neighbours:
             return
         if other.name not in self._seen and len(self._seen) >= MAX_NEIGHBOURS:
             return
-        began = message.get("began_ns")
-        self._seen[other.name] = (other, self._clock.now(), began if isinstance(began, int) else 0)
+        began_ns = message.get("began_ns")
+        self._seen[other.name] = (other, self._clock.now(), began_ns if isinstance(began_ns, int) else 0)
 
     def present_robots(self) -> tuple[OtherRobot, ...]:
         """Return the other robots that are currently in the room."""
         since = self._clock.now() - PRESENCE_TIMEOUT_S
-        self._seen = {name: seen for name, seen in self._seen.items() if seen[1] >= since}
+        self._seen = {name: entry for name, entry in self._seen.items() if entry[1] >= since}
         return tuple(other for other, _at, _began in self._seen.values())
 
     def must_give_way(self, x: float, y: float, radius: float, ignored: Collection[str] = ()) -> bool:
@@ -60,8 +60,8 @@ class Neighbours:
         return any(
             other.name not in ignored
             and math.hypot(other.x - x, other.y - y) < other.radius + radius
-            and (began, other.name) < (self.began_ns, self._name)
-            for other, _at, began in self._seen.values()
+            and (began_ns, other.name) < (self.began_ns, self._name)
+            for other, _at, began_ns in self._seen.values()
         )
 
     def publish_position(self, me: OtherRobot, publish: Callable[[Mapping[str, object]], None]) -> None:
@@ -93,5 +93,5 @@ def _parse_position(message: Mapping[str, object]) -> OtherRobot | None:
     if not all(isinstance(n, (int, float)) and abs(n) < 1000 for n in numbers):  # neither has NaN
         return None
     x, y, theta, radius, height = (float(n) for n in numbers)  # type: ignore[arg-type]
-    good = 0.0 < radius < 1.0 and 0.0 < height < 3.0
-    return OtherRobot(name, x, y, theta, radius, height, figure) if good else None
+    is_valid = 0.0 < radius < 1.0 and 0.0 < height < 3.0
+    return OtherRobot(name, x, y, theta, radius, height, figure) if is_valid else None

@@ -186,14 +186,14 @@ class Room:
             name: Name, such as ``ball 2``, or a kind (``ball``, ``person``, ``face`` or ``marker``) for the
                 first object of this kind.
         """
-        named = next((thing for thing in self.things if thing.name == name), None)
+        exact_match = next((thing for thing in self.things if thing.name == name), None)
         kinds: dict[str, Sequence[Thing]] = {
             "ball": self.balls,
             "person": self.people,
             "face": self.people,
             "marker": self.markers,
         }
-        return named or next(iter(kinds.get(name, ())), None)
+        return exact_match or next(iter(kinds.get(name, ())), None)
 
     def is_free(self, x: float, y: float, radius: float, before: tuple[float, float] | None = None) -> bool:
         """Return True if a disc is inside the room and overlaps no obstacle.
@@ -213,10 +213,10 @@ class Room:
         ):
             return False
         rounds: tuple[_RoundObject, ...] = (*self.people, *self.other_robots)
-        for each in rounds:
-            gap = math.hypot(x - each.x, y - each.y)
-            if gap < radius + each.radius and (
-                before is None or gap <= math.hypot(before[0] - each.x, before[1] - each.y)
+        for obstacle in rounds:
+            gap = math.hypot(x - obstacle.x, y - obstacle.y)
+            if gap < radius + obstacle.radius and (
+                before is None or gap <= math.hypot(before[0] - obstacle.x, before[1] - obstacle.y)
             ):
                 return False
         return all(
@@ -228,14 +228,14 @@ class Room:
     def nearest_free(self, x: float, y: float, radius: float) -> tuple[float, float]:
         """Return the free position of a disc nearest to a point, or the point itself if there is none."""
         x, y = self.clamped_position(x, y, radius)
-        for away in range(60):
-            for turn in range(1 if away == 0 else 16):
-                angle = math.tau * turn / 16
-                place = self.clamped_position(
-                    x + 0.08 * away * math.cos(angle), y + 0.08 * away * math.sin(angle), radius
+        for ring in range(60):
+            for step in range(1 if ring == 0 else 16):
+                angle = math.tau * step / 16
+                position = self.clamped_position(
+                    x + 0.08 * ring * math.cos(angle), y + 0.08 * ring * math.sin(angle), radius
                 )
-                if self.is_free(*place, radius):
-                    return place
+                if self.is_free(*position, radius):
+                    return position
         return x, y
 
     def distance_ahead(self, x: float, y: float, theta_deg: float) -> float:
@@ -279,16 +279,16 @@ class Room:
         thing = self.thing(name)
         match thing:
             case Ball():
-                at = self.clamped_position(x, y, thing.radius)
-                moved = replace(thing, x=at[0], y=at[1])
+                position = self.clamped_position(x, y, thing.radius)
+                moved = replace(thing, x=position[0], y=position[1])
                 return replace(self, balls=_with_replaced(self.balls, thing, moved))
             case Person():
-                at = self.clamped_position(x, y, thing.radius)
-                stands = replace(thing, x=at[0], y=at[1])
-                return replace(self, people=_with_replaced(self.people, thing, stands))
+                position = self.clamped_position(x, y, thing.radius)
+                moved_person = replace(thing, x=position[0], y=position[1])
+                return replace(self, people=_with_replaced(self.people, thing, moved_person))
             case Box():
-                at = self.clamped_position(x, y, thing.width / 2, thing.depth / 2)
-                put = replace(thing, x=at[0], y=at[1])
+                position = self.clamped_position(x, y, thing.width / 2, thing.depth / 2)
+                put = replace(thing, x=position[0], y=position[1])
                 return replace(self, boxes=_with_replaced(self.boxes, thing, put))
             case Marker():
                 return replace(
@@ -302,12 +302,12 @@ class Room:
         for ball in self.balls:
             away_x, away_y = ball.x - x, ball.y - y
             gap = math.hypot(away_x, away_y)
-            reach = radius + ball.radius
-            if gap >= reach:
+            min_gap = radius + ball.radius
+            if gap >= min_gap:
                 continue
             if gap < 1e-6:
                 away_x, away_y, gap = 1.0, 0.0, 1.0
-            room = room.with_moved(ball.name, x + away_x / gap * reach, y + away_y / gap * reach)
+            room = room.with_moved(ball.name, x + away_x / gap * min_gap, y + away_y / gap * min_gap)
         return room
 
     def _attached_to_wall(self, card: Marker, x: float, y: float) -> Marker:
@@ -319,14 +319,14 @@ class Room:
             (y - self.y_min, 90.0, (x, self.y_min + _WALL_GAP_M)),
             (self.y_max - y, -90.0, (x, self.y_max - _WALL_GAP_M)),
         )
-        away, facing, place = min(walls)
-        if away > _WALL_SNAP_M:
+        distance, facing, position = min(walls)
+        if distance > _WALL_SNAP_M:
             x, y = self.clamped_position(x, y, half)
             return replace(card, x=x, y=y, facing_deg=None)
-        return replace(card, x=place[0], y=place[1], facing_deg=facing)
+        return replace(card, x=position[0], y=position[1], facing_deg=facing)
 
     def carried_position(
-        self, x: float, y: float, radius: float, at: tuple[float, float]
+        self, x: float, y: float, radius: float, current: tuple[float, float]
     ) -> tuple[float, float] | None:
         """Return the position that a carried robot reaches; None if obstacles block it.
 
@@ -336,16 +336,16 @@ class Room:
             x: Target position.
             y: Target position.
             radius: Radius of the robot.
-            at: Current position of the robot.
+            current: Current position of the robot.
         """
-        place = self.clamped_position(x, y, radius)
-        for to in (place, (place[0], at[1]), (at[0], place[1])):
-            if self.is_free(*to, radius, at):
+        target = self.clamped_position(x, y, radius)
+        for to in (target, (target[0], current[1]), (current[0], target[1])):
+            if self.is_free(*to, radius, current):
                 return to
         return None
 
     def clamped_position(
-        self, x: float, y: float, half: float, deep: float | None = None
+        self, x: float, y: float, half: float, half_depth: float | None = None
     ) -> tuple[float, float]:
         """Return the nearest position at which an object is completely within the walls.
 
@@ -353,12 +353,12 @@ class Room:
             x: Centre of the object.
             y: Centre of the object.
             half: Half of the size along x.
-            deep: Half of the size along y (default: `half`).
+            half_depth: Half of the size along y (default: `half`).
         """
-        deep = half if deep is None else deep
+        half_depth = half if half_depth is None else half_depth
         return (
             min(max(x, self.x_min + half), self.x_max - half),
-            min(max(y, self.y_min + deep), self.y_max - deep),
+            min(max(y, self.y_min + half_depth), self.y_max - half_depth),
         )
 
     def _distance_to_walls(self, x: float, y: float, dx: float, dy: float) -> float:

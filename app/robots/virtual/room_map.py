@@ -94,16 +94,16 @@ class RoomMap:
         """Update the positions of all objects from a room; return True if any position has changed."""
         changed = False
         for thing in room.things:
-            known = self._things.get(thing.name)
-            if known is not None and not known.gone and (known.x, known.y) != (thing.x, thing.y):
-                self._set_entry(replace(known, x=thing.x, y=thing.y))
+            entry = self._things.get(thing.name)
+            if entry is not None and not entry.gone and (entry.x, entry.y) != (thing.x, thing.y):
+                self._set_entry(replace(entry, x=thing.x, y=thing.y))
                 changed = True
         return changed
 
     def add(self, kind: str, x: float, y: float) -> str | None:
         """Add an object and return its name; None if there are too many objects of this kind."""
-        there = {each.name for each in self._things.values() if not each.gone}
-        free = [name for name in _names(kind) if name not in there]
+        existing = {each.name for each in self._things.values() if not each.gone}
+        free = [name for name in _names(kind) if name not in existing]
         if not free:
             return None
         self._set_entry(MapEntry(free[0], kind, x, y))
@@ -112,26 +112,26 @@ class RoomMap:
 
     def remove(self, name: str) -> bool:
         """Remove an object; return False if it doesn't exist."""
-        known = self._things.get(name)
-        if known is None or known.gone:
+        entry = self._things.get(name)
+        if entry is None or entry.gone:
             return False
-        self._set_entry(replace(known, gone=True))
+        self._set_entry(replace(entry, gone=True))
         return True
 
     def reset(self) -> None:
         """Restore the room at the start; added objects are removed."""
         first = {thing.name: thing for thing in self.start.things}
-        for known in list(self._things.values()):
-            thing = first.get(known.name)
+        for entry in list(self._things.values()):
+            thing = first.get(entry.name)
             if thing is None:
-                self._set_entry(replace(known, gone=True))
+                self._set_entry(replace(entry, gone=True))
             else:
-                self._set_entry(replace(known, x=thing.x, y=thing.y, gone=False))
+                self._set_entry(replace(entry, x=thing.x, y=thing.y, gone=False))
 
-    def _set_entry(self, thing: MapEntry) -> None:
-        before = self._things.get(thing.name)
+    def _set_entry(self, entry: MapEntry) -> None:
+        before = self._things.get(entry.name)
         newest = before.changed_ns + 1 if before is not None else 1
-        self._things[thing.name] = replace(thing, changed_ns=max(self._clock_ns(), newest))
+        self._things[entry.name] = replace(entry, changed_ns=max(self._clock_ns(), newest))
         self.revision += 1
 
     # -- replication ------------------------------------------------------------------------------
@@ -142,68 +142,70 @@ class RoomMap:
         Args:
             message: Payload created by `RoomMap.message`; invalid entries are ignored.
         """
-        told = message.get("things")
+        raw_entries = message.get("things")
         changed = False
-        for thing in _parse_entries(told if isinstance(told, Sequence) and not isinstance(told, str) else ()):
-            known = self._things.get(thing.name)
-            if known is None and len(self._things) >= MAX_OBJECTS:
+        for entry in _parse_entries(
+            raw_entries if isinstance(raw_entries, Sequence) and not isinstance(raw_entries, str) else ()
+        ):
+            existing = self._things.get(entry.name)
+            if existing is None and len(self._things) >= MAX_OBJECTS:
                 continue
-            if known is None or (thing.kind == known.kind and thing.merge_key > known.merge_key):
-                self._things[thing.name] = thing
+            if existing is None or (entry.kind == existing.kind and entry.merge_key > existing.merge_key):
+                self._things[entry.name] = entry
                 changed = True
         self.revision += changed
         return changed
 
     def message(self) -> dict[str, object]:
         """Return the whole map as a payload for publishing and saving."""
-        return {"things": [asdict(thing) for thing in self._things.values()]}
+        return {"things": [asdict(entry) for entry in self._things.values()]}
 
     # -- conversion --------------------------------------------------------------------------------
 
     def room(self) -> Room:
         """Return the room with all objects at their current positions."""
         balls, people, markers, boxes = [], [], [], []
-        for made in filter(None, map(self._create_thing, self._things.values())):
-            match made:
+        for created in filter(None, map(self._create_thing, self._things.values())):
+            match created:
                 case Ball():
-                    balls.append(made)
+                    balls.append(created)
                 case Person():
-                    people.append(made)
+                    people.append(created)
                 case Marker():
-                    markers.append(made)
+                    markers.append(created)
                 case Box():
-                    boxes.append(made)
+                    boxes.append(created)
         empty = replace(
             self.start, balls=tuple(balls), people=tuple(people), markers=tuple(markers), boxes=tuple(boxes)
         )
         for name in [thing.name for thing in empty.things]:
-            placed = self._things[name]
-            empty = empty.with_moved(name, placed.x, placed.y)
+            entry = self._things[name]
+            empty = empty.with_moved(name, entry.x, entry.y)
         return empty
 
-    def _create_thing(self, placed: MapEntry) -> Thing | None:
-        if placed.gone:
+    def _create_thing(self, entry: MapEntry) -> Thing | None:
+        if entry.gone:
             return None
-        like = self.start.thing(placed.name)
-        if like is not None and like.name == placed.name:
-            return replace(like, x=placed.x, y=placed.y)
-        return _create_added_thing(placed)
+        like = self.start.thing(entry.name)
+        if like is not None and like.name == entry.name:
+            return replace(like, x=entry.x, y=entry.y)
+        return _create_added_thing(entry)
 
 
-def _create_added_thing(placed: MapEntry) -> Thing | None:
-    number = _number_in_name(placed.name)
-    match placed.kind:
+def _create_added_thing(entry: MapEntry) -> Thing | None:
+    number = _number_in_name(entry.name)
+    match entry.kind:
         case "ball":
-            return Ball(placed.name, placed.x, placed.y, 0.15, BALL_COLOURS[(number - 1) % len(BALL_COLOURS)])
+            return Ball(entry.name, entry.x, entry.y, 0.15, BALL_COLOURS[(number - 1) % len(BALL_COLOURS)])
         case "person":
-            at = PERSON_NAMES.index(placed.name) if placed.name in PERSON_NAMES else number
-            return Person(placed.name, placed.x, placed.y, 1.24 + 0.1 * (at % 3))
+            index = PERSON_NAMES.index(entry.name) if entry.name in PERSON_NAMES else number
+            return Person(entry.name, entry.x, entry.y, 1.24 + 0.1 * (index % 3))
         case "marker":
-            return Marker(number % 50, placed.x, placed.y, 1.15, 0.36, None)
+            return Marker(number % 50, entry.x, entry.y, 1.15, 0.36, None)
         case "table":
-            return Box("table", placed.x, placed.y, 0.7, 1.1, 0.72, placed.name)
+            return Box("table", entry.x, entry.y, 0.7, 1.1, 0.72, entry.name)
         case "shelf":
-            return Box("shelf", placed.x, placed.y, 1.1, 0.36, 1.35, placed.name)
+            return Box("shelf", entry.x, entry.y, 1.1, 0.36, 1.35, entry.name)
     return None
 
 
@@ -220,12 +222,12 @@ def _names(kind: str) -> Sequence[str]:
     return [kind, *(f"{kind} {number}" for number in range(2, MAX_PER_KIND + 1))] if kind in KINDS else []
 
 
-def _parse_entries(told: Sequence[object]) -> Iterator[MapEntry]:
-    for one in told[:MAX_OBJECTS]:
-        if not isinstance(one, Mapping):
+def _parse_entries(raw_entries: Sequence[object]) -> Iterator[MapEntry]:
+    for fields in raw_entries[:MAX_OBJECTS]:
+        if not isinstance(fields, Mapping):
             continue
-        name, kind, x, y = (one.get(key) for key in ("name", "kind", "x", "y"))
-        changed_ns = one.get("changed_ns")
+        name, kind, x, y = (fields.get(key) for key in ("name", "kind", "x", "y"))
+        changed_ns = fields.get("changed_ns")
         if (
             isinstance(name, str)
             and 0 < len(name) <= MAX_NAME_LENGTH
@@ -236,9 +238,9 @@ def _parse_entries(told: Sequence[object]) -> Iterator[MapEntry]:
             and isinstance(changed_ns, int)
             and 0 <= changed_ns < 1 << 62
         ):
-            yield MapEntry(name, kind, float(x), float(y), changed_ns, one.get("gone") is True)  # type: ignore[arg-type]
+            yield MapEntry(name, kind, float(x), float(y), changed_ns, fields.get("gone") is True)  # type: ignore[arg-type]
 
 
 def _is_coordinate(value: object) -> bool:
-    place = finite_float(value)
-    return place is not None and abs(place) < _MAX_COORDINATE_M
+    coordinate = finite_float(value)
+    return coordinate is not None and abs(coordinate) < _MAX_COORDINATE_M

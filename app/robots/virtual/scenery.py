@@ -124,8 +124,10 @@ def _paint_picture(picture: Picture, left: float, top: float, right: float, bott
     base = bottom - 14
     for x, peak in ((0.36, 0.35), (0.66, 0.5)):
         tip = (left + (right - left) * x, top + (bottom - top) * peak)
-        wide = (right - left) * 0.25
-        corners = np.array([tip, (tip[0] + wide, base), (tip[0] - wide, base)]).round().astype(np.int32)
+        half_width = (right - left) * 0.25
+        corners = (
+            np.array([tip, (tip[0] + half_width, base), (tip[0] - half_width, base)]).round().astype(np.int32)
+        )
         cv2.fillConvexPoly(picture, corners, to_bgr("#e6a94b"), cv2.LINE_AA)
 
 
@@ -215,9 +217,16 @@ class _Painter:
         self, middle: tuple[float, float], radii: tuple[float, float], colour: str, part: tuple[int, int]
     ) -> None:
         thick = round(0.014 * self.width)
-        across, down = round(radii[0] * self.width), round(radii[1] * self.height)
+        radius_x, radius_y = round(radii[0] * self.width), round(radii[1] * self.height)
         cv2.ellipse(
-            self.colour, self._point(*middle), (across, down), 0, *part, to_bgr(colour), thick, cv2.LINE_AA
+            self.colour,
+            self._point(*middle),
+            (radius_x, radius_y),
+            0,
+            *part,
+            to_bgr(colour),
+            thick,
+            cv2.LINE_AA,
         )
 
     def shape(self, points: list[tuple[float, float]], colour: str) -> None:

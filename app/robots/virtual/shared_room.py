@@ -139,7 +139,7 @@ class SharedRoom:
                 y=round(body.y, 3),
                 theta_deg=round(body.theta_deg, 1),
             )
-            told, self._is_new = self._map.message() if self._is_new else None, False
-        if told is not None:
-            self._tell_room(told)
+            map_message, self._is_new = self._map.message() if self._is_new else None, False
+        if map_message is not None:
+            self._tell_room(map_message)
         self._neighbours.publish_position(me, self._tell_robots)

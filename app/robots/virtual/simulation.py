@@ -173,26 +173,26 @@ class Simulation:
             room, lens = self.body.room, lens_of(self.body)
         if self._view is None or (self._view.room, self._view.lens) != (room, lens):
             self._view = self._render(room, lens)
-        picture, seen = self._view.picture, self._view.detections
+        picture, detections_by_sensor = self._view.picture, self._view.detections
         if publish:
             self._link.sense("camera", picture)
         with self.changed:
-            self.seen = seen
-        for sensor, found in seen.items():
-            self._link.sense(sensor, message(found, lens))
-        self._link.sense("sees_face", bool(seen["faces"]))
-        self._link.sense("sees_ball", bool(seen["balls"]))
-        self._update_seen_face(seen["faces"])
+            self.seen = detections_by_sensor
+        for sensor, detections in detections_by_sensor.items():
+            self._link.sense(sensor, message(detections, lens))
+        self._link.sense("sees_face", bool(detections_by_sensor["faces"]))
+        self._link.sense("sees_ball", bool(detections_by_sensor["balls"]))
+        self._update_seen_face(detections_by_sensor["faces"])
 
     def _render(self, room: Room, lens: Lens) -> _View:
         picture = self._camera.picture(room, lens)
         picture.flags.writeable = False  # reused until something moves
-        seen = {
+        detections = {
             "faces": self._eyes.faces(room, lens),
             "balls": self._eyes.balls(picture),
             "markers": self._eyes.markers(picture),
         }
-        return _View(room, lens, picture, seen)
+        return _View(room, lens, picture, detections)
 
     def _update_seen_face(self, faces: list[Detection]) -> None:
         now = self._clock.now()
@@ -203,8 +203,8 @@ class Simulation:
                 self._face = name
                 self._link.happen("face_seen", name=name)
         elif self._face is not None and now - self._face_seen_s >= _FACE_LOST_TIMEOUT_S:
-            gone, self._face = self._face, None
-            self._link.happen("face_lost", name=gone)
+            lost_face, self._face = self._face, None
+            self._link.happen("face_lost", name=lost_face)
 
     # ---- time and the user's actions -----------------------------------------------------------------------
 
@@ -218,13 +218,13 @@ class Simulation:
             change: Payload of a message on ``/<name>/world``: touch, move, say, hold, reset, start, or a
                 simulated event.
         """
-        place, moved, word = change.get("touch"), change.get("move"), change.get("say")
+        part, moved, word = change.get("touch"), change.get("move"), change.get("say")
         x, y = finite_float(change.get("x")), finite_float(change.get("y"))
         with self.changed:
-            if place in TOUCHABLE_PARTS:
-                self.body.touch(str(place), down=change.get("down") is not False)
+            if part in TOUCHABLE_PARTS:
+                self.body.touch(str(part), down=change.get("down") is not False)
             if isinstance(change.get("hold"), bool):
-                self.body.set_lifted(held=change["hold"] is True)
+                self.body.set_lifted(is_lifted=change["hold"] is True)
             if isinstance(moved, str) and x is not None and y is not None:
                 if moved == ROBOT_ITSELF:
                     self.body.carry(x, y)
@@ -240,8 +240,8 @@ class Simulation:
             self._simulate_event(change)
 
     def _simulate_event(self, change: Mapping[str, object]) -> None:
-        event, given = parse_event(change)
-        data = {**self._default_event_data(event), **given}
+        event, given_data = parse_event(change)
+        data = {**self._default_event_data(event), **given_data}
         if not is_valid_event(self._link, event, data):
             return
         with self.changed:
@@ -296,10 +296,10 @@ def parse_event(change: Mapping[str, object]) -> tuple[str, dict[str, object]]:
 
 def is_valid_event(link: Link, event: str, data: Mapping[str, object]) -> bool:
     """Return True if a simulated event matches the description; otherwise log the problems."""
-    wrong = link.event_problems(event, data)
-    if wrong:
-        _log.warning("%s: it can't notice '%s': %s", link.name, quotable(event), "; ".join(wrong))
-    return not wrong
+    problems = link.event_problems(event, data)
+    if problems:
+        _log.warning("%s: it can't notice '%s': %s", link.name, quotable(event), "; ".join(problems))
+    return not problems
 
 
 def drawing_state(body: Body) -> dict[str, object]:

@@ -52,21 +52,22 @@ class Detection:
         return x + width / 2, y + height / 2
 
 
-def message(found: Iterable[Detection], lens: Lens) -> dict[str, object]:
+def message(detections: Iterable[Detection], lens: Lens) -> dict[str, object]:
     """Return the payload of a detection sensor; its ``name`` is the name of the largest object, or null.
 
     Args:
-        found: Detected objects.
+        detections: Detected objects.
         lens: Camera model, for the size of the image.
     """
-    listed = sorted(found, key=lambda one: -one.box[2] * one.box[3])
+    largest_first = sorted(detections, key=lambda one: -one.box[2] * one.box[3])
     return {
-        "count": len(listed),
-        "name": listed[0].name if listed else None,
+        "count": len(largest_first),
+        "name": largest_first[0].name if largest_first else None,
         "width": lens.width,
         "height": lens.height,
         "items": [
-            {"name": one.name, "confidence": round(one.confidence, 2), "box": list(one.box)} for one in listed
+            {"name": detection.name, "confidence": round(detection.confidence, 2), "box": list(detection.box)}
+            for detection in largest_first
         ],
     }
 
@@ -88,18 +89,18 @@ class ObjectDetector:
         red = cv2.bitwise_or(low, high)
         red = cv2.morphologyEx(red, cv2.MORPH_CLOSE, np.ones((5, 5), dtype=np.uint8))
         count, _, stats, _ = cv2.connectedComponentsWithStats(red)
-        found = []
+        detections = []
         for x, y, width, height, area in stats[1:count].tolist():
             roundness = area / (np.pi / 4 * max(width, height) ** 2)
             if area >= _MIN_BALL_AREA_PX and roundness > 0.72:
-                found.append(Detection("ball", min(0.99, roundness), (x, y, width, height)))
-        return found
+                detections.append(Detection("ball", min(0.99, roundness), (x, y, width, height)))
+        return detections
 
     def markers(self, picture: Picture) -> list[Detection]:
         """Detect ArUco cards (dictionary 4x4, 50) in an image."""
         corners, ids, _ = self._markers.detectMarkers(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
         # OpenCV returns None for no markers, unlike its annotations say.
-        numbers = [int(one) for one in np.asarray(ids).ravel()] if len(corners) else []
+        numbers = [int(marker_id) for marker_id in np.asarray(ids).ravel()] if len(corners) else []
         return [
             Detection(f"marker {number}", 1.0, _box_of(outline[0]))
             for outline, number in zip(corners, numbers, strict=True)
@@ -107,8 +108,10 @@ class ObjectDetector:
 
     def faces(self, room: Room, lens: Lens) -> list[Detection]:
         """Return the visible faces of the people in a room, the largest first."""
-        found = [_face(room, person, lens) for person in room.people]
-        return sorted((each for each in found if each is not None), key=lambda one: -one.box[2] * one.box[3])
+        detections = [_face(room, person, lens) for person in room.people]
+        return sorted(
+            (each for each in detections if each is not None), key=lambda one: -one.box[2] * one.box[3]
+        )
 
 
 def _face(room: Room, person: Person, lens: Lens) -> Detection | None:
@@ -116,10 +119,12 @@ def _face(room: Room, person: Person, lens: Lens) -> Detection | None:
     half_across = right_vector(lens, person.x, person.y) * person.face_width / 2
     half_down = np.array([0.0, 0.0, person.face_height / 2])
     corners = np.array([middle + a * half_across + d * half_down for a in (-1, 1) for d in (-1, 1)])
-    seen = lens.to_camera(corners)
-    if seen[:, 2].min() < NEAR_PLANE_M or room.is_hidden(lens.position, (person.x, person.y, person.face_z)):
+    camera_points = lens.to_camera(corners)
+    if camera_points[:, 2].min() < NEAR_PLANE_M or room.is_hidden(
+        lens.position, (person.x, person.y, person.face_z)
+    ):
         return None
-    pixels = lens.to_pixels(seen)
+    pixels = lens.to_pixels(camera_points)
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     inside_low = np.maximum(low, 0.0)
     inside_high = np.minimum(high, (lens.width, lens.height))
@@ -165,12 +170,14 @@ def colours_in(picture: Picture) -> dict[str, ColourPatch]:
     """Return the largest region of each colour by name, if it fills at least 0.4 % of a BGR image."""
     height, width = picture.shape[:2]
     hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
-    found = {}
+    patches = {}
     for name, ranges in _HUE_RANGES.items():
         mask = np.zeros((height, width), np.uint8)
         for low, high in ranges:
-            least = np.array([low, _MIN_SATURATION, _MIN_VALUE], np.uint8)
-            cv2.bitwise_or(mask, cv2.inRange(hsv, least, np.array([high, 255, 255], np.uint8)), dst=mask)
+            lower_bound = np.array([low, _MIN_SATURATION, _MIN_VALUE], np.uint8)
+            cv2.bitwise_or(
+                mask, cv2.inRange(hsv, lower_bound, np.array([high, 255, 255], np.uint8)), dst=mask
+            )
         count, _, parts, middles = cv2.connectedComponentsWithStats(mask)
         if count < 2:
             continue
@@ -178,5 +185,5 @@ def colours_in(picture: Picture) -> dict[str, ColourPatch]:
         area = float(parts[largest, cv2.CC_STAT_AREA]) / (width * height)
         if area >= MIN_AREA:
             x = float(middles[largest][0]) / width * 2 - 1
-            found[name] = ColourPatch(name, round(x, 3), round(area, 4))
-    return found
+            patches[name] = ColourPatch(name, round(x, 3), round(area, 4))
+    return patches

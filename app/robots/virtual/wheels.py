@@ -60,8 +60,8 @@ class WheelBody:
     @property
     def distance(self) -> float:
         """Distance in m from the edge of the robot to the next obstacle ahead, at most 4 m."""
-        ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
-        return min(MAX_DISTANCE_M, max(0.0, ahead))
+        distance_m = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
+        return min(MAX_DISTANCE_M, max(0.0, distance_m))
 
     def press(self, side: str) -> None:
         """Press a bumper for `PRESS_DURATION_S`; the robot stops as after a collision.
@@ -84,19 +84,19 @@ class WheelBody:
             False,
         )
 
-    def set_lifted(self, *, held: bool) -> None:
+    def set_lifted(self, *, is_lifted: bool) -> None:
         """Lift the robot or put it down; the target speeds apply again after that.
 
         Args:
-            held: True to lift the robot.
+            is_lifted: True to lift the robot.
         """
-        self.is_lifted = held
+        self.is_lifted = is_lifted
 
     def carry(self, x: float, y: float) -> None:
         """Move the lifted robot to a position in m, limited by walls; it stays in place if blocked."""
-        place = self.room.carried_position(x, y, RADIUS, (self.x, self.y))
-        if place is not None:
-            self.set_position(*place)
+        position = self.room.carried_position(x, y, RADIUS, (self.x, self.y))
+        if position is not None:
+            self.set_position(*position)
 
     def set_position(self, x: float, y: float) -> None:
         """Set the position of the robot in m; overlapping balls are pushed aside."""
@@ -127,23 +127,23 @@ class WheelBody:
         drain = _DRAIN_PER_S if self.is_still else _DRAIN_MOVING_PER_S
         self.battery = max(0.0, self.battery - dt * drain)
 
-    def _advance(self, way: float) -> None:
-        x = self.x + way * math.cos(math.radians(self.theta_deg))
-        y = self.y + way * math.sin(math.radians(self.theta_deg))
+    def _advance(self, distance_m: float) -> None:
+        x = self.x + distance_m * math.cos(math.radians(self.theta_deg))
+        y = self.y + distance_m * math.sin(math.radians(self.theta_deg))
         if self.room.is_free(x, y, RADIUS, (self.x, self.y)):
             self.x, self.y = x, y
-            self.driven_m += abs(way)
+            self.driven_m += abs(distance_m)
             self.pressed_bumper = self.pressed_bumper if self._pressed_s > 0.0 else ""
             self.room = self.room.with_pushed_ball(x, y, RADIUS)
             return
         self.speed, self.turn_speed, self._target = 0.0, 0.0, (0.0, 0.0)
-        side = self._touching_side(way)
+        side = self._touching_side(distance_m)
         if side != self.pressed_bumper:
             self.pressed_bumper = side
             self.events.append(BodyEvent("bump", {"side": side}))
 
-    def _touching_side(self, way: float) -> str:
-        if way < 0:
+    def _touching_side(self, distance_m: float) -> str:
+        if distance_m < 0:
             return "back"
         touches = {
             side: not self._is_free_towards(self.theta_deg + aside)
@@ -159,9 +159,9 @@ class WheelBody:
         return self.room.is_free(x, y, RADIUS)
 
 
-def _approach(now: float, wanted: float, faster: float, slower: float) -> float:
+def _approach(now: float, target: float, faster: float, slower: float) -> float:
     # Braking (also to reverse) uses the larger rate.
-    brakes = abs(wanted) < abs(now) or now * wanted < 0
+    brakes = abs(target) < abs(now) or now * target < 0
     change = slower if brakes else faster
-    goal = 0.0 if now * wanted < 0 else wanted
+    goal = 0.0 if now * target < 0 else target
     return goal if abs(goal - now) <= change else now + math.copysign(change, goal - now)

@@ -43,8 +43,8 @@ class KeyBuffer:
 
     def release(self) -> None:
         """Stop buffering and send the buffered keys to the page, in the order in which they were pressed."""
-        kept, self._kept = self._kept or [], None
-        for event in kept:
+        buffered, self._kept = self._kept or [], None
+        for event in buffered:
             keyboard = self._keyboard()
             if keyboard is not None:
                 QCoreApplication.sendEvent(keyboard, event)

@@ -16,8 +16,8 @@ def parse_strings(text: str) -> tuple[str, ...]:
 
 def parse_string_pairs(text: str) -> tuple[tuple[str, str], ...]:
     """Parse a JSON list of string pairs, such as robot and sensor; other items are dropped."""
-    found = (each for each in _parse_list(text) if isinstance(each, list) and len(each) == 2)
-    return tuple((bounded_str(first), bounded_str(second)) for first, second in found)
+    pairs = (each for each in _parse_list(text) if isinstance(each, list) and len(each) == 2)
+    return tuple((bounded_str(first), bounded_str(second)) for first, second in pairs)
 
 
 def decode_data_url(text: str) -> bytes:
@@ -30,7 +30,7 @@ def decode_data_url(text: str) -> bytes:
 
 def _parse_list(text: str) -> list[object]:
     try:
-        found = json.loads(text)
+        items = json.loads(text)
     except (ValueError, RecursionError):
         return []
-    return found if isinstance(found, list) else []
+    return items if isinstance(items, list) else []

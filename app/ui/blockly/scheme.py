@@ -96,11 +96,11 @@ class SchemeHandler(QWebEngineUrlSchemeHandler):
         if url.host() != HOST or job.requestMethod() != b"GET":
             job.fail(QWebEngineUrlRequestJob.Error.RequestDenied)
             return
-        found = read_content(url.path())
-        if found is None:
+        content = read_content(url.path())
+        if content is None:
             job.fail(QWebEngineUrlRequestJob.Error.UrlNotFound)
             return
-        kind, data = found
+        kind, data = content
         buffer = QBuffer(job)
         buffer.setData(QByteArray(data))
         buffer.open(QIODevice.OpenModeFlag.ReadOnly)

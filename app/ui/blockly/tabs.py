@@ -61,10 +61,10 @@ class Tabs:
 
     def close(self, key: str) -> bool:
         """Remove a tab; return False if it doesn't exist. The placeholder replaces the shown tab."""
-        gone = self._tabs.pop(key, None)
-        if gone is not None and gone is self.shown:
+        tab = self._tabs.pop(key, None)
+        if tab is not None and tab is self.shown:
             self.shown = self._create_tab("", WorkspaceJson.from_blocks(EMPTY_WORKSPACE))
-        return gone is not None
+        return tab is not None
 
     def replace(self, program: WorkspaceJson) -> None:
         """Replace the program of the shown tab; `tab_for_edit` rejects later edits of the old program."""

@@ -123,10 +123,10 @@ class BlocklyView(BlocklyHost):
             key: Key of the behaviour.
             workspace: Program for a new tab; not used for an existing one.
         """
-        gone = self._tabs.show(key, WorkspaceJson.from_blocks(workspace))
+        evicted = self._tabs.show(key, WorkspaceJson.from_blocks(workspace))
         self._send_tab()
-        if gone is not None:
-            self._send_command("close", gone)
+        if evicted is not None:
+            self._send_command("close", evicted)
 
     def close_tab(self, key: str) -> None:
         """Close a tab and discard its undo stack. An empty behaviour replaces the shown tab."""
@@ -150,45 +150,47 @@ class BlocklyView(BlocklyHost):
         self._tabs.shown.program = WorkspaceJson.from_blocks(workspace)
         self._send_command("change", workspace)
 
-    def flush(self, done: Callable[[WorkspaceJson], None]) -> None:
-        """Fetch pending edits of the shown tab, then call `done` with the latest program.
+    def flush(self, callback: Callable[[WorkspaceJson], None]) -> None:
+        """Fetch pending edits of the shown tab, then call `callback` with the latest program.
 
-        `done` is called exactly once, even if the page is not loaded or dies. Other tabs have no pending
+        `callback` is called exactly once, even if the page is not loaded or dies. Other tabs have no pending
         edits: they were flushed when another tab was shown.
         """
         if not self._up:
-            done(self._tabs.shown.program)
+            callback(self._tabs.shown.program)
             return
         self._tokens += 1
-        self._waiting[self._tokens] = done
+        self._waiting[self._tokens] = callback
         self._bridge.send_command("flush", self._tokens)
 
-    def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+    def picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
         """Render all blocks of the shown tab as an image.
 
         Args:
             kind: "png" or "svg".
             white: True for a white background, False for a transparent one.
-            done: Called exactly once with the image; with b"" if there are no blocks or no page.
+            callback: Called exactly once with the image; with b"" if there are no blocks or no page.
         """
         if not self._up:
-            done(b"")
+            callback(b"")
             return
         self._tokens += 1
-        self._pictures[self._tokens] = done
+        self._pictures[self._tokens] = callback
         self._bridge.send_command("picture", {"token": self._tokens, "kind": kind, "white": white})
 
-    def render_pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+    def render_pdf(
+        self, title: str, date: str, layout: QPageLayout, callback: Callable[[bytes], None]
+    ) -> None:
         """Render all blocks of the shown tab as a PDF with title and date on each page.
 
         Args:
             title: Title.
             date: Formatted date.
             layout: Page size and margins.
-            done: Called exactly once with the PDF; with b"" if there are no blocks or no page.
+            callback: Called exactly once with the PDF; with b"" if there are no blocks or no page.
         """
         if not self._up:
-            done(b"")
+            callback(b"")
             return
         self._tokens += 1
         token = self._tokens
@@ -201,11 +203,11 @@ class BlocklyView(BlocklyHost):
 
         def on_pages_laid_out(count: bytes) -> None:
             if not count or self.web is None:
-                done(b"")
+                callback(b"")
                 return
-            self._pictures[token] = done  # kept until the PDF is created, as the page may die meanwhile
-            bare = QPageLayout(layout.pageSize(), layout.orientation(), QMarginsF())
-            self.web.page.printToPdf(on_pdf_rendered, bare)
+            self._pictures[token] = callback  # kept until the PDF is created, as the page may die meanwhile
+            layout_without_margins = QPageLayout(layout.pageSize(), layout.orientation(), QMarginsF())
+            self.web.page.printToPdf(on_pdf_rendered, layout_without_margins)
 
         paper = layout.fullRect(QPageLayout.Unit.Inch)
         edge = max(_MIN_MARGIN_INCH, *_margins(layout))
@@ -253,14 +255,14 @@ class BlocklyView(BlocklyHost):
         """Set the warnings shown at blocks, as messages by block id."""
         self._set_state("warnings", dict(warnings))
 
-    def show_value(self, id: str, words: str) -> None:
+    def show_value(self, id: str, text: str) -> None:
         """Show a value at a block until the next click.
 
         Args:
             id: Id of a block of the program or in the flyout.
-            words: Value as text.
+            text: Value as text.
         """
-        self._send_command("value", [id, words])
+        self._send_command("value", [id, text])
 
     def set_absent(self, ids: Sequence[str]) -> None:
         """Dim the blocks with these ids, because their robot is not connected."""
@@ -299,7 +301,9 @@ class BlocklyView(BlocklyHost):
             alarms: Pairs of status (colour of the dot) and message by robot name. The dots of other robots
                 show whether the robot is connected.
         """
-        states: Json = {name: {"status": status, "words": words} for name, (status, words) in alarms.items()}
+        states: Json = {
+            name: {"status": status, "words": message} for name, (status, message) in alarms.items()
+        }
         if states != self._alarms:
             self._alarms = states
             self._send_command("alarms", states)
@@ -325,17 +329,17 @@ class BlocklyView(BlocklyHost):
             self._first_step = state
             self._send_command("begin", state)
 
-    def point_at(self, block: str, name: str = "", then: str = "") -> None:
+    def point_at(self, block: str, name: str = "", placement_hint: str = "") -> None:
         """Highlight the category of a block type and then its block, until such a block is added.
 
         Args:
             block: Type of the block; "" ends the highlighting.
             name: Label of the block.
-            then: Hint where to put the block.
+            placement_hint: Hint where to put the block.
         """
-        wanted: Json | None = {"block": block, "name": name, "then": then} if block else None
-        self._pointed = None if self._up else wanted
-        self._send_command("point", wanted)
+        target: Json | None = {"block": block, "name": name, "then": placement_hint} if block else None
+        self._pointed = None if self._up else target
+        self._send_command("point", target)
 
     # -- commands ---------------------------------------------------------------------------------
 
@@ -359,23 +363,23 @@ class BlocklyView(BlocklyHost):
         """Redo the most recently undone edit in the shown tab."""
         self._send_command("redo", None)
 
-    def edit(self, what: str) -> None:
+    def edit(self, command: str) -> None:
         """Apply an editing command to the selected block and focus the page.
 
         Has no effect if the page already has the focus, because the page has handled the key itself.
 
         Args:
-            what: "copy", "cut", "paste" or "duplicate".
+            command: "copy", "cut", "paste" or "duplicate".
         """
         if self.web is not None and not self._has_focus():
             self.setFocus()
-            self._send_command("edit", what)
+            self._send_command("edit", command)
 
-    def edit_from_menu(self, what: str) -> None:
+    def edit_from_menu(self, command: str) -> None:
         """Apply an editing command to the page's focused text field, or to the selected block.
 
         Args:
-            what: "cut", "copy", "paste" or "selectAll".
+            command: "cut", "copy", "paste" or "selectAll".
         """
         if self.web is None:
             return
@@ -383,10 +387,10 @@ class BlocklyView(BlocklyHost):
 
         def apply_edit(types: object) -> None:
             if types:
-                page.triggerAction(page.WebAction[PAGE_EDIT_ACTIONS[what]])
+                page.triggerAction(page.WebAction[PAGE_EDIT_ACTIONS[command]])
             else:
                 self.setFocus()
-                self._send_command("edit", what)
+                self._send_command("edit", command)
 
         page.runJavaScript(IS_TEXT_FIELD_FOCUSED_JS, apply_edit)
 
@@ -450,8 +454,8 @@ class BlocklyView(BlocklyHost):
         for without in pictures.values():
             without(b"")
         waiting, self._waiting = self._waiting, {}
-        for done in waiting.values():
-            done(self._tabs.shown.program)
+        for callback in waiting.values():
+            callback(self._tabs.shown.program)
         self.history_changed.emit(False, False)
         self.visible_sensors_changed.emit(())
         self.watched_variables_changed.emit(())
@@ -461,11 +465,11 @@ class BlocklyView(BlocklyHost):
         if not self._up:
             return
         tab = self._tabs.shown
-        here: Json = {"key": tab.key}
+        payload: Json = {"key": tab.key}
         if not tab.is_loaded:
-            here |= {"generation": tab.generation, "workspace": tab.program.blocks}
+            payload |= {"generation": tab.generation, "workspace": tab.program.blocks}
             tab.is_loaded = True
-        self._bridge.send_command("tab", here)
+        self._bridge.send_command("tab", payload)
         for name, value in tab.states.items():
             self._bridge.send_command(name, value)
         self._bridge.send_command("live", self._live)
@@ -484,14 +488,14 @@ class BlocklyView(BlocklyHost):
             self.changed.emit(key, tab.program)
 
     def _on_picture_rendered(self, token: int, data: str) -> None:
-        done = self._pictures.pop(token, None)
-        if done is not None:
-            done(decode_data_url(data) if data.startswith("data:") else data.encode())
+        callback = self._pictures.pop(token, None)
+        if callback is not None:
+            callback(decode_data_url(data) if data.startswith("data:") else data.encode())
 
     def _on_workspace_flushed(self, token: int, workspace: str) -> None:
-        done = self._waiting.pop(token, None)
-        if done is not None:
-            done(WorkspaceJson(workspace))
+        callback = self._waiting.pop(token, None)
+        if callback is not None:
+            callback(WorkspaceJson(workspace))
 
 
 def _margins(layout: QPageLayout) -> tuple[float, float, float, float]:

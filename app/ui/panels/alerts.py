@@ -47,16 +47,18 @@ class AlertsPanel(PanelWidget):
             self._show(active)
 
     def _show(self, active: list[ActiveAlert]) -> None:
-        known = {alert.id: row for alert, row in zip(self.shown, self.rows, strict=True)}
+        rows_by_id = {alert.id: row for alert, row in zip(self.shown, self.rows, strict=True)}
         self.shown = active
-        self.rows = [known.pop(each.id) if each.id in known else self._row(each.id) for each in active]
-        for row in known.values():
+        self.rows = [
+            rows_by_id.pop(each.id) if each.id in rows_by_id else self._row(each.id) for each in active
+        ]
+        for row in rows_by_id.values():
             self.pages.remove_row(row)
-        for place, (row, alert) in enumerate(zip(self.rows, active, strict=True)):
+        for index, (row, alert) in enumerate(zip(self.rows, active, strict=True)):
             row.set_texts(
                 alert.severity, alert.title, alert.detail, note=_since_text(alert), button=alert.button or ""
             )
-            self.pages.insert_row(place, row)
+            self.pages.insert_row(index, row)
         self.pages.show_rows(bool(active))
         self.chip.set(str(len(active)) if active else "", active[0].severity if active else "ok")
 
@@ -76,8 +78,8 @@ def _since_text(alert: ActiveAlert) -> str:
     since = f"{clock.tm_hour}:{clock.tm_min:02d}"
     if alert.count < 2:
         return _("since {clock}").format(clock=since)
-    said = ngettext("since {clock}, {count} time", "since {clock}, {count} times", alert.count)
-    return said.format(clock=since, count=group_digits(alert.count))
+    template = ngettext("since {clock}, {count} time", "since {clock}, {count} times", alert.count)
+    return template.format(clock=since, count=group_digits(alert.count))
 
 
 PANEL = Panel("alerts", lazy("Alerts"), "bell", (), AlertsPanel)

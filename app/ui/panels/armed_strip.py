@@ -24,8 +24,8 @@ ARMED_MINUTES = (1, 5, 15, 60)
 
 def remaining_text(seconds: float) -> str:
     """Format a remaining time in minutes and seconds, such as "3:48"."""
-    whole = math.ceil(seconds)
-    return f"{whole // 60}:{whole % 60:02d}"
+    whole_seconds = math.ceil(seconds)
+    return f"{whole_seconds // 60}:{whole_seconds % 60:02d}"
 
 
 class ArmedStrip(QWidget):
@@ -62,15 +62,15 @@ class ArmedStrip(QWidget):
         row.addWidget(self.question, 1)
         for button in (self.let, self.cancel):
             row.addWidget(button, 0, Qt.AlignmentFlag.AlignTop)
-        inside = QVBoxLayout()
-        inside.setContentsMargins(12, 7, 12, 7)
-        inside.setSpacing(6)
-        inside.addWidget(self._flow_place)
-        inside.addWidget(self._asks)
+        content = QVBoxLayout()
+        content.setContentsMargins(12, 7, 12, 7)
+        content.setSpacing(6)
+        content.addWidget(self._flow_place)
+        content.addWidget(self._asks)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        column.addLayout(inside)
+        column.addLayout(content)
         column.addWidget(Separator(self._theme))
         self._asks.hide()
         self.counts.hide()
@@ -85,29 +85,29 @@ class ArmedStrip(QWidget):
         """Update the switch, the targets and the counts."""
         acting = self.acting
         arming, question = acting.arming, acting.question
-        left, replaying = remaining_text(arming.remaining_s), self._context.session.is_replaying
+        remaining, replaying = remaining_text(arming.remaining_s), self._context.session.is_replaying
         targets = arming.targets if arming.is_on else ()
         more = self.summary_text()
-        facts = (arming.is_on, left, targets, question, replaying, more)
-        if facts == self._seen:
+        state = (arming.is_on, remaining, targets, question, replaying, more)
+        if state == self._seen:
             return
-        self._seen = facts
+        self._seen = state
         self._is_on = arming.is_on
         self.switch.setChecked(arming.is_on)
         can_arm = self.is_for_replay or not replaying
         self.switch.setEnabled(can_arm or arming.is_on)
         nothing = self.disarmed_text() if can_arm else _("Sending is off while a recording is open")
-        self.words.setText(_("{time} left").format(time=left) if arming.is_on else nothing)
+        self.words.setText(_("{time} left").format(time=remaining) if arming.is_on else nothing)
         set_role(self.words, "warn" if arming.is_on else "textSecondary")
         self._sends.setVisible(bool(targets))
         self.counts.setVisible(bool(more))
         self.counts.setText(more)
         self._show_tokens(targets)
-        said = question.message if question is not None else ""
+        message = question.message if question is not None else ""
         self._asks.setVisible(question is not None)
-        if said != self.question.text():
-            self.question.setText(said)
-            paint.announce(self, said)
+        if message != self.question.text():
+            self.question.setText(message)
+            paint.announce(self, message)
         self.update()
 
     def disarmed_text(self) -> str:
@@ -149,9 +149,9 @@ class ArmedStrip(QWidget):
         if self.acting.arming.is_on:
             self.acting.disarm()
         else:
-            why_not = self.arm()
-            if why_not:
-                self._context.show_toast(why_not)
+            error = self.arm()
+            if error:
+                self._context.show_toast(error)
         self._seen = ()
         self.refresh()
 
@@ -172,8 +172,8 @@ class ArmDurationMenu(Menu):
         self._choices: dict[int, QAction] = {}
         group = QActionGroup(self)
         for count in ARMED_MINUTES:
-            words = ngettext("{count} minute", "{count} minutes", count).format(count=count)
-            action = self._choices[count] = self.addAction(words)
+            text = ngettext("{count} minute", "{count} minutes", count).format(count=count)
+            action = self._choices[count] = self.addAction(text)
             action.setCheckable(True)
             action.triggered.connect(lambda _on=False, count=count: self._set_minutes(count))
             group.addAction(action)

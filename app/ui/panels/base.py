@@ -40,7 +40,7 @@ class ShowToast(Protocol):
 
     def __call__(
         self,
-        words: str,
+        text: str,
         button: str = "",
         run: Callable[[], object] | None = None,
         *,
@@ -114,16 +114,16 @@ def paused_blocker(panel: str, go_on: Callable[[], object]) -> Blocker:
     )
 
 
-def filter_blocker(panel: str, words: str, clear: Callable[[], object]) -> Blocker:
+def filter_blocker(panel: str, text: str, clear: Callable[[], object]) -> Blocker:
     """Return the reason for a panel whose filter hides data.
 
     Args:
         panel: Title of the panel.
-        words: Text of the filter.
+        text: Text of the filter.
         clear: Clears the filter.
     """
     return Blocker(
-        _("{panel} only shows entries with “{words}”.").format(panel=panel, words=words),
+        _("{panel} only shows entries with “{words}”.").format(panel=panel, words=text),
         "",
         _("Clear the filter"),
         clear,
@@ -238,9 +238,9 @@ class PanelWidget(QWidget):
             title: Title without a number.
             subtitle: Subtitle; None leaves the current one.
         """
-        wanted = (title, self._subtitle if subtitle is None else subtitle)
-        if wanted != (self._title, self._subtitle):
-            self._title, self._subtitle = wanted
+        texts = (title, self._subtitle if subtitle is None else subtitle)
+        if texts != (self._title, self._subtitle):
+            self._title, self._subtitle = texts
             self.setAccessibleName(self.title())
             self.title_changed.emit()
 
@@ -309,15 +309,15 @@ class PanelWidget(QWidget):
 
     def suspend(self) -> None:
         """Suspend the panel's watches after it has been hidden for a while. Its contents stay visible."""
-        for look in self.suspendables():
-            if look is not None:
-                look.suspend()
+        for watch in self.suspendables():
+            if watch is not None:
+                watch.suspend()
 
     def resume(self) -> None:
         """Resume the panel's watches when it becomes visible."""
-        for look in self.suspendables():
-            if look is not None:
-                look.resume()
+        for watch in self.suspendables():
+            if watch is not None:
+                watch.resume()
 
     def dispose(self) -> None:
         """Close watches and streams before the panel is removed from the window."""

@@ -37,7 +37,7 @@ class CameraPanel(OneRobotPanel):
         self._topic = ""
         self._stream: ImageStream | None = None
         # has a fixed width: the topic next to it is elided instead
-        self.rate = SteadyLabel("body", "textSecondary", least=110)
+        self.rate = SteadyLabel("body", "textSecondary", min_width=110)
         self.header = [self.rate]
         self._rates = RateText()
         self._detecting: tuple[str, ...] = ()
@@ -64,28 +64,28 @@ class CameraPanel(OneRobotPanel):
         if self._stream is None or link is None:
             return
         silent_s = self._stream.silent_s
-        seen, size, now = self._snapshot(link, silent_s), self.view.size(), time.monotonic()
+        snapshot, size, now = self._snapshot(link, silent_s), self.view.size(), time.monotonic()
         if (
             now < self._looks_s
             and size == self._size
-            and len(seen) == len(self._seen)
-            and all(map(is_, seen, self._seen))
+            and len(snapshot) == len(self._seen)
+            and all(map(is_, snapshot, self._seen))
         ):
             return  # called 60 times a second, mostly without a new image
         self.view.show_image(self._stream, boxes_in_camera(link, self._topic))
         silent = silent_s is not None and silent_s > STALE_AFTER_S
-        sentence = self._rates.for_stream(self._stream)
-        self.rate.setText("" if silent else sentence)
+        rate_text = self._rates.for_stream(self._stream)
+        self.rate.setText("" if silent else rate_text)
         self.chip.set(_("silent for {age}").format(age=age_text(silent_s)) if silent else "", "error")
         if self._stream.picture is not None:
             self.pages.setCurrentWidget(self.view)
-        self._seen, self._size, self._looks_s = seen, size, now + REFRESH_INTERVAL_S
+        self._seen, self._size, self._looks_s = snapshot, size, now + REFRESH_INTERVAL_S
 
     def _snapshot(self, link: RobotLink, silent_s: float | None) -> tuple[object, ...]:
         # Unchanged items must be the identical objects of the last call.
-        found = (link.values.get(name) for name in self._detecting)
+        detections = (link.values.get(name) for name in self._detecting)
         picture = self._stream.picture if self._stream is not None else None
-        return (picture, None if silent_s is None else int(silent_s * 2), *found)
+        return (picture, None if silent_s is None else int(silent_s * 2), *detections)
 
     def robot_to_show(self) -> RobotLink | None:
         """Return the selected robot if it has a camera, else the first connected one with a camera.
@@ -93,9 +93,11 @@ class CameraPanel(OneRobotPanel):
         Return None if no connected robot has a camera.
         """
         fleet = self.session.fleet
-        shown = fleet.current
-        there = [shown, *fleet.connected] if shown is not None and shown.is_connected else fleet.connected
-        return next((link for link in there if camera_of(link) is not None), None)
+        current = fleet.current
+        candidates = (
+            [current, *fleet.connected] if current is not None and current.is_connected else fleet.connected
+        )
+        return next((link for link in candidates if camera_of(link) is not None), None)
 
     def rebuild_key(self, link: RobotLink) -> object:
         return (link.name, _topic_of(link))
@@ -108,8 +110,8 @@ class CameraPanel(OneRobotPanel):
         self.view.clear()
         self._rates.clear()
         self.set_title(_("Camera"), self._topic)
-        said = _("The next image from {robot} appears here.").format(robot=link.name)
-        self.empty.set_texts(_("No images yet"), said)
+        hint = _("The next image from {robot} appears here.").format(robot=link.name)
+        self.empty.set_texts(_("No images yet"), hint)
         self.empty.set_actions([])
         self.pages.setCurrentWidget(self.empty)
 

@@ -81,29 +81,29 @@ class DoctorPanel(PanelWidget):
     def _arrange(self) -> None:
         about = label(_("Missing topic"), "body", role="textSecondary")
         about.setBuddy(self.missed)
-        self.looked = ElidedLabel("small", "textTertiary", least=40)
+        self.looked = ElidedLabel("small", "textTertiary", min_width=40)
         top = QHBoxLayout()
         top.setContentsMargins(12, 8, 12, 4)
         top.setSpacing(8)
         top.addWidget(about)
         top.addWidget(self.missed, 1)
         top.addWidget(self.looked, 1)
-        self.terminal = ElidedLabel("small", "textSecondary", least=40)
+        self.terminal = ElidedLabel("small", "textSecondary", min_width=40)
         self.copy = Button(self.theme, _("Copy the report"), "copy", size="small")
         self.copy.allow_shrinking()
         self.copy.clicked.connect(self.copy_report)
-        foot = QHBoxLayout()
-        foot.setContentsMargins(12, 5, 12, 6)
-        foot.setSpacing(8)
-        foot.addWidget(self.terminal, 1)
-        foot.addWidget(self.copy)
+        footer = QHBoxLayout()
+        footer.setContentsMargins(12, 5, 12, 6)
+        footer.setSpacing(8)
+        footer.addWidget(self.terminal, 1)
+        footer.addWidget(self.copy)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addLayout(top)
         column.addWidget(self.pages, 1)
         column.addWidget(Separator(self.theme))
-        column.addLayout(foot)
+        column.addLayout(footer)
 
     # -- display ------------------------------------------------------------------------------------------
 
@@ -132,9 +132,9 @@ class DoctorPanel(PanelWidget):
         elif doctor.checked_topic != doctor.expected_topic and not doctor.is_running:
             doctor.start()
         self._update_topics()
-        own = list(self._blockers())
-        told = tuple((each.message, each.button) for each in own)
-        now = (doctor.revision, doctor.is_running, told)
+        blockers = list(self._blockers())
+        texts = tuple((each.message, each.button) for each in blockers)
+        now = (doctor.revision, doctor.is_running, texts)
         if now == self._seen:
             return
         self._seen = now
@@ -143,11 +143,13 @@ class DoctorPanel(PanelWidget):
         is_new = doctor.finished_s is None or doctor.checked_topic != doctor.expected_topic
         if so_far is None and doctor.finished_s is None:
             return
-        self._own = own  # earlier findings stay visible until the next check is done
-        found = self._merge_findings(own, so_far if so_far is not None and is_new else doctor.findings)
-        if found != self.shown or told != self._told:
-            self._told = told
-            self._show(found)
+        self._own = blockers  # earlier findings stay visible until the next check is done
+        findings = self._merge_findings(
+            blockers, so_far if so_far is not None and is_new else doctor.findings
+        )
+        if findings != self.shown or texts != self._told:
+            self._told = texts
+            self._show(findings)
         if doctor.finished_s is not None:
             self.set_title(self.title(), time.strftime("%H:%M:%S", time.localtime(doctor.finished_s)))
         self._show_chip(is_done=so_far is None)
@@ -155,9 +157,11 @@ class DoctorPanel(PanelWidget):
         self.pages.show_rows(bool(self.rows))
 
     @staticmethod
-    def _merge_findings(own: Sequence[Blocker], found: Sequence[Finding]) -> list[Finding]:
-        here = [Finding(f"studio:{place}", "error", each.message, each.fix) for place, each in enumerate(own)]
-        return list(sort_findings([*here, *found]))
+    def _merge_findings(blockers: Sequence[Blocker], findings: Sequence[Finding]) -> list[Finding]:
+        own_findings = [
+            Finding(f"studio:{index}", "error", each.message, each.fix) for index, each in enumerate(blockers)
+        ]
+        return list(sort_findings([*own_findings, *findings]))
 
     def _blockers(self) -> Iterator[Blocker]:
         session, topic = self.session, self.session.doctor.expected_topic
@@ -176,8 +180,8 @@ class DoctorPanel(PanelWidget):
     def _waiting_blockers(self) -> Iterator[Blocker]:
         # Without the missing topic, which the other findings are about.
         missed, now = self.session.doctor.expected_topic, time.monotonic()
-        shown = self.context.panels() if self.session.replay is None else ()
-        waiting = {(panel, topic) for panel in shown if (topic := panel.awaited_topic()) and topic != missed}
+        panels = self.context.panels() if self.session.replay is None else ()
+        waiting = {(panel, topic) for panel in panels if (topic := panel.awaited_topic()) and topic != missed}
         self._waits = {each: self._waits.get(each, now) for each in waiting}
         for panel, topic in sorted(waiting, key=lambda each: (each[0].title(), each[1])):
             if now - self._waits[panel, topic] >= WAIT_REPORT_DELAY_S:
@@ -185,46 +189,51 @@ class DoctorPanel(PanelWidget):
 
     def _waiting_blocker(self, panel: PanelWidget, topic: str) -> Blocker:
         live, names = self.session.live, {"panel": panel.title(), "topic": topic_label(topic)}
-        ask = (_("Why is nothing shown?"), lambda: self.context.open_doctor(panel, topic))
-        known = live.topics.get(topic)
-        if split_key(topic)[0] or (known is not None and known.publisher_nodes):
+        doctor_button = (_("Why is nothing shown?"), lambda: self.context.open_doctor(panel, topic))
+        topic_info = live.topics.get(topic)
+        if split_key(topic)[0] or (topic_info is not None and topic_info.publisher_nodes):
             return Blocker(
-                _("{panel} is waiting for {topic}; no message has arrived.").format(**names), "", *ask
+                _("{panel} is waiting for {topic}; no message has arrived.").format(**names),
+                "",
+                *doctor_button,
             )
-        sentence = _("{panel} is waiting for {topic}, which has no publisher.").format(**names)
+        message = _("{panel} is waiting for {topic}, which has no publisher.").format(**names)
         if topic not in self._near:  # cached: comparing thousands of names takes long
             sent = [each.key for each in live.topics if each.publisher_nodes]
             self._near = {topic: nearest(topic, sent[:MAX_TOPICS])}
-        near = self._near[topic]
-        if near is None:
-            return Blocker(sentence, "", *ask)
+        suggestion = self._near[topic]
+        if suggestion is None:
+            return Blocker(message, "", *doctor_button)
         fix, use = _("Did you mean {topic}?"), _("Use {topic}")
         return Blocker(
-            sentence, fix.format(topic=near), use.format(topic=near), lambda: panel.show_topic(near)
+            message,
+            fix.format(topic=suggestion),
+            use.format(topic=suggestion),
+            lambda: panel.show_topic(suggestion),
         )
 
     def _replay_blocker(self, topic: str) -> Blocker:
         recorded = not topic or self.session.topics.get(topic) is not None
-        sentence = _("A recording is open, so panels show recorded data instead of live data.")
+        message = _("A recording is open, so panels show recorded data instead of live data.")
         if not recorded:
-            sentence = _("The open recording doesn't contain {topic}.").format(topic=topic_label(topic))
+            message = _("The open recording doesn't contain {topic}.").format(topic=topic_label(topic))
         fix = _("The checks below are about the live network.")
-        return Blocker(sentence, fix, _("Back to live"), lambda: self.context.run("replay.live"))
+        return Blocker(message, fix, _("Back to live"), lambda: self.context.run("replay.live"))
 
     def _network_blockers(self, topic: str, lost: str) -> Iterator[Blocker]:
         # Topics of another network: the doctor can't check them.
         unread = self.session.live.networks.read_problem(topic)
-        words = lost or (f"{topic_label(topic)}: {unread}." if unread else "")
-        if words:
+        message = lost or (f"{topic_label(topic)}: {unread}." if unread else "")
+        if message:
             fix = _("Check its address, and its password or key if it needs one.")
-            yield Blocker(words, fix, _("Other networks"), lambda: self.context.run(BROWSE_COMMAND))
+            yield Blocker(message, fix, _("Other networks"), lambda: self.context.run(BROWSE_COMMAND))
 
     def _update_topics(self) -> None:
         live, missed = self.session.live, self.session.doctor.expected_topic
-        facts = (live.topics.revision, live.networks.revision, missed)
-        if facts == self._offered or self.missed.view().isVisible():
+        state = (live.topics.revision, live.networks.revision, missed)
+        if state == self._offered or self.missed.view().isVisible():
             return
-        self._offered = facts
+        self._offered = state
         names = [topic.key for topic in (*live.topics, *live.networks.topics)]
         self.missed.clear()
         self.missed.addItem(_("no specific topic"), "")
@@ -236,30 +245,30 @@ class DoctorPanel(PanelWidget):
 
     def _update_progress(self, *, is_done: bool) -> None:
         doctor = self.session.doctor
-        done, count = (number(each, ".0f") for each in (doctor.looked_at, doctor.things))
+        checked, count = (number(each, ".0f") for each in (doctor.looked_at, doctor.things))
         if not is_done:
-            self.looked.setText(_("Checking: {done} of {count}").format(done=done, count=count))
+            self.looked.setText(_("Checking: {done} of {count}").format(done=checked, count=count))
             return
-        words = ngettext("{count} check done", "{count} checks done", doctor.looked_at)
+        template = ngettext("{count} check done", "{count} checks done", doctor.looked_at)
         if all(each.severity not in PROBLEM_SEVERITIES for each in self.shown):
-            words = ngettext("{count} check passed", "All {count} checks passed", doctor.looked_at)
-        self.looked.setText(words.format(count=done))
+            template = ngettext("{count} check passed", "All {count} checks passed", doctor.looked_at)
+        self.looked.setText(template.format(count=checked))
 
-    def _show(self, found: Sequence[Finding]) -> None:
+    def _show(self, findings: Sequence[Finding]) -> None:
         for row in self.rows:
             self.pages.remove_row(row)
-        self.shown = list(found)
-        steps = [self._next_step(finding) for finding in found]
-        fixes = [place for place, step in enumerate(steps) if step is not None and step.is_fix]
-        self.rows = [self._row(finding, step) for finding, step in zip(found, steps, strict=True)]
-        for place, row in enumerate(self.rows):
-            row.button.set_kind("primary" if place in fixes[:1] else "plain")
-            self.pages.insert_row(place, row)
+        self.shown = list(findings)
+        steps = [self._next_step(finding) for finding in findings]
+        fixes = [index for index, step in enumerate(steps) if step is not None and step.is_fix]
+        self.rows = [self._row(finding, step) for finding, step in zip(findings, steps, strict=True)]
+        for index, row in enumerate(self.rows):
+            row.button.set_kind("primary" if index in fixes[:1] else "plain")
+            self.pages.insert_row(index, row)
 
     def _show_chip(self, *, is_done: bool) -> None:
-        bad = [each.severity for each in self.shown if each.severity in PROBLEM_SEVERITIES]
-        if bad:
-            self.chip.set(str(len(bad)), STATUS_BY_SEVERITY[bad[0]])
+        problem_severities = [each.severity for each in self.shown if each.severity in PROBLEM_SEVERITIES]
+        if problem_severities:
+            self.chip.set(str(len(problem_severities)), STATUS_BY_SEVERITY[problem_severities[0]])
         elif is_done:
             self.chip.set(_("no problems"), "ok")
         else:
@@ -286,8 +295,8 @@ class DoctorPanel(PanelWidget):
         if kind == "studio":
             return NextStep(self._own[int(rest)].button, self._own[int(rest)].run)
         if finding.id == "topic:near":
-            words = _("Use {topic}").format(topic=finding.instead)
-            return NextStep(words, lambda: self._use_topic(finding.instead))
+            text = _("Use {topic}").format(topic=finding.instead)
+            return NextStep(text, lambda: self._use_topic(finding.instead))
         if kind == "topic" and finding.instead:
             return NextStep(
                 _("Call {service}").format(service=finding.instead),

@@ -53,25 +53,25 @@ class HealthRow(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        beside = self.width() >= self._theme.scaled(ONE_LINE_MIN_WIDTH)
-        way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
-        self.title.setMinimumWidth(round(self._theme.scaled(TITLE_WIDTH)) if beside else 0)
+        is_wide = self.width() >= self._theme.scaled(ONE_LINE_MIN_WIDTH)
+        direction = QBoxLayout.Direction.LeftToRight if is_wide else QBoxLayout.Direction.TopToBottom
+        self.title.setMinimumWidth(round(self._theme.scaled(TITLE_WIDTH)) if is_wide else 0)
         space = self._space
-        self.title.setContentsMargins(0, space, 0, space if beside else 0)
-        self.words.setContentsMargins(0, space if beside else 0, 0, space)
-        self._said.setDirection(way)
-        self._said.setSpacing(10 if beside else 0)
+        self.title.setContentsMargins(0, space, 0, space if is_wide else 0)
+        self.words.setContentsMargins(0, space if is_wide else 0, 0, space)
+        self._said.setDirection(direction)
+        self._said.setSpacing(10 if is_wide else 0)
 
-    def show_fact(self, fact: HealthItem) -> None:
+    def show_fact(self, item: HealthItem) -> None:
         """Show the icon, title and text of a fact."""
-        if fact == self.fact:
+        if item == self.fact:
             return
-        self.fact = fact
-        self.icon.set(fact.status)
-        self.title.setText(_(fact.title))
-        self.words.setText(fact.text)
-        self.setAccessibleName(_(fact.title))
-        self.setAccessibleDescription(fact.text)
+        self.fact = item
+        self.icon.set(item.status)
+        self.title.setText(_(item.title))
+        self.words.setText(item.text)
+        self.setAccessibleName(_(item.title))
+        self.setAccessibleDescription(item.text)
 
 
 class HealthPanel(OneRobotPanel):
@@ -93,8 +93,8 @@ class HealthPanel(OneRobotPanel):
         self._no_robot.set_starting(self.session.starting_robots)
         self.step = Button(self.theme, _("Restart it"), "rotate-ccw", size="small")
         self.step.clicked.connect(self._do_next_step)
-        inside = QWidget()
-        self._column = QVBoxLayout(inside)
+        content = QWidget()
+        self._column = QVBoxLayout(content)
         self._column.setContentsMargins(0, 6, 0, 6)
         self._column.setSpacing(0)
         self._below = QWidget()
@@ -104,7 +104,7 @@ class HealthPanel(OneRobotPanel):
         below.addStretch(1)
         self._column.addWidget(self._below)
         self._column.addStretch(1)
-        self._scroll = ContentScrollArea(inside)
+        self._scroll = ContentScrollArea(content)
         self._scroll.setAccessibleName(_("Robot status"))
         self._scroll.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._scroll.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -124,19 +124,19 @@ class HealthPanel(OneRobotPanel):
             self.chip.set("")
             self._no_robot.set_starting(self.session.starting_robots)
             return
-        facts = health_items(link, self.session.live.topics, time.monotonic(), _age_text)
-        if facts != self._facts:
-            self._facts = facts
-            self._show(facts, link)
+        items = health_items(link, self.session.live.topics, time.monotonic(), _age_text)
+        if items != self._facts:
+            self._facts = items
+            self._show(items, link)
 
-    def _show(self, facts: tuple[HealthItem, ...], link: RobotLink) -> None:
-        self._make_rows(len(facts))
-        for row, fact in zip(self.rows, facts, strict=True):
-            row.show_fact(fact)
-        wrong = [fact for fact in facts if fact.needs_attention]
-        worst = "error" if any(fact.status == "error" for fact in wrong) else "warn"
-        said = ngettext("{count} warning", "{count} warnings", len(wrong)).format(count=len(wrong))
-        self.chip.set(said if wrong else "", worst)
+    def _show(self, items: tuple[HealthItem, ...], link: RobotLink) -> None:
+        self._make_rows(len(items))
+        for row, item in zip(self.rows, items, strict=True):
+            row.show_fact(item)
+        problems = [item for item in items if item.needs_attention]
+        worst = "error" if any(item.status == "error" for item in problems) else "warn"
+        summary = ngettext("{count} warning", "{count} warnings", len(problems)).format(count=len(problems))
+        self.chip.set(summary if problems else "", worst)
         self.step.setText(_("Restart it") if link.is_virtual else _("Find the cause"))
         self._below.setVisible(not link.is_connected or link.is_unresponsive)
 

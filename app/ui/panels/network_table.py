@@ -26,8 +26,8 @@ Row = TypeVar("Row")
 class NetworkTable(TablePanel[Row]):
     """Table panel with a line below the table that names unreachable networks."""
 
-    def __init__(self, context: PanelContext, words: TableTexts, icon: str) -> None:
-        super().__init__(context, words, icon)
+    def __init__(self, context: PanelContext, texts: TableTexts, icon: str) -> None:
+        super().__init__(context, texts, icon)
         self.networks = NetworkLine(self.theme, context.run)
         self._networks_seen = 0
         self._others = QAction(self.theme.icon("waypoints"), _("Other networks"), self)
@@ -70,11 +70,11 @@ class NetworkLine(QWidget):
         column.addLayout(row)
         self.hide()
 
-    def set_messages(self, sentences: Sequence[str]) -> None:
+    def set_messages(self, messages: Sequence[str]) -> None:
         """Show sentences, one per line. The widget is hidden if all of them are empty."""
-        said = "\n".join(filter(None, sentences))
-        self.words.setText(said)
-        show_when(self, bool(said))
+        text = "\n".join(filter(None, messages))
+        self.words.setText(text)
+        show_when(self, bool(text))
 
 
 def are_own_nodes(nodes: Iterable[str]) -> bool:

@@ -62,8 +62,8 @@ class ProblemRow(QWidget):
         self._theme, self.line, self.problem, self._large = theme, line, problem, large
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         severity = _(SEVERITY_NAMES[problem.severity])
-        said = _("{severity}: {sentence}").format(severity=severity, sentence=problem.message)
-        self.setAccessibleName(said)
+        text = _("{severity}: {sentence}").format(severity=severity, sentence=problem.message)
+        self.setAccessibleName(text)
         self.setProperty("focusRadius", theme.radius("small"))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         if problem.block_id:
@@ -73,7 +73,7 @@ class ProblemRow(QWidget):
         row.setContentsMargins(14, 0, 8, 0)
         row.setSpacing(10)
         status = STATUS_BY_SEVERITY[problem.severity]
-        row.addWidget(StatusIcon(theme, status, ink="text" if status == "info" else ""))
+        row.addWidget(StatusIcon(theme, status, colour="text" if status == "info" else ""))
         category = problem.category or "values"
         icon = problem.icon or theme.block_icon(category)
         if problem.category:
@@ -157,7 +157,7 @@ class ProblemsPanel(PanelWidget):
             return
         self._program, self._of_editor = program, of_editor
         self.checked.setText(_("Checked as you build"))
-        found = problem_lines(
+        lines = problem_lines(
             program.problems,
             document.workspace if program.absent else {},  # parsed only if robots are missing
             self._missing_robots(document),
@@ -166,40 +166,42 @@ class ProblemsPanel(PanelWidget):
             program.absent,
         )
         if of_editor is not None:
-            sentence = f"{of_editor.title} {of_editor.detail}"
-            found = (ProblemLine(Problem("error", None, None, of_editor.title, sentence), ()), *found)
-        if found != self._found:
-            self._found = found
-            self._show(found)
+            message = f"{of_editor.title} {of_editor.detail}"
+            lines = (ProblemLine(Problem("error", None, None, of_editor.title, message), ()), *lines)
+        if lines != self._found:
+            self._found = lines
+            self._show(lines)
 
     def _missing_robots(self, document: Document) -> list[Robot]:
         # As described in the behaviour, else as last reported on the network.
-        seen = {link.name: link.robot for link in self.session.fleet.links if not link.is_connected}
-        return list({**seen, **{robot.name: robot for robot in document.absent_robots}}.values())
+        robots = {link.name: link.robot for link in self.session.fleet.links if not link.is_connected}
+        return list({**robots, **{robot.name: robot for robot in document.absent_robots}}.values())
 
-    def _show(self, found: tuple[ProblemLine, ...]) -> None:
+    def _show(self, lines: tuple[ProblemLine, ...]) -> None:
         # Existing rows are reused, so that they don't lose the focus.
-        kept = {row.line: row for row in self.rows}
-        held = False
-        for line, row in kept.items():
-            if line not in found[:MAX_ROWS]:
-                held = held or row.contains_focus()
+        rows_by_line = {row.line: row for row in self.rows}
+        had_focus = False
+        for line, row in rows_by_line.items():
+            if line not in lines[:MAX_ROWS]:
+                had_focus = had_focus or row.contains_focus()
                 self._column.removeWidget(row)
                 row.hide()
                 row.deleteLater()
-        self.rows = [kept.get(line) or self._row(line) for line in list(dict.fromkeys(found))[:MAX_ROWS]]
-        for place, row in enumerate(self.rows):
-            self._column.insertWidget(place, row)
-        more = max(0, len(found) - MAX_ROWS)
-        said = ngettext(
+        self.rows = [
+            rows_by_line.get(line) or self._row(line) for line in list(dict.fromkeys(lines))[:MAX_ROWS]
+        ]
+        for index, row in enumerate(self.rows):
+            self._column.insertWidget(index, row)
+        more = max(0, len(lines) - MAX_ROWS)
+        text = ngettext(
             "{count} more, shown once these are fixed", "{count} more, shown once these are fixed", more
         )
-        self.others.setText(said.format(count=more))
+        self.others.setText(text.format(count=more))
         paint.show_when(self.others, more > 0)
-        self.pages.setCurrentIndex(1 if found else 0)
-        if held:  # the focus stays in the panel when the focused problem is fixed
+        self.pages.setCurrentIndex(1 if lines else 0)
+        if had_focus:  # the focus stays in the panel when the focused problem is fixed
             (self.rows[0] if self.rows else self).setFocus(Qt.FocusReason.OtherFocusReason)
-        self._show_counts(found)
+        self._show_counts(lines)
 
     def _row(self, line: ProblemLine) -> ProblemRow:
         row = ProblemRow(self.theme, line, large=self.density == "comfortable")
@@ -209,25 +211,25 @@ class ProblemsPanel(PanelWidget):
         return row
 
     def _step_focus(self, row: ProblemRow, step: int) -> None:
-        place = self.rows.index(row) + step
-        if 0 <= place < len(self.rows):
-            self.rows[place].setFocus(Qt.FocusReason.TabFocusReason)
-            self._scroll.ensureWidgetVisible(self.rows[place])
+        index = self.rows.index(row) + step
+        if 0 <= index < len(self.rows):
+            self.rows[index].setFocus(Qt.FocusReason.TabFocusReason)
+            self._scroll.ensureWidgetVisible(self.rows[index])
 
     def badge(self) -> tuple[str, str] | None:
         self.refresh()  # hidden panels are not refreshed otherwise
         return (self.chip.text, self.chip.status) if self._found else None
 
-    def _show_counts(self, found: tuple[ProblemLine, ...]) -> None:
-        if not found:
+    def _show_counts(self, lines: tuple[ProblemLine, ...]) -> None:
+        if not lines:
             self.chip.set(_("No problems"), "ok")
             return
-        kinds = [each.severity for each in found]
+        kinds = [each.severity for each in lines]
         worst = next((kind for kind in ("error", "warning") if kind in kinds), "info")
-        self.chip.set(str(len(found)), STATUS_BY_SEVERITY[worst])
-        words = [_count_text(kind, kinds.count(kind)) for kind in SEVERITY_NAMES if kind in kinds]
-        self.chip.setAccessibleName(", ".join(words))
-        self.chip.setToolTip(plain.tip(", ".join(words)))
+        self.chip.set(str(len(lines)), STATUS_BY_SEVERITY[worst])
+        texts = [_count_text(kind, kinds.count(kind)) for kind in SEVERITY_NAMES if kind in kinds]
+        self.chip.setAccessibleName(", ".join(texts))
+        self.chip.setToolTip(plain.tip(", ".join(texts)))
 
     def set_density(self, density: Density) -> None:
         super().set_density(density)

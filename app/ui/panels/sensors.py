@@ -64,8 +64,8 @@ class SensorRow(QWidget):
             self.update()
 
     def sizeHint(self) -> QSize:
-        least = ROW_HEIGHTS["comfortable" if self.large else "compact"]
-        return QSize(260, max(least, round(self._theme.scaled(least))))
+        min_height = ROW_HEIGHTS["comfortable" if self.large else "compact"]
+        return QSize(260, max(min_height, round(self._theme.scaled(min_height))))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
@@ -117,9 +117,9 @@ class SensorsPanel(OneRobotPanel):
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is not None:
             now = time.monotonic()
-            there = link.is_connected  # values of a disconnected robot are outdated
+            is_connected = link.is_connected  # values of a disconnected robot are outdated
             for row in self.rows:
-                row.show_value(link.values.get(row.sensor.name) if there else None, now)
+                row.show_value(link.values.get(row.sensor.name) if is_connected else None, now)
         else:
             self._no_robot.set_starting(self.session.starting_robots)
 
@@ -128,9 +128,9 @@ class SensorsPanel(OneRobotPanel):
             self._column.removeWidget(row)
             row.deleteLater()
         self.rows = [SensorRow(self.theme, sensor) for sensor in _listed_sensors(link)]
-        for place, row in enumerate(self.rows):
+        for index, row in enumerate(self.rows):
             row.large = self.density == "comfortable"
-            self._column.insertWidget(place, row)
+            self._column.insertWidget(index, row)
         self._fit_rows()
         self.pages.setCurrentIndex(1 if self.rows else 0)
         if not self.rows:
@@ -143,8 +143,8 @@ class SensorsPanel(OneRobotPanel):
             return
         room = self.height() - self._column.contentsMargins().top()
         height = self.rows[0].sizeHint().height()
-        fitting = max(1, room // height)
-        below = room - fitting * height if fitting < len(self.rows) else 0
+        row_count = max(1, room // height)
+        below = room - row_count * height if row_count < len(self.rows) else 0
         self._frame.setContentsMargins(0, 0, 0, max(0, below))
         self.pages.setMinimumHeight(height + self._column.contentsMargins().top())  # at least one whole row
         self._scroll.verticalScrollBar().setSingleStep(height)
@@ -168,9 +168,10 @@ def _listed_sensors(link: RobotLink) -> list[Sensor]:
     # All sensors except images, with the most relevant first.
 
     def rank(sensor: Sensor) -> int:
-        words = f"{sensor.name} {sensor.title}".casefold()
+        text = f"{sensor.name} {sensor.title}".casefold()
         return next(
-            (place for place, word in enumerate(PRIORITY_KEYWORDS) if word in words), len(PRIORITY_KEYWORDS)
+            (index for index, keyword in enumerate(PRIORITY_KEYWORDS) if keyword in text),
+            len(PRIORITY_KEYWORDS),
         )
 
     return sorted((sensor for sensor in link.robot.sensors if not sensor.is_image), key=rank)

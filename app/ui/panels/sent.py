@@ -91,14 +91,14 @@ class SentPanel(PanelWidget):
         row.setContentsMargins(12, 4, 12, 4)
         row.addWidget(self.foot, 1)
         row.addWidget(self.total)
-        listed = QWidget()
-        inside = QVBoxLayout(listed)
-        inside.setContentsMargins(0, 0, 0, 0)
-        inside.setSpacing(0)
-        inside.addWidget(self.table, 1)
-        inside.addWidget(Separator(self.theme))
-        inside.addWidget(below)
-        self.pages: QStackedWidget = self.make_page_stack(self.empty, listed)
+        page = QWidget()
+        layout = QVBoxLayout(page)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(self.table, 1)
+        layout.addWidget(Separator(self.theme))
+        layout.addWidget(below)
+        self.pages: QStackedWidget = self.make_page_stack(self.empty, page)
 
     # -- display ------------------------------------------------------------------------------------------
 
@@ -110,18 +110,20 @@ class SentPanel(PanelWidget):
             self._update_repeat_button()
 
     def _rebuild(self) -> None:
-        log, words = self.acting.sent, self.filter.text().casefold().split()
+        log, keywords = self.acting.sent, self.filter.text().casefold().split()
         self._seen = log.revision
-        rows = [each for each in reversed(log.records) if all(word in _haystack(each) for word in words)]
+        rows = [
+            each for each in reversed(log.records) if all(keyword in _haystack(each) for keyword in keywords)
+        ]
         self.model.set_rows(rows)
         self.table.refresh_visible()
         self.pages.setCurrentIndex(1 if rows else 0)
-        if words and log.records:
+        if keywords and log.records:
             self.empty.set_texts(_("No matches"), _("Clear the filter to see all sent messages."), "search")
             self.empty.set_actions([EmptyAction(_("Clear the filter"), self.filter.clear, "x")])
         else:
-            said = _("Messages you publish, calls, replays and clicks in images are listed here.")
-            self.empty.set_texts(_("Nothing sent yet"), said, "send")
+            text = _("Messages you publish, calls, replays and clicks in images are listed here.")
+            self.empty.set_texts(_("Nothing sent yet"), text, "send")
             publish = EmptyAction(_("Publish a message"), lambda: self.context.run("publish.new"), "send")
             self.empty.set_actions([publish])
         self.foot.setText(_("Messages and calls you send by hand are listed here"))
@@ -133,8 +135,8 @@ class SentPanel(PanelWidget):
         if log.since_s is None:
             return ""
         clock = time.strftime("%H:%M", time.localtime(log.since_s))
-        said = ngettext("{count} since {time}", "{count} since {time}", log.total)
-        return said.format(count=group_digits(log.total), time=clock)
+        template = ngettext("{count} since {time}", "{count} since {time}", log.total)
+        return template.format(count=group_digits(log.total), time=clock)
 
     def selected(self) -> SentRecord | None:
         """Return the selected entry, or None."""
@@ -148,17 +150,17 @@ class SentPanel(PanelWidget):
         self.again.setEnabled(self._can_repeat(self.selected()))
 
     def blockers(self) -> list[Blocker]:
-        words = self.filter.text().strip()
-        return [filter_blocker(self.title(), words, self.filter.clear)] if words else []
+        filter_text = self.filter.text().strip()
+        return [filter_blocker(self.title(), filter_text, self.filter.clear)] if filter_text else []
 
     # -- user actions -------------------------------------------------------------------------------------
 
     def repeat(self) -> None:
         """Send the selected entry again. Show a confirmation if necessary, or the reason on failure."""
         record = self.selected()
-        why_not = self.acting.repeat(record.number) if record is not None else ""
-        if why_not:
-            self.context.show_toast(why_not)
+        reason = self.acting.repeat(record.number) if record is not None else ""
+        if reason:
+            self.context.show_toast(reason)
         if self.acting.question is not None:
             self.context.run("panel:publish")  # this panel asks for confirmation
         self.refresh()
@@ -169,9 +171,9 @@ class SentPanel(PanelWidget):
         if record is not None:
             self._copy_text(format_line(record), _("Copied the line"))
 
-    def _copy_text(self, text: str, said: str) -> None:
+    def _copy_text(self, text: str, message: str) -> None:
         QGuiApplication.clipboard().setText(text)
-        self.context.show_toast(said)
+        self.context.show_toast(message)
 
     def clear(self) -> None:
         """Clear the log."""
@@ -199,10 +201,10 @@ class SentPanel(PanelWidget):
             return None
         menu = Menu(self.theme, self)
         if record.repeat is not None:
-            words = _("Call again") if record.origin == "service" else _("Send again")
-            may = self._can_repeat(record)
-            words = words if may else _("{what} (not armed)").format(what=words)
-            menu.addAction(self.theme.icon("repeat"), words, self.repeat).setEnabled(may)
+            text = _("Call again") if record.origin == "service" else _("Send again")
+            can_repeat = self._can_repeat(record)
+            text = text if can_repeat else _("{what} (not armed)").format(what=text)
+            menu.addAction(self.theme.icon("repeat"), text, self.repeat).setEnabled(can_repeat)
         actions = [RowAction(_("Copy the line"), "copy", self.copy)]
         if record.text:
             copied = _("Copied the request") if record.origin == "service" else _("Copied the message")
@@ -214,11 +216,11 @@ class SentPanel(PanelWidget):
             actions.append(RowAction(shows, "spline" if is_call else "list-tree", lambda: self.show_row(key)))
         return fill_menu(menu, self.theme, actions)
 
-    def _show_menu(self, key: str, at: QPoint) -> None:
+    def _show_menu(self, key: str, position: QPoint) -> None:
         menu = self.menu_of(key)
         if menu is not None:
             menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-            menu.popup(at)
+            menu.popup(position)
 
     # -- overrides ----------------------------------------------------------------------------------------
 
@@ -244,11 +246,11 @@ def _haystack(record: SentRecord) -> str:
 
 def _columns() -> tuple[Column[SentRecord], ...]:
     def state_cell(record: SentRecord) -> Cell:
-        icon, words = SENDERS[record.origin]
+        icon, text = SENDERS[record.origin]
         if record.is_error:
             return Cell(icon="circle-x", role="error", accessible_text=_("failed"))
         role = "warn" if record.origin == "switch" else "textTertiary"
-        return Cell(icon=icon, role=role, accessible_text=_(words))
+        return Cell(icon=icon, role=role, accessible_text=_(text))
 
     def content_cell(record: SentRecord) -> Cell:
         return Cell(record.result_text, role="error" if record.is_error else "text")

@@ -53,13 +53,13 @@ class TablePanel(PanelWidget, Generic[Row]):
         foot: Short text below the table.
     """
 
-    def __init__(self, context: PanelContext, words: TableTexts, icon: str) -> None:
-        self._words = words
-        super().__init__(context, _(words.title))
+    def __init__(self, context: PanelContext, texts: TableTexts, icon: str) -> None:
+        self._words = texts
+        super().__init__(context, _(texts.title))
         theme = self.theme
         self.model = self.make_model()
         self.table = self.make_table(self.model)
-        self.filter = FilterField(theme, _(words.filter))
+        self.filter = FilterField(theme, _(texts.filter))
         self.filter.exited.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self.filter.textChanged.connect(self.rebuild)
         self.header: list[QWidget] = [self.filter]
@@ -106,11 +106,11 @@ class TablePanel(PanelWidget, Generic[Row]):
         actions = self.row_actions(key)
         return fill_menu(Menu(self.theme, self), self.theme, actions) if actions else None
 
-    def _show_row_menu(self, key: str, at: QPoint) -> None:
+    def _show_row_menu(self, key: str, position: QPoint) -> None:
         menu = self.menu_of(key)
         if menu is not None:
             menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-            menu.popup(at)
+            menu.popup(position)
 
     def filter_words(self) -> list[str]:
         """Return the words of the filter. A row matches if it contains all of them."""
@@ -128,18 +128,18 @@ class TablePanel(PanelWidget, Generic[Row]):
         if any_rows:
             return
         if filtered:
-            words = self._words
-            self.empty.set_texts(_(words.no_matches), _(words.clear_filter_hint), "search")
+            texts = self._words
+            self.empty.set_texts(_(texts.no_matches), _(texts.clear_filter_hint), "search")
             clear = EmptyAction(_("Clear the filter"), self.filter.clear, "x")
-            wanted = self.missing_topic()
-            self.empty.set_actions([clear, self.doctor_action(wanted)] if wanted else [clear])
+            topic = self.missing_topic()
+            self.empty.set_actions([clear, self.doctor_action(topic)] if topic else [clear])
         elif self.session.replay is not None and self._words.not_recorded:
             self.doctor.hide()
             self.empty.set_texts(_(self._words.not_recorded), "", "film")
             self.empty.set_actions([])
         elif self.session.master.kind == "none":
-            said = _("A master lets programs find each other.")
-            self.empty.set_texts(_("No master is running"), said, "radio-tower")
+            text = _("A master lets programs find each other.")
+            self.empty.set_texts(_("No master is running"), text, "radio-tower")
             start = self.session.launcher.ensure_master
             self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", is_primary=True)])
         else:
@@ -150,8 +150,8 @@ class TablePanel(PanelWidget, Generic[Row]):
         return ""
 
     def blockers(self) -> list[Blocker]:
-        words = self.filter.text().strip()
-        return [filter_blocker(self.title(), words, self.filter.clear)] if words else []
+        filter_text = self.filter.text().strip()
+        return [filter_blocker(self.title(), filter_text, self.filter.clear)] if filter_text else []
 
     def update_empty_state(self) -> None:
         """Set the texts of the empty state for a table without rows while a master is running."""
@@ -183,18 +183,18 @@ class TablePanel(PanelWidget, Generic[Row]):
 class DoctorLine(QWidget):
     """Line with the question "Expected to see something?" and a link to the connection doctor."""
 
-    def __init__(self, theme: Theme, ask: Callable[[], object]) -> None:
+    def __init__(self, theme: Theme, on_click: Callable[[], object]) -> None:
         super().__init__()
-        words = ElidedLabel("small", "textSecondary")
-        words.setText(_("Is something missing?"))
+        text_label = ElidedLabel("small", "textSecondary")
+        text_label.setText(_("Is something missing?"))
         self.button = LinkButton(theme, _("Open the connection doctor"))
         self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
-        self.button.clicked.connect(ask)
+        self.button.clicked.connect(on_click)
         row = QHBoxLayout()
         row.setContentsMargins(12, 3, 12, 3)
         row.setSpacing(6)
         row.addStretch(1)
-        row.addWidget(words)
+        row.addWidget(text_label)
         row.addWidget(self.button)
         row.addStretch(1)
         column = QVBoxLayout(self)

@@ -109,8 +109,8 @@ def rows_of(
     opened: Collection[str],
     order: Order[VariableRow],
     *,
-    fresh: Collection[str] = (),
-    over: bool = False,
+    changed_ids: Collection[str] = (),
+    has_ended: bool = False,
 ) -> list[VariableRow]:
     """Return the rows of the table, sorted.
 
@@ -119,20 +119,22 @@ def rows_of(
         values: Values by variable id.
         opened: Ids of expanded lists, which are followed by the rows of their first items.
         order: Sort order of the variables.
-        fresh: Ids of variables whose value has just changed.
-        over: True if the run has ended.
+        changed_ids: Ids of variables whose value has just changed.
+        has_ended: True if the run has ended.
     """
     rows: list[VariableRow] = []
-    heads = [
-        VariableRow(each, values.get(each.id), each.id in opened, is_new=each.id in fresh, has_ended=over)
+    variable_rows = [
+        VariableRow(
+            each, values.get(each.id), each.id in opened, is_new=each.id in changed_ids, has_ended=has_ended
+        )
         for each in variables
     ]
-    for head in order.sort(heads):
-        rows.append(head)
-        if head.is_expanded and head.value is not None:
+    for row in order.sort(variable_rows):
+        rows.append(row)
+        if row.is_expanded and row.value is not None:
             rows += [
-                VariableRow(head.variable, head.value, item=number, has_ended=over)
-                for number in range(1, len(head.value.items) + 1)
+                VariableRow(row.variable, row.value, item=number, has_ended=has_ended)
+                for number in range(1, len(row.value.items) + 1)
             ]
     return rows
 
@@ -184,34 +186,43 @@ class VariablesPanel(TablePanel[VariableRow]):
         mine = runs.document is document
         now = self.clock()
         values = runs.values if mine else {}
-        seen = (document.key, program.variables, runs.values_revision if mine else -1, mine and runs.active)
+        state = (document.key, program.variables, runs.values_revision if mine else -1, mine and runs.active)
         faded = [id for id, since in self._fresh.items() if now - since >= CHANGE_HIGHLIGHT_S]
         for id in faded:
             del self._fresh[id]
-        if seen == self._seen and not faded:
+        if state == self._seen and not faded:
             return
-        if seen[:1] == self._seen[:1] and mine and runs.active:
+        if state[:1] == self._seen[:1] and mine and runs.active:
             self._fresh.update({id: now for id, value in values.items() if self._values.get(id) != value})
-        self._seen, self._variables, self._values = seen, program.variables, values
+        self._seen, self._variables, self._values = state, program.variables, values
         self.rebuild()
 
     def rebuild(self) -> None:
-        words = self.filter_words()
-        found = [each for each in self._variables if all(word in each.name.casefold() for word in words)]
+        keywords = self.filter_words()
+        matches = [
+            each for each in self._variables if all(keyword in each.name.casefold() for keyword in keywords)
+        ]
         runs = self.session.runs
-        over = not (runs.active and runs.document is self.session.document)
+        has_ended = not (runs.active and runs.document is self.session.document)
         self.model.set_rows(
-            rows_of(found, self._values, self._opened, self.table.order, fresh=self._fresh, over=over)
+            rows_of(
+                matches,
+                self._values,
+                self._opened,
+                self.table.order,
+                changed_ids=self._fresh,
+                has_ended=has_ended,
+            )
         )
-        self.filter.setVisible(len(self._variables) > MAX_WITHOUT_FILTER or bool(words))
-        self.when.setText(self._status_text(over=over))
+        self.filter.setVisible(len(self._variables) > MAX_WITHOUT_FILTER or bool(keywords))
+        self.when.setText(self._status_text(has_ended=has_ended))
         self.table.refresh_visible()
-        self.show_table(bool(found), bool(words))
+        self.show_table(bool(matches), bool(keywords))
 
-    def _status_text(self, *, over: bool) -> str:
+    def _status_text(self, *, has_ended: bool) -> str:
         if not self._variables or not self._values:
             return ""
-        return _("Final values") if over else _("Live")
+        return _("Final values") if has_ended else _("Live")
 
     def show_table(self, any_rows: bool, filtered: bool) -> None:
         if any_rows or filtered:
@@ -260,25 +271,25 @@ class VariablesPanel(TablePanel[VariableRow]):
         menu = Menu(self.theme, self)
         runs = self.session.runs
         running = runs.active and runs.document is self.session.document
-        for words, icon, command, possible in (
+        for text, icon, command, possible in (
             (_("Show next to the blocks"), "eye", "variable.watch", True),
             (_("Show where it is used"), "search", "variable.find", bool(row.variable.python)),
             (_("Change the value"), "pencil", "variable.put", running and bool(row.variable.python)),
             (_("Rename"), "text-cursor-input", "variable.rename", True),
             (_("Delete"), "trash-2", "variable.delete", True),
         ):
-            action = QAction(self.theme.icon(icon), words, menu)
+            action = QAction(self.theme.icon(icon), text, menu)
             action.setEnabled(possible)
             action.triggered.connect(lambda _on=False, command=command: self._run_command_for(command, key))
             menu.addAction(action)
         return menu
 
-    def _show_menu(self, at: QPoint) -> None:
-        row = self.model.row_at(self.table.indexAt(at))
+    def _show_menu(self, position: QPoint) -> None:
+        row = self.model.row_at(self.table.indexAt(position))
         menu = self.menu_of(self.model.key_of(row)) if row is not None else None
         if menu is not None:
             menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-            menu.popup(self.table.viewport().mapToGlobal(at))
+            menu.popup(self.table.viewport().mapToGlobal(position))
 
 
 class _VariableTable(TableView[VariableRow]):

@@ -35,11 +35,11 @@ def paint_annotations(
     """
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    for each in drawn:
-        points = [shares.map(QPointF(x, y)) for x, y in each.points]
-        painter.setPen(_pen(each.outline, each.thickness * scale))
-        painter.setBrush(_brush(each.fill))
-        _paint_annotation(painter, theme, shares, scale, each, points)
+    for shape in drawn:
+        points = [shares.map(QPointF(x, y)) for x, y in shape.points]
+        painter.setPen(_pen(shape.outline, shape.thickness * scale))
+        painter.setBrush(_brush(shape.fill))
+        _paint_annotation(painter, theme, shares, scale, shape, points)
     painter.restore()
 
 
@@ -69,20 +69,24 @@ def _paint_annotation(
     elif drawn.kind == "line":
         painter.drawPolyline(QPolygonF(points))
     else:
-        high = shares.mapRect(QRectF(0, 0, drawn.size[1], drawn.size[1])).height()
-        _paint_text(painter, theme, points[0], high, drawn)
+        text_height = shares.mapRect(QRectF(0, 0, drawn.size[1], drawn.size[1])).height()
+        _paint_text(painter, theme, points[0], text_height, drawn)
 
 
-def _paint_text(painter: QPainter, theme: Theme, at: QPointF, high: float, drawn: AnnotationShape) -> None:
+def _paint_text(
+    painter: QPainter, theme: Theme, position: QPointF, height: float, drawn: AnnotationShape
+) -> None:
     # The lower left corner of the text is at `at`; the text is upright for any rotation of the image.
-    font, words = theme.font("small"), drawn.text
-    font.setPixelSize(round(min(max(high, MIN_LETTERS), MAX_LETTERS)))
+    font, text = theme.font("small"), drawn.text
+    font.setPixelSize(round(min(max(height, MIN_LETTERS), MAX_LETTERS)))
     metrics = QFontMetricsF(font)
-    room = QRectF(at.x(), at.y() - metrics.height(), metrics.horizontalAdvance(words) + 4, metrics.height())
+    room = QRectF(
+        position.x(), position.y() - metrics.height(), metrics.horizontalAdvance(text) + 4, metrics.height()
+    )
     if drawn.fill is not None:
         painter.fillRect(room, _to_qcolor(drawn.fill))
-    ink = _to_qcolor(drawn.outline) if drawn.outline is not None else QColor("white")
-    paint.text_line(painter, room.adjusted(2, 0, 2, 0), words, font, ink)
+    colour = _to_qcolor(drawn.outline) if drawn.outline is not None else QColor("white")
+    paint.text_line(painter, room.adjusted(2, 0, 2, 0), text, font, colour)
 
 
 def _pen(colour: Colour | None, width: float) -> QPen:
@@ -110,19 +114,19 @@ def paint_colour_bar(painter: QPainter, theme: Theme, view: QRectF, scale: Colou
     """Paint the colour bar at the upper right of the view; nothing if the view is not high enough."""
     font = theme.font("small")
     line = paint.height_of(font)
-    high = min(BAR_SIZE.height(), view.height() - 2 * BAR_MARGIN - 2 * line - 40)
-    if high < MIN_BAR_HEIGHT:
+    height = min(BAR_SIZE.height(), view.height() - 2 * BAR_MARGIN - 2 * line - 40)
+    if height < MIN_BAR_HEIGHT:
         return
-    ends = (bar_label(scale.high), bar_label(scale.low / 2 + scale.high / 2), bar_label(scale.low))
-    wide = max(paint.width_of(font, words) for words in ends)
-    ground = QRectF(0, 0, BAR_SIZE.width() + wide + 22, high + line + 8)
+    labels = (bar_label(scale.high), bar_label(scale.low / 2 + scale.high / 2), bar_label(scale.low))
+    width = max(paint.width_of(font, text) for text in labels)
+    ground = QRectF(0, 0, BAR_SIZE.width() + width + 22, height + line + 8)
     ground.moveTopRight(QPointF(view.right() - BAR_MARGIN, view.top() + BAR_MARGIN))
     paint.box(painter, ground, 4, QColor(0, 0, 0, 190))
-    bar = QRectF(ground.right() - BAR_SIZE.width() - 7, ground.top() + line / 2 + 4, BAR_SIZE.width(), high)
+    bar = QRectF(ground.right() - BAR_SIZE.width() - 7, ground.top() + line / 2 + 4, BAR_SIZE.width(), height)
     painter.drawImage(bar, bar_image(scale))
-    for words, y in zip(ends, (bar.top(), bar.center().y(), bar.bottom()), strict=True):
-        place = QRectF(ground.left() + 7, y - line / 2, wide, line)
-        paint.text_line(painter, place, words, font, QColor("white"), paint.RIGHT)
+    for text, y in zip(labels, (bar.top(), bar.center().y(), bar.bottom()), strict=True):
+        text_rect = QRectF(ground.left() + 7, y - line / 2, width, line)
+        paint.text_line(painter, text_rect, text, font, QColor("white"), paint.RIGHT)
 
 
 def bar_image(scale: ColourScale) -> QImage:

@@ -54,18 +54,18 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
     items = detections.get("items")
     if not width or not height or not isinstance(items, Sequence) or isinstance(items, str):
         return ()
-    found = []
+    boxes = []
     for item in items:
-        place = item.get("box") if isinstance(item, Mapping) else None
-        if isinstance(item, Mapping) and isinstance(place, Sequence) and len(place) == 4:
-            x, y, w, h = (_float_or_none(part) or 0.0 for part in place)
+        bounds = item.get("box") if isinstance(item, Mapping) else None
+        if isinstance(item, Mapping) and isinstance(bounds, Sequence) and len(bounds) == 4:
+            x, y, w, h = (_float_or_none(part) or 0.0 for part in bounds)
             area = QRectF(x / width, y / height, w / width, h / height)
-            found.append(
+            boxes.append(
                 DetectionBox(
                     bounded_str(item.get("name", "")), _float_or_none(item.get("confidence")), area, kind
                 )
             )
-    return tuple(found)
+    return tuple(boxes)
 
 
 def boxes_in_camera(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
@@ -76,12 +76,12 @@ def boxes_in_camera(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
         topic: Topic of the camera.
     """
     cameras = {sensor.name for sensor in link.robot.sensors if sensor.topic == topic}
-    found: list[DetectionBox] = []
+    boxes: list[DetectionBox] = []
     detecting = [sensor for sensor in link.robot.sensors if sensor.kind == "detections"]
     for kind, sensor in enumerate(detecting):
         if sensor.camera is None or sensor.camera in cameras:
-            found += boxes_of(link.values.get(sensor.name), kind)
-    return tuple(found)
+            boxes += boxes_of(link.values.get(sensor.name), kind)
+    return tuple(boxes)
 
 
 def camera_of(link: RobotLink) -> Sensor | None:
@@ -97,31 +97,31 @@ def robot_of_camera(session: Session, topic: str) -> RobotLink | None:
     return None
 
 
-def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: DetectionBox) -> None:
+def paint_box(painter: QPainter, theme: Theme, rect: QRectF, box: DetectionBox) -> None:
     """Paint a bounding box with an upright label above it.
 
     Args:
         painter: Painter in view coordinates.
         theme: Theme, for the font.
-        place: Rectangle of the box in view coordinates.
+        rect: Rectangle of the box in view coordinates.
         box: Bounding box.
     """
     colour = QColor(BOX_COLOURS[box.sensor_index % len(BOX_COLOURS)])
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.setPen(QPen(colour, 2.5))
-    painter.drawRoundedRect(place, 2, 2)
-    words = box.label if box.confidence is None else f"{box.label} {number(box.confidence, '.2f')}"
+    painter.drawRoundedRect(rect, 2, 2)
+    text = box.label if box.confidence is None else f"{box.label} {number(box.confidence, '.2f')}"
     font = theme.font("caption")
     font.setWeight(font.Weight.DemiBold)
-    width = paint.width_of(font, words) + 12
-    high = max(18.0, paint.height_of(font) + 2)
-    top = place.top() - high - 1 if place.top() - high - 1 >= 0 else place.top()
-    tag = QRectF(place.left() - 1.25, top, width, high)
+    width = paint.width_of(font, text) + 12
+    height = max(18.0, paint.height_of(font) + 2)
+    top = rect.top() - height - 1 if rect.top() - height - 1 >= 0 else rect.top()
+    tag = QRectF(rect.left() - 1.25, top, width, height)
     paint.box(painter, tag, 2, colour)
-    paint.text_line(painter, tag.adjusted(6, 0, 0, 0), words, font, QColor(BOX_TEXT_COLOUR))
+    paint.text_line(painter, tag.adjusted(6, 0, 0, 0), text, font, QColor(BOX_TEXT_COLOUR))
 
 
 def _float_or_none(value: object) -> float | None:
-    good = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return float(value) if good else None  # type: ignore[arg-type]
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return float(value) if is_number else None  # type: ignore[arg-type]

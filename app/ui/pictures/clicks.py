@@ -142,11 +142,13 @@ class ClickablePicture(ZoomablePicture):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         name, picture = key_name(event), self.picture
-        way = KEY_DIRECTIONS.get(name.removeprefix("Shift+"))
+        direction = KEY_DIRECTIONS.get(name.removeprefix("Shift+"))
         if not self._takes_clicks or picture is None:
             super().keyPressEvent(event)
-        elif way is not None:
-            self._move_cursor(-way[0], -way[1], LARGE_CURSOR_STEP_PX if name.startswith("Shift+") else 1)
+        elif direction is not None:
+            self._move_cursor(
+                -direction[0], -direction[1], LARGE_CURSOR_STEP_PX if name.startswith("Shift+") else 1
+            )
         elif name in {"Return", "Enter"} and self.pointed is not None and not event.isAutoRepeat():
             self._emit_click()
             x, y = _clamp_to_picture(self.pointed, picture)
@@ -154,19 +156,19 @@ class ClickablePicture(ZoomablePicture):
         else:
             super().keyPressEvent(event)
 
-    def _move_cursor(self, across: int, down: int, count: int) -> None:
+    def _move_cursor(self, dx: int, dy: int, count: int) -> None:
         # Directions are those on the screen. The cursor starts at the centre of the visible part.
         if self.pointed is None:
-            wanted = QRectF(self.rect()).center()
+            target = QRectF(self.rect()).center()
         else:
             step = count * max(1.0, self.scale())
-            wanted = self._view_position(self.pointed) + QPointF(across * step, down * step)
-        shown = self.area()
-        inside = QPointF(
-            min(max(wanted.x(), shown.left()), shown.right() - 1e-3),
-            min(max(wanted.y(), shown.top()), shown.bottom() - 1e-3),
+            target = self._view_position(self.pointed) + QPointF(dx * step, dy * step)
+        area = self.area()
+        clamped = QPointF(
+            min(max(target.x(), area.left()), area.right() - 1e-3),
+            min(max(target.y(), area.top()), area.bottom() - 1e-3),
         )
-        pixel = self.pixel_at(inside)
+        pixel = self.pixel_at(clamped)
         if pixel is None:
             return
         self.pointed = pixel
@@ -177,9 +179,12 @@ class ClickablePicture(ZoomablePicture):
         # Scrolls a zoomed image so that the cursor is visible.
         if self.pointed is None or self.place.zoom is None:
             return
-        at, seen = self._view_position(self.pointed), QRectF(self.rect()).adjusted(*SCROLL_MARGINS)
-        dx = min(0.0, seen.right() - at.x()) + max(0.0, seen.left() - at.x())
-        dy = min(0.0, seen.bottom() - at.y()) + max(0.0, seen.top() - at.y())
+        position, visible_rect = (
+            self._view_position(self.pointed),
+            QRectF(self.rect()).adjusted(*SCROLL_MARGINS),
+        )
+        dx = min(0.0, visible_rect.right() - position.x()) + max(0.0, visible_rect.left() - position.x())
+        dy = min(0.0, visible_rect.bottom() - position.y()) + max(0.0, visible_rect.top() - position.y())
         if dx or dy:
             self.move_by(dx, dy)
 
@@ -210,17 +215,19 @@ class ClickablePicture(ZoomablePicture):
         if self.pointed is not None and self._takes_clicks:
             self._paint_cross(self._view_position(self.pointed), ring=False)
 
-    def _paint_cross(self, at: QPointF, *, ring: bool = True) -> None:
+    def _paint_cross(self, position: QPointF, *, ring: bool = True) -> None:
         # Dark below and light above, so that the mark is visible on every image.
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        for ink, width in ((Qt.GlobalColor.black, 4.0), (Qt.GlobalColor.white, 1.6)):
-            painter.setPen(QPen(ink, width))
+        for colour, width in ((Qt.GlobalColor.black, 4.0), (Qt.GlobalColor.white, 1.6)):
+            painter.setPen(QPen(colour, width))
             if ring:
-                painter.drawEllipse(QRectF(at.x() - RING_PX, at.y() - RING_PX, 2 * RING_PX, 2 * RING_PX))
+                painter.drawEllipse(
+                    QRectF(position.x() - RING_PX, position.y() - RING_PX, 2 * RING_PX, 2 * RING_PX)
+                )
             for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-                way = QPointF(dx, dy)
-                painter.drawLine(at + way * (RING_PX - 3), at + way * REACH_PX)
+                direction = QPointF(dx, dy)
+                painter.drawLine(position + direction * (RING_PX - 3), position + direction * REACH_PX)
         painter.end()
 
 

@@ -49,11 +49,14 @@ class PicturePlacement:
             fill: True to fill the view instead, if the shapes of view and image are similar; the edges of the
                 image are cut off.
         """
-        seen = self.rotated_size(picture)
-        across, down = view.width() / max(1.0, seen.width()), view.height() / max(1.0, seen.height())
-        scale = min(across, down)
-        if fill and scale > 0 and max(across, down) / scale < MAX_FILL_RATIO:
-            return max(across, down)
+        rotated = self.rotated_size(picture)
+        x_scale, y_scale = (
+            view.width() / max(1.0, rotated.width()),
+            view.height() / max(1.0, rotated.height()),
+        )
+        scale = min(x_scale, y_scale)
+        if fill and scale > 0 and max(x_scale, y_scale) / scale < MAX_FILL_RATIO:
+            return max(x_scale, y_scale)
         return scale
 
     def area(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> QRectF:
@@ -62,11 +65,11 @@ class PicturePlacement:
         The rectangle may exceed the view. It leaves a gap only if the image is smaller than the view.
         """
         scale = self.zoom if self.zoom is not None else self.fit_zoom(view, picture, fill=fill)
-        seen = self.rotated_size(picture) * scale
+        rotated = self.rotated_size(picture) * scale
         x, y = self.centre if self.zoom is not None else (0.5, 0.5)
-        left = _offset(view.width(), seen.width(), x)
-        top = _offset(view.height(), seen.height(), y)
-        return QRectF(left, top, seen.width(), seen.height())
+        left = _offset(view.width(), rotated.width(), x)
+        top = _offset(view.height(), rotated.height(), y)
+        return QRectF(left, top, rotated.width(), rotated.height())
 
     def orientation(self) -> QTransform:
         """Return the transform from the image to the rotated and mirrored image, both in fractions."""
@@ -88,31 +91,31 @@ class PicturePlacement:
         transform.scale(area.width(), area.height())
         return self.orientation() * transform
 
-    def to_picture(self, at: QPointF, area: QRectF) -> QPointF:
+    def to_picture(self, position: QPointF, area: QRectF) -> QPointF:
         """Convert a point in the view to fractions of the image; below 0 or above 1 beside the image.
 
         Args:
-            at: Point in the view.
+            position: Point in the view.
             area: Rectangle of the rotated image in the view.
         """
         back, _good = self.to_view(area).inverted()
-        return back.map(at)
+        return back.map(position)
 
     # -- commands of the user -----------------------------------------------------------------------------
 
-    def zoom_at(self, factor: float, at: QPointF, view: QSizeF, picture: QSizeF) -> None:
-        """Zoom by a factor; the image point at ``at`` (in the view) stays in place."""
+    def zoom_at(self, factor: float, position: QPointF, view: QSizeF, picture: QSizeF) -> None:
+        """Zoom by a factor; the image point at ``position`` (in the view) stays in place."""
         area = self.area(view, picture)
         before = area.width() / max(1.0, self.rotated_size(picture).width())
         smallest = min(SMALLEST, self.fit_zoom(view, picture))
         after = min(MAX_SIZE, max(smallest, before * factor))
-        share_x = (at.x() - area.x()) / max(1e-9, area.width())
-        share_y = (at.y() - area.y()) / max(1e-9, area.height())
-        seen = self.rotated_size(picture) * after
+        share_x = (position.x() - area.x()) / max(1e-9, area.width())
+        share_y = (position.y() - area.y()) / max(1e-9, area.height())
+        rotated = self.rotated_size(picture) * after
         self.zoom = after
         self.centre = (
-            share_x + (view.width() / 2 - at.x()) / max(1e-9, seen.width()),
-            share_y + (view.height() / 2 - at.y()) / max(1e-9, seen.height()),
+            share_x + (view.width() / 2 - position.x()) / max(1e-9, rotated.width()),
+            share_y + (view.height() / 2 - position.y()) / max(1e-9, rotated.height()),
         )
         self._normalize_centre(view, picture)
 
@@ -143,14 +146,14 @@ class PicturePlacement:
         elif degrees % 360:
             self.centre = (1 - self.centre[0], 1 - self.centre[1])
 
-    def flip(self, *, across: bool) -> None:
+    def flip(self, *, horizontally: bool) -> None:
         """Mirror the image.
 
         Args:
-            across: True to mirror horizontally, False to mirror vertically.
+            horizontally: True to mirror horizontally, False to mirror vertically.
         """
         x, y = self.centre
-        if across:
+        if horizontally:
             self.is_flipped_horizontally, self.centre = not self.is_flipped_horizontally, (1 - x, y)
         else:
             self.is_flipped_vertically, self.centre = not self.is_flipped_vertically, (x, 1 - y)

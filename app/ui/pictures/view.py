@@ -44,8 +44,8 @@ def rate_text(shown_hz: float | None, arriving_hz: float | None) -> str:
     """
     if arriving_hz is None:
         return ""
-    shown = min(shown_hz, arriving_hz) if shown_hz is not None else 0.0
-    return _("{arriving} fps ({shown} shown)").format(shown=round(shown), arriving=round(arriving_hz))
+    displayed_hz = min(shown_hz, arriving_hz) if shown_hz is not None else 0.0
+    return _("{arriving} fps ({shown} shown)").format(shown=round(displayed_hz), arriving=round(arriving_hz))
 
 
 class RateText:
@@ -63,9 +63,9 @@ class RateText:
 
     def for_stream(self, stream: ImageStream) -> str:
         """Return the current text for a stream."""
-        words, now = rate_text(stream.displayed_hz, stream.arriving_hz), self._clock()
-        if words != self._words and (not self._words or not words or now - self._since >= STATS_INTERVAL_S):
-            self._words, self._since = words, now
+        text, now = rate_text(stream.displayed_hz, stream.arriving_hz), self._clock()
+        if text != self._words and (not self._words or not text or now - self._since >= STATS_INTERVAL_S):
+            self._words, self._since = text, now
         return self._words
 
     def clear(self) -> None:
@@ -135,8 +135,8 @@ class PictureView(QWidget):
         under = self._hovered_pixel_text()
         size = "" if self._state else f"{picture.width}\u00d7{picture.height}"
         zoom = f"{round(self.scale() * 100)} %" if self.place.zoom is not None else ""
-        facts = (under, zoom) if under else (size, zoom, "" if self._state else self._age)
-        return "  ".join(part for part in (self._state or self._rate, *facts) if part)
+        details = (under, zoom) if under else (size, zoom, "" if self._state else self._age)
+        return "  ".join(part for part in (self._state or self._rate, *details) if part)
 
     @property
     def boxes(self) -> tuple[DetectionBox, ...]:
@@ -175,8 +175,8 @@ class PictureView(QWidget):
             boxes: Bounding boxes of detections on the image.
             drawn: Returns the annotations for an image with the given width and height.
         """
-        words, before = self.label_text, (self._boxes, self._drawn, self._silent, self._state)
-        picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
+        previous_text, before = self.label_text, (self._boxes, self._drawn, self._silent, self._state)
+        picture, displayed, silent_s = stream.picture, self._picture, stream.silent_s
         self._rate = self._rates.for_stream(stream)
         now = self._clock()
         if picture is not None and (now - self._age_updated_s >= STATS_INTERVAL_S or not self._age):
@@ -190,7 +190,9 @@ class PictureView(QWidget):
             self._state = ""
         if picture is not self._picture and picture is not None:
             self._picture = picture
-            if shown is None or picture.bgra is not shown.bgra:  # unless a camera repeats the same image
+            if (
+                displayed is None or picture.bgra is not displayed.bgra
+            ):  # unless a camera repeats the same image
                 rows, columns = picture.bgra.shape[:2]
                 # QImage does not copy the bytes: self._picture keeps them alive.
                 self._grey = None
@@ -200,19 +202,23 @@ class PictureView(QWidget):
                 self.update()
             if not stream.is_frozen:
                 stream.count_painted()
-        if not stream.is_frozen or picture is not shown:
+        if not stream.is_frozen or picture is not displayed:
             self._boxes = boxes  # boxes on a frozen image don't change
-            shown = self._picture
-            self._drawn = drawn(shown.width, shown.height) if drawn is not None and shown is not None else ()
+            displayed = self._picture
+            self._drawn = (
+                drawn(displayed.width, displayed.height)
+                if drawn is not None and displayed is not None
+                else ()
+            )
         stream.set_size(self._requested_size())
         if (self._boxes, self._drawn, self._silent, self._state) != before:
             self.update()
-        self._update_label(words)
+        self._update_label(previous_text)
 
     def _update_label(self, before: str) -> None:
-        words = self.label_text
-        if words != before:
-            self.setAccessibleDescription(words)
+        text = self.label_text
+        if text != before:
+            self.setAccessibleDescription(text)
             if self._labelled:
                 top = self._label_top()
                 self.update(0, top, self.width(), self.height() - top)
@@ -243,15 +249,15 @@ class PictureView(QWidget):
 
     def scale(self) -> float:
         """Return the number of device pixels per image pixel."""
-        seen = self.place.rotated_size(self.picture_size()).width()
-        return self.area().width() / max(1.0, seen) * self.devicePixelRatioF()
+        rotated_width = self.place.rotated_size(self.picture_size()).width()
+        return self.area().width() / max(1.0, rotated_width) * self.devicePixelRatioF()
 
-    def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
+    def pixel_at(self, position: QPointF) -> tuple[int, int] | None:
         """Return the column and row of the image pixel at a point of the view; None outside of the image."""
         picture = self._picture
         if picture is None:
             return None
-        share = self.place.to_picture(at, self.area())
+        share = self.place.to_picture(position, self.area())
         if not (-1e-9 <= share.x() < 1 and -1e-9 <= share.y() < 1):
             return None
         x, y = int(share.x() * picture.width + 1e-6), int(share.y() * picture.height + 1e-6)
@@ -301,12 +307,16 @@ class PictureView(QWidget):
     def _paint_image(self, painter: QPainter, area: QRectF, image: QImage) -> None:
         smooth = self.scale() < MIN_SHARP_SCALE
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
-        place = self.place
-        if not place.rotation_deg and not place.is_flipped_horizontally and not place.is_flipped_vertically:
+        placement = self.place
+        if (
+            not placement.rotation_deg
+            and not placement.is_flipped_horizontally
+            and not placement.is_flipped_vertically
+        ):
             painter.drawImage(area, image)  # fast path of Qt
             return
         painter.save()
-        painter.setTransform(place.to_view(area), True)
+        painter.setTransform(placement.to_view(area), True)
         painter.drawImage(QRectF(0, 0, 1, 1), image)
         painter.restore()
 
@@ -316,14 +326,14 @@ class PictureView(QWidget):
         return font
 
     def _label_top(self) -> int:
-        high = max(20.0, paint.height_of(self._label_font()) + 4)
-        return math.floor(self.height() - LABEL_MARGIN - high)
+        height = max(20.0, paint.height_of(self._label_font()) + 4)
+        return math.floor(self.height() - LABEL_MARGIN - height)
 
     def _paint_label(self, painter: QPainter) -> None:
         font = self._label_font()
-        high = max(20.0, paint.height_of(font) + 4)
+        height = max(20.0, paint.height_of(font) + 4)
         width = min(paint.width_of(font, self.label_text) + 16, self.width() - 2 * LABEL_MARGIN)
-        tag = QRectF(LABEL_MARGIN, self.height() - LABEL_MARGIN - high, width, high)
+        tag = QRectF(LABEL_MARGIN, self.height() - LABEL_MARGIN - height, width, height)
         paint.box(painter, tag, 4, QColor(0, 0, 0, 190))
         paint.text_line(painter, tag.adjusted(8, 0, -4, 0), self.label_text, font, QColor("white"))
 
@@ -343,7 +353,7 @@ def to_greyscale(image: QImage) -> QImage:
     return image.convertToFormat(QImage.Format.Format_Grayscale8)
 
 
-def paint_stale(painter: QPainter, theme: Theme, view: QRectF, words: str) -> None:
+def paint_stale(painter: QPainter, theme: Theme, view: QRectF, text: str) -> None:
     """Darken the view and paint a camera icon with a text in the middle, for a stream without new images."""
     painter.fillRect(view, SILENT)
     font = theme.font("bodyLarge")
@@ -352,12 +362,12 @@ def paint_stale(painter: QPainter, theme: Theme, view: QRectF, words: str) -> No
     with_icon = view.height() >= ICON_SIZE + line + 12
     middle = view.center()
     if with_icon:
-        square = QRectF(0, 0, ICON_SIZE, ICON_SIZE)
-        square.moveCenter(QPointF(middle.x(), middle.y() - line / 2 - 2))
-        paint_icon(painter, square, "camera", QColor("white"))
+        icon_rect = QRectF(0, 0, ICON_SIZE, ICON_SIZE)
+        icon_rect.moveCenter(QPointF(middle.x(), middle.y() - line / 2 - 2))
+        paint_icon(painter, icon_rect, "camera", QColor("white"))
     top = middle.y() + ICON_SIZE / 2 - line / 2 + 4 if with_icon else middle.y() - line / 2
     room = QRectF(view.left() + 8, top, view.width() - 16, line + 2)
-    paint.text_line(painter, room, words, font, QColor("white"), paint.CENTRE)
+    paint.text_line(painter, room, text, font, QColor("white"), paint.CENTRE)
 
 
 def _age_text(age_s: float | None) -> str:

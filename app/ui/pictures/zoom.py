@@ -35,15 +35,15 @@ class ZoomablePicture(PictureView):
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
 
-    def zoom_by(self, factor: float, at: QPointF | None = None) -> None:
+    def zoom_by(self, factor: float, position: QPointF | None = None) -> None:
         """Zoom by a factor around a point of the view.
 
         Args:
             factor: Factor; greater than 1 to zoom in.
-            at: Point that stays in place (default: the centre).
+            position: Point that stays in place (default: the centre).
         """
         middle = QPointF(self.width() / 2, self.height() / 2)
-        self.place.zoom_at(factor, at or middle, QSizeF(self.size()), self.picture_size())
+        self.place.zoom_at(factor, position or middle, QSizeF(self.size()), self.picture_size())
         self.notify_changed()
 
     def fit_to_view(self) -> None:
@@ -51,13 +51,13 @@ class ZoomablePicture(PictureView):
         self.place.set_zoom(None)
         self.notify_changed()
 
-    def show_actual_size(self, at: QPointF | None = None) -> None:
+    def show_actual_size(self, position: QPointF | None = None) -> None:
         """Show one device pixel per image pixel.
 
         Args:
-            at: Point of the view that stays in place (default: the centre).
+            position: Point of the view that stays in place (default: the centre).
         """
-        self.zoom_by(1 / max(1e-9, self.scale()), at)
+        self.zoom_by(1 / max(1e-9, self.scale()), position)
 
     def move_by(self, dx: float, dy: float) -> None:
         """Move the image by a distance in px."""
@@ -89,8 +89,8 @@ class ZoomablePicture(PictureView):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         name = key_name(event)
         if name in KEY_DIRECTIONS and self.place.zoom is not None:
-            across, down = KEY_DIRECTIONS[name]
-            self.move_by(across * KEY_MOVE_PX, down * KEY_MOVE_PX)
+            dx, dy = KEY_DIRECTIONS[name]
+            self.move_by(dx * KEY_MOVE_PX, dy * KEY_MOVE_PX)
         elif name in self.keys:
             self.key_pressed.emit(name)
         else:
@@ -136,13 +136,13 @@ def _is_key(event: QEvent) -> TypeGuard[QKeyEvent]:
 
 def key_name(event: QKeyEvent) -> str:
     """Return the name of a pressed key with its modifiers, such as "Ctrl+C", "R" or "+"."""
-    held = event.modifiers()
+    modifiers = event.modifiers()
     text = event.text()
     if text and text in "+-":  # on some keyboards these keys need Shift, or are on the number pad
         name = text
     else:
         name = event.keyCombination().key().name.removeprefix("Key_")
-        name = ("Shift+" if held & Qt.KeyboardModifier.ShiftModifier else "") + name
+        name = ("Shift+" if modifiers & Qt.KeyboardModifier.ShiftModifier else "") + name
     names = {"Plus": "+", "Minus": "-", "Equal": "+"}
     name = names.get(name.removeprefix("Shift+"), name)
-    return f"Ctrl+{name}" if held & Qt.KeyboardModifier.ControlModifier else name
+    return f"Ctrl+{name}" if modifiers & Qt.KeyboardModifier.ControlModifier else name

@@ -39,10 +39,10 @@ class BubbleText:
         return self.lines[self.first : self.first + self.visible_count]
 
 
-def wrap_text(words: str, metrics: QFontMetricsF, width: float) -> list[str]:
+def wrap_text(text: str, metrics: QFontMetricsF, width: float) -> list[str]:
     """Wrap a text to a width in px; words that are too long are split."""
     lines = [""]
-    for word in words.split():
+    for word in text.split():
         tried = f"{lines[-1]} {word}".strip()
         if metrics.horizontalAdvance(tried) <= width:
             lines[-1] = tried
@@ -64,25 +64,25 @@ def _split_word(word: str, metrics: QFontMetricsF, width: float) -> list[str]:
     return pieces
 
 
-def scroll_to_spoken(lines: Sequence[str], most: int, spoken: float) -> BubbleText:
+def scroll_to_spoken(lines: Sequence[str], max_lines: int, spoken_fraction: float) -> BubbleText:
     """Scroll a wrapped text so that the spoken line is visible.
 
     Args:
         lines: Lines of the text.
-        most: Maximum number of visible lines.
-        spoken: Spoken fraction of the text, 0 to 1.
+        max_lines: Maximum number of visible lines.
+        spoken_fraction: Spoken fraction of the text, 0 to 1.
     """
-    shown = max(1, min(most, len(lines)))
+    visible_count = max(1, min(max_lines, len(lines)))
     letters = sum(len(line) for line in lines)
-    position, line = spoken * letters, 0
+    position, line = spoken_fraction * letters, 0
     while line < len(lines) - 1 and position >= len(lines[line]):
         position -= len(lines[line])
         line += 1
     first = min(
-        max(0, line - (shown - 1 - LINES_ABOVE_SPOKEN if shown > LINES_ABOVE_SPOKEN else 0)),
-        len(lines) - shown,
+        max(0, line - (visible_count - 1 - LINES_ABOVE_SPOKEN if visible_count > LINES_ABOVE_SPOKEN else 0)),
+        len(lines) - visible_count,
     )
-    return BubbleText(lines, max(0, first), shown)
+    return BubbleText(lines, max(0, first), visible_count)
 
 
 def paint_bubble(
@@ -91,7 +91,7 @@ def paint_bubble(
     head: Spot,
     state: RobotState,
     font: QFont,
-    taken: Sequence[QRectF] = (),
+    occupied: Sequence[QRectF] = (),
 ) -> QRectF:
     """Paint the speech bubble of a robot beside its head, and return the rectangle of the bubble.
 
@@ -101,74 +101,76 @@ def paint_bubble(
         head: Position of the head, with its scale.
         state: State of the robot, with the text.
         font: Font of the text.
-        taken: Rectangles of other bubbles, which are covered only if there is no free space.
+        occupied: Rectangles of other bubbles, which are covered only if there is no free space.
     """
-    near, words = 31.0 * head.scale, state.caption
-    room_right, room_left = bounds.right() - EDGE - head.u - near, head.u - near - bounds.left() - EDGE
+    gap, caption = 31.0 * head.scale, state.caption
+    room_right, room_left = bounds.right() - EDGE - head.u - gap, head.u - gap - bounds.left() - EDGE
     face = QFont(font)
     face.setWeight(QFont.Weight.DemiBold)
     face.setPixelSize(LARGE)
     width = min(SHORT_WIDTH, bounds.width() - 2 * EDGE)
-    lines = wrap_text(words, QFontMetricsF(face), width - 2 * INSIDE)
+    lines = wrap_text(caption, QFontMetricsF(face), width - 2 * INSIDE)
     if len(lines) > SHORT_LINES:
         face.setPixelSize(SMALL)
-        beside = max(room_right, room_left)  # narrower and higher, so that the bubble doesn't cover the face
-        width = min(max(MIN_WIDTH, beside), LONG_WIDTH, bounds.width() - 2 * EDGE)
-        lines = wrap_text(words, QFontMetricsF(face), width - 2 * INSIDE)
+        max_room = max(
+            room_right, room_left
+        )  # narrower and higher, so that the bubble doesn't cover the face
+        width = min(max(MIN_WIDTH, max_room), LONG_WIDTH, bounds.width() - 2 * EDGE)
+        lines = wrap_text(caption, QFontMetricsF(face), width - 2 * INSIDE)
     metrics = QFontMetricsF(face)
     line_height = metrics.height() + 1
-    fits = int((bounds.height() - 2 * EDGE - 30) / line_height)
+    max_lines = int((bounds.height() - 2 * EDGE - 30) / line_height)
     text = scroll_to_spoken(
-        lines, min(MAX_NARROW if width < SHORT_WIDTH else MAX_LINES, fits), state.spoken_fraction
+        lines, min(MAX_NARROW if width < SHORT_WIDTH else MAX_LINES, max_lines), state.spoken_fraction
     )
     width = max(metrics.horizontalAdvance(line) for line in lines) + 2 * INSIDE
     height = text.visible_count * line_height + 18
     side = -1.0 if room_left > room_right and room_right < width else 1.0
 
     def box_at(towards: float) -> QRectF:
-        left = head.u + near if towards > 0 else head.u - near - width
+        left = head.u + gap if towards > 0 else head.u - gap - width
         left = min(max(left, bounds.left() + EDGE), max(bounds.left() + EDGE, bounds.right() - EDGE - width))
         return QRectF(left, max(bounds.top() + EDGE, head.v - 39 * head.scale - height), width, height)
 
-    side, box = _pick_box([(side, box_at(side)), (-side, box_at(-side))], taken, bounds)
+    side, box = _pick_box([(side, box_at(side)), (-side, box_at(-side))], occupied, bounds)
     _paint_box(p, box, min(max(head.u + side * 58 * head.scale, box.left() + 18), box.right() - 30), side)
     p.setFont(face)
     p.setPen(QColor("#1C1B19"))
     scrolls = text.visible_count < len(lines)
     for number, line in enumerate(text.visible_lines):
-        at = QRectF(box.left(), box.top() + 9 + number * line_height, width, line_height)
-        p.drawText(at, Qt.AlignmentFlag.AlignCenter, line)
+        line_rect = QRectF(box.left(), box.top() + 9 + number * line_height, width, line_height)
+        p.drawText(line_rect, Qt.AlignmentFlag.AlignCenter, line)
     if scrolls:
         _paint_scroll_thumb(p, box, text)
     return box
 
 
 def _pick_box(
-    places: Sequence[tuple[float, QRectF]], taken: Sequence[QRectF], bounds: QRectF
+    candidates: Sequence[tuple[float, QRectF]], occupied: Sequence[QRectF], bounds: QRectF
 ) -> tuple[float, QRectF]:
     # Tries places without overlap first, then below other bubbles, then the one with the smallest overlap.
-    def covered_area(place: tuple[float, QRectF]) -> float:
-        common = [place[1].intersected(other) for other in taken]
+    def covered_area(candidate: tuple[float, QRectF]) -> float:
+        common = [candidate[1].intersected(other) for other in occupied]
         return sum(each.width() * each.height() for each in common)
 
-    tops = [other.bottom() + EDGE for other in taken]
-    lower = [(side, box.translated(0, top - box.top())) for top in tops for side, box in places]
-    inside = [place for place in lower if place[1].bottom() <= bounds.bottom() - EDGE]
-    return min([*places, *inside], key=covered_area)
+    tops = [other.bottom() + EDGE for other in occupied]
+    lower = [(side, box.translated(0, top - box.top())) for top in tops for side, box in candidates]
+    fitting = [candidate for candidate in lower if candidate[1].bottom() <= bounds.bottom() - EDGE]
+    return min([*candidates, *fitting], key=covered_area)
 
 
-def paint_caption(p: QPainter, area: QRectF, words: str, font: QFont) -> None:
+def paint_caption(p: QPainter, area: QRectF, text: str, font: QFont) -> None:
     """Paint speech as a caption in one line at the bottom of an area, after its bubble has disappeared.
 
     Args:
         p: Painter in px.
         area: Area in px.
-        words: Text, elided if it is too long.
+        text: Text, elided if it is too long.
         font: Font of the text.
     """
     metrics = QFontMetricsF(font)
-    most = max(0.0, area.width() - 4 * EDGE - 2 * INSIDE)
-    line = metrics.elidedText(words, Qt.TextElideMode.ElideRight, most)
+    max_width = max(0.0, area.width() - 4 * EDGE - 2 * INSIDE)
+    line = metrics.elidedText(text, Qt.TextElideMode.ElideRight, max_width)
     width, height = metrics.horizontalAdvance(line) + 2 * INSIDE, metrics.height() + 10
     box = QRectF(area.center().x() - width / 2, area.bottom() - EDGE - height, width, height)
     p.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -180,12 +182,12 @@ def paint_caption(p: QPainter, area: QRectF, words: str, font: QFont) -> None:
     p.drawText(box, Qt.AlignmentFlag.AlignCenter, line)
 
 
-def _paint_box(p: QPainter, box: QRectF, foot: float, side: float) -> None:
+def _paint_box(p: QPainter, box: QRectF, tail_x: float, side: float) -> None:
     shape = QPainterPath()
     shape.addRoundedRect(box, min(12.0, box.height() / 2), min(12.0, box.height() / 2))
-    tail = QPainterPath(QPointF(foot, box.bottom() - 1))
-    tail.lineTo(foot + 15 if side > 0 else foot - 15, box.bottom() - 1)
-    tail.lineTo(foot - 2.5 * side, box.bottom() + 11)
+    tail = QPainterPath(QPointF(tail_x, box.bottom() - 1))
+    tail.lineTo(tail_x + 15 if side > 0 else tail_x - 15, box.bottom() - 1)
+    tail.lineTo(tail_x - 2.5 * side, box.bottom() + 11)
     tail.closeSubpath()
     p.setPen(QPen(QColor("#C9C4BA"), 0.8))
     p.setBrush(QColor("#FFFFFF"))

@@ -48,17 +48,17 @@ def _paint_shelf(p: QPainter, area: QRectF) -> None:
     # Lower than a real table, so that the window stays visible.
     p.fillRect(area, QColor("#8B6644"))
     edge = area.width() * 0.07
-    inside = area.adjusted(edge, edge, -edge, -edge * 0.6)
-    p.fillRect(inside, QColor("#6B4A2F"))
-    board = inside.height() / 2
+    inner = area.adjusted(edge, edge, -edge, -edge * 0.6)
+    p.fillRect(inner, QColor("#6B4A2F"))
+    board = inner.height() / 2
     for row in range(2):
-        bottom = inside.top() + board * (row + 1)
-        p.fillRect(QRectF(inside.left(), bottom - edge * 0.7, inside.width(), edge * 0.7), QColor("#9E7654"))
-        x = inside.left() + edge * 0.6
-        for place, colour in enumerate(BOOK_COLOURS[row]):
-            wide, high = edge * (1.5 + place % 2 * 0.5), board * (0.62 + 0.09 * (place * 2 % 3))
-            p.fillRect(QRectF(x, bottom - edge * 0.7 - high, wide, high), QColor(colour))
-            x += wide + edge * 0.25
+        bottom = inner.top() + board * (row + 1)
+        p.fillRect(QRectF(inner.left(), bottom - edge * 0.7, inner.width(), edge * 0.7), QColor("#9E7654"))
+        x = inner.left() + edge * 0.6
+        for index, colour in enumerate(BOOK_COLOURS[row]):
+            width, height = edge * (1.5 + index % 2 * 0.5), board * (0.62 + 0.09 * (index * 2 % 3))
+            p.fillRect(QRectF(x, bottom - edge * 0.7 - height, width, height), QColor(colour))
+            x += width + edge * 0.25
 
 
 def thing_area(thing: Thing, spot: Spot) -> QRectF:
@@ -71,16 +71,16 @@ def thing_area(thing: Thing, spot: Spot) -> QRectF:
     if thing.kind == "place":
         return QRectF(spot.u - 30 * spot.scale, spot.v - 8 * spot.scale, 60 * spot.scale, 16 * spot.scale)
     if thing.kind == "shelf":
-        high = (thing.height_m or 1.2) * SHELF_UNITS_PER_M * spot.scale
-        return QRectF(spot.u - 27 * spot.scale, spot.v - high, 54 * spot.scale, high)
+        height = (thing.height_m or 1.2) * SHELF_UNITS_PER_M * spot.scale
+        return QRectF(spot.u - 27 * spot.scale, spot.v - height, 54 * spot.scale, height)
     if thing.kind == "ball":
         r = max(4.0, (thing.size_m or BALL_M) * 110.0 * spot.scale)
         return QRectF(spot.u - r, spot.v - 2 * r + r * 0.08, 2 * r, 2 * r)
     if thing.kind == "table":
         share = spot.scale / TABLE_SPOT.scale
         return QRectF(spot.u - 53 * share, spot.v - 61 * share, 106 * share, 61 * share)
-    wide = max(10.0, min(thing.size_m or CARD_M, CARD_M * 0.8) * UNITS_PER_M * spot.scale)
-    return QRectF(spot.u - wide / 2, spot.v - 78 * spot.scale - wide * 0.6, wide, wide * 1.2)
+    width = max(10.0, min(thing.size_m or CARD_M, CARD_M * 0.8) * UNITS_PER_M * spot.scale)
+    return QRectF(spot.u - width / 2, spot.v - 78 * spot.scale - width * 0.6, width, width * 1.2)
 
 
 def paint_thing(p: QPainter, thing: Thing, spot: Spot, font: QFont) -> None:
@@ -138,10 +138,10 @@ def _paint_position(p: QPainter, area: QRectF, name: str, font: QFont) -> None:
     p.setPen(QPen(QColor(63, 124, 179, 210), 1.4))
     p.setBrush(QColor(63, 124, 179, 70))
     p.drawEllipse(area)
-    words = QFont(font)
-    words.setPixelSize(10)
-    words.setWeight(QFont.Weight.DemiBold)
-    p.setFont(words)
+    name_font = QFont(font)
+    name_font.setPixelSize(10)
+    name_font.setWeight(QFont.Weight.DemiBold)
+    p.setFont(name_font)
     p.setPen(QColor("#1F4468"))
     p.drawText(area, int(Qt.AlignmentFlag.AlignCenter), name)
 

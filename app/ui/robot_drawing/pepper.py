@@ -100,8 +100,8 @@ def _limb(side: str, sign: int, raised_deg: float, heading: float) -> Limb:
     out = sign * math.pi / 2 + heading
     raised = math.radians(REST_DEG + max(-20.0, min(180.0, raised_deg)) * (UP_DEG - REST_DEG) / 180.0)
     shoulder = QPointF(SHOULDER_X * math.sin(out), SHOULDER_Y)
-    reach = math.cos(ARM_PLANE_RAD) * math.sin(out) + math.sin(ARM_PLANE_RAD) * math.sin(heading)
-    hand = shoulder + QPointF(ARM * math.sin(raised) * reach, ARM * math.cos(raised))
+    projection = math.cos(ARM_PLANE_RAD) * math.sin(out) + math.sin(ARM_PLANE_RAD) * math.sin(heading)
+    hand = shoulder + QPointF(ARM * math.sin(raised) * projection, ARM * math.cos(raised))
     return Limb(side, shoulder, hand, math.cos(out))
 
 
@@ -129,12 +129,12 @@ def paint_figure(p: QPainter, state: RobotState) -> None:
 
 
 def _shading_brush(half: float) -> QBrush:
-    across = QLinearGradient(-half, 0, half, 0)
-    across.setColorAt(0.0, QColor("#E9EDF4"))
-    across.setColorAt(0.34, QColor(WHITE))
-    across.setColorAt(0.55, QColor("#F4F6FA"))
-    across.setColorAt(1.0, QColor("#D3DAE7"))
-    return QBrush(across)
+    gradient = QLinearGradient(-half, 0, half, 0)
+    gradient.setColorAt(0.0, QColor("#E9EDF4"))
+    gradient.setColorAt(0.34, QColor(WHITE))
+    gradient.setColorAt(0.55, QColor("#F4F6FA"))
+    gradient.setColorAt(1.0, QColor("#D3DAE7"))
+    return QBrush(gradient)
 
 
 def _paint_base(p: QPainter) -> None:
@@ -170,10 +170,10 @@ def _paint_torso(p: QPainter, heading: float) -> None:
 
 
 def _paint_tablet(p: QPainter, heading: float) -> None:
-    wide = math.cos(heading)
+    x_scale = math.cos(heading)
     p.save()
     p.translate(21.5 * math.sin(heading), -88.1)
-    p.scale(wide, 1.0)
+    p.scale(x_scale, 1.0)
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor("#1B1E2A"))
     p.drawRoundedRect(QRectF(-17.5, -12.5, 35, 25), 2.6, 2.6)
@@ -268,7 +268,7 @@ def paint_face(p: QPainter, state: RobotState, heading: float, nod: float) -> No
         heading: Direction of the head in rad.
         nod: Vertical shift of the face because of the head's pitch.
     """
-    look = _EXPRESSIONS.get(state.emotion, _EXPRESSIONS["neutral"])
+    expression = _EXPRESSIONS.get(state.emotion, _EXPRESSIONS["neutral"])
     dot = QPointF(HEAD_RX * 0.5 * math.sin(heading), -20.8 + nod)
     if math.cos(heading) > 0.0:
         p.setPen(Qt.PenStyle.NoPen)
@@ -280,53 +280,57 @@ def paint_face(p: QPainter, state: RobotState, heading: float, nod: float) -> No
             p.save()
             p.translate(HEAD_RX * math.sin(azimuth), 1.9 + nod)
             p.scale(math.cos(azimuth) / math.cos(EYE_AZIMUTH_RAD), 1.0)
-            _paint_eye(p, QColor(state.eyes), look, sign)
+            _paint_eye(p, QColor(state.eyes), expression, sign)
             p.restore()
     if math.cos(heading) > 0.12:
         p.save()
         p.translate(HEAD_RX * 0.93 * math.sin(heading), 19.4 + nod)
         p.scale(math.cos(heading), 1.0)
-        _paint_mouth(p, look)
+        _paint_mouth(p, expression)
         p.restore()
 
 
-def _paint_eye(p: QPainter, colour: QColor, look: Expression, sign: int) -> None:
+def _paint_eye(p: QPainter, colour: QColor, expression: Expression, sign: int) -> None:
     p.setPen(Qt.PenStyle.NoPen)
     for brush, radius in ((QColor(DARK_COLOUR), 9.7), (colour, 8.4), (QColor(DARK_COLOUR), 5.3)):
         p.setBrush(brush)
-        p.drawEllipse(QPointF(0, 0), radius * look.eye, radius * look.eye)
+        p.drawEllipse(QPointF(0, 0), radius * expression.eye, radius * expression.eye)
     p.setBrush(QColor(WHITE))
     p.drawEllipse(QPointF(2.3, -2.3), 2.0, 2.0)
-    if look.lid > 0:
+    if expression.lid > 0:
         lid = QPainterPath()
-        lid.addRect(QRectF(-11, -11, 22, 1.3 + 19.4 * look.lid))
+        lid.addRect(QRectF(-11, -11, 22, 1.3 + 19.4 * expression.lid))
         eye = QPainterPath()
-        eye.addEllipse(QPointF(0, 0), 10.2 * look.eye, 10.2 * look.eye)
+        eye.addEllipse(QPointF(0, 0), 10.2 * expression.eye, 10.2 * expression.eye)
         p.fillPath(lid.intersected(eye), QColor("#DCE2EC"))
-    if look.brow:
+    if expression.brow:
         p.setPen(QPen(QColor("#4E5566"), 2.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         # For a positive brow the inner end (towards the nose) is up.
-        tilt = 3.0 * look.brow * sign
+        tilt = 3.0 * expression.brow * sign
         p.drawLine(QLineF(-7, -13.4 - tilt, 7, -13.4 + tilt))
         p.setPen(Qt.PenStyle.NoPen)
 
 
-def _paint_mouth(p: QPainter, look: Expression) -> None:
-    if look.has_cheeks:
+def _paint_mouth(p: QPainter, expression: Expression) -> None:
+    if expression.has_cheeks:
         p.setPen(Qt.PenStyle.NoPen)
         p.setBrush(QColor(255, 150, 150, 70))
         p.drawEllipse(QPointF(-17, -5), 4.6, 3.0)
         p.drawEllipse(QPointF(17, -5), 4.6, 3.0)
     pen = QPen(QColor("#4E5566"), 1.7, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
     p.setPen(pen)
-    mouth = QPainterPath(QPointF(-look.mouth_half_width, 0))
-    if look.mouth_opening and not look.smile:
+    mouth = QPainterPath(QPointF(-expression.mouth_half_width, 0))
+    if expression.mouth_opening and not expression.smile:
         p.setBrush(QColor("#5B3440"))
-        p.drawEllipse(QPointF(0, look.mouth_opening * 0.2), look.mouth_half_width, look.mouth_opening * 0.62)
+        p.drawEllipse(
+            QPointF(0, expression.mouth_opening * 0.2),
+            expression.mouth_half_width,
+            expression.mouth_opening * 0.62,
+        )
         return
-    mouth.quadTo(QPointF(0, 2 * look.smile), QPointF(look.mouth_half_width, 0))
-    if look.mouth_opening:
-        mouth.quadTo(QPointF(0, -1.0), QPointF(-look.mouth_half_width, 0))
+    mouth.quadTo(QPointF(0, 2 * expression.smile), QPointF(expression.mouth_half_width, 0))
+    if expression.mouth_opening:
+        mouth.quadTo(QPointF(0, -1.0), QPointF(-expression.mouth_half_width, 0))
         p.setBrush(QColor("#5B3440"))
     else:
         p.setBrush(Qt.BrushStyle.NoBrush)

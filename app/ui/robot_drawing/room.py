@@ -129,10 +129,10 @@ def _paint_planks(p: QPainter, bounds: QRectF) -> None:
     p.save()
     p.setClipRect(QRectF(bounds.left(), FLOOR_TOP, bounds.width(), bounds.bottom() - FLOOR_TOP))
     p.setPen(QPen(QColor(140, 108, 74, 90), 1.0))
-    reach = (bounds.bottom() - HORIZON) / (HEIGHT - HORIZON)
+    scale = (bounds.bottom() - HORIZON) / (HEIGHT - HORIZON)
     count = int(bounds.width() / 25.0) + 2
     for plank in range(-count, count + 1):
-        along = plank * 70.6 * reach
+        along = plank * 70.6 * scale
         p.drawLine(QLineF(WIDTH / 2, HORIZON, WIDTH / 2 + along, bounds.bottom()))
     p.restore()
 

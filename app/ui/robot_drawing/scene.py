@@ -90,17 +90,17 @@ class RobotDrawing:
         _paint_reach(painter, figures[0].spot, state)
         drawn: list[tuple[Spot, Thing | Figure]] = [*_placed_things(stage, state)]
         drawn += [(figure.spot, figure) for figure in reversed(figures)]
-        for spot, one in sorted(drawn, key=lambda pair: pair[0].v):
-            if isinstance(one, Thing):
-                paint_thing(painter, one, spot, self._font)
+        for spot, item in sorted(drawn, key=lambda pair: pair[0].v):
+            if isinstance(item, Thing):
+                paint_thing(painter, item, spot, self._font)
             else:
-                _paint_figure(painter, one)
+                _paint_figure(painter, item)
         self._paint_marks(painter, stage, state, others, marks)
         bubbles: list[QRectF] = []
         for figure in figures:
             if figure.state.caption:
-                high = TOP_CENTRE.y() if figure.state.figure == TURTLE_FIGURE else HEAD_CENTRE.y()
-                head = replace(figure.spot, v=figure.spot.v + high * figure.spot.scale)
+                head_y = TOP_CENTRE.y() if figure.state.figure == TURTLE_FIGURE else HEAD_CENTRE.y()
+                head = replace(figure.spot, v=figure.spot.v + head_y * figure.spot.scale)
                 bubble = paint_bubble(painter, stage.bounds(), head, figure.state, self._font, bubbles)
                 bubbles.append(bubble)
         painter.restore()
@@ -162,11 +162,13 @@ class RobotDrawing:
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
             small = figure.state.figure == TURTLE_FIGURE
-            own = {} if small else {f"{limb.side}_hand": limb.hand for limb in limbs(figure.state)}
-            own |= {"body": TOP_CENTRE} if small else {"head": HEAD_CENTRE, "body": QPointF(0, -50)}
-            for name, place in own.items():
+            part_positions = {} if small else {f"{limb.side}_hand": limb.hand for limb in limbs(figure.state)}
+            part_positions |= (
+                {"body": TOP_CENTRE} if small else {"head": HEAD_CENTRE, "body": QPointF(0, -50)}
+            )
+            for name, position in part_positions.items():
                 if part == figure.part_name(name):
-                    unit = QPointF(figure.spot.u, figure.spot.v) + place * figure.spot.scale
+                    unit = QPointF(figure.spot.u, figure.spot.v) + position * figure.spot.scale
                     return stage.origin + unit * stage.scale
         for spot, thing in _placed_things(stage, state):
             if part in {thing.name, thing.kind}:
@@ -184,8 +186,8 @@ class RobotDrawing:
             area = areas.get(part or "")
             if area is not None:
                 p.setBrush(Qt.BrushStyle.NoBrush)
-                for ink, wide in ((QColor("#FFFFFF"), width + 1.6), (marks.colour, width)):
-                    p.setPen(QPen(ink, wide))
+                for colour, pen_width in ((QColor("#FFFFFF"), width + 1.6), (marks.colour, width)):
+                    p.setPen(QPen(colour, pen_width))
                     p.drawRoundedRect(area.adjusted(-4, -4, 4, 4), 6, 6)
 
     def _paint_room(self, painter: QPainter, stage: Stage, dark: bool) -> None:
@@ -209,16 +211,16 @@ class RobotDrawing:
 
 def _placed_things(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
     # Sorted from back to front; people in front of the robot are marks on the floor.
-    placed = []
+    pairs = []
     for thing in state.objects:
         before = thing.kind in {"person", "face"} and thing.x > state.x
-        shown = replace(thing, kind="place") if before else thing
+        drawn_thing = replace(thing, kind="place") if before else thing
         spot = stage.spot_at(thing.x, thing.y)
-        half = thing_area(shown, spot).width() / 2
+        half = thing_area(drawn_thing, spot).width() / 2
         # keeps things at a side wall completely visible
-        inside = min(max(spot.u, half + 4), WIDTH - half - 4)
-        placed.append((replace(spot, u=inside), shown))
-    return sorted(placed, key=lambda pair: pair[0].v)
+        clamped_u = min(max(spot.u, half + 4), WIDTH - half - 4)
+        pairs.append((replace(spot, u=clamped_u), drawn_thing))
+    return sorted(pairs, key=lambda pair: pair[0].v)
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,8 +259,8 @@ class Figure:
 
 
 def _figures(stage: Stage, state: RobotState, others: OtherRobots) -> list[Figure]:
-    found = [("", state), *others]
-    return [Figure(name, each, stage.spot_at(each.x, each.y)) for name, each in found]
+    named_states = [("", state), *others]
+    return [Figure(name, each, stage.spot_at(each.x, each.y)) for name, each in named_states]
 
 
 def _paint_figure(p: QPainter, figure: Figure) -> None:
@@ -274,25 +276,25 @@ def _paint_reach(painter: QPainter, robot: Spot, state: RobotState) -> None:
     painter.save()
     painter.translate(robot.u, robot.v)
     painter.scale(robot.scale, robot.scale)
-    reach = QPen(QColor(88, 92, 170, 170), 1.1)
-    reach.setStyle(Qt.PenStyle.DashLine)
-    reach.setDashPattern([4.0, 4.0])
-    painter.setPen(reach)
+    pen = QPen(QColor(88, 92, 170, 170), 1.1)
+    pen.setStyle(Qt.PenStyle.DashLine)
+    pen.setDashPattern([4.0, 4.0])
+    painter.setPen(pen)
     painter.setBrush(QColor(92, 88, 170, 46 if not state.is_moving else 78))
     painter.drawEllipse(QPointF(0, 0), 113, 21)
     painter.restore()
 
 
-def _part_at(own: QPointF, state: RobotState) -> str | None:
+def _part_at(point: QPointF, state: RobotState) -> str | None:
     # Only Pepper has parts that can be touched.
     if state.figure == TURTLE_FIGURE:
         return None
     for limb in limbs(state):
-        if _is_near(own, limb.hand, 11.0):
+        if _is_near(point, limb.hand, 11.0):
             return f"{limb.side}_hand"
-    return "head" if _is_near(own, HEAD_CENTRE, 36.0) else None
+    return "head" if _is_near(point, HEAD_CENTRE, 36.0) else None
 
 
 def _is_near(point: QPointF, centre: QPointF, radius: float) -> bool:
-    away = point - centre
-    return QPointF.dotProduct(away, away) <= radius * radius
+    offset = point - centre
+    return QPointF.dotProduct(offset, offset) <= radius * radius

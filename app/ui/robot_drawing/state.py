@@ -136,8 +136,8 @@ def _parse_sound(value: object) -> str:
 
 
 def _parse_number(value: object, default: float = 0.0) -> float:
-    good = isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e6
-    return float(value) if good else default  # type: ignore[arg-type]
+    is_valid = isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e6
+    return float(value) if is_valid else default  # type: ignore[arg-type]
 
 
 def _parse_colour(value: object, default: str) -> str:
@@ -150,29 +150,29 @@ def _parse_touched_parts(value: object) -> tuple[str, ...]:
     if isinstance(value, str):
         return (value,)
     if isinstance(value, Mapping):
-        return tuple(bounded_str(place) for place, down in value.items() if down is True)
+        return tuple(bounded_str(part) for part, is_touched in value.items() if is_touched is True)
     if isinstance(value, Sequence):
-        return tuple(bounded_str(place) for place in value)
+        return tuple(bounded_str(part) for part in value)
     return ()
 
 
 def _parse_things(value: object) -> tuple[Thing, ...]:
     if not isinstance(value, Sequence) or isinstance(value, str):
         return ()
-    return tuple(_parse_thing(one) for one in value if isinstance(one, Mapping))
+    return tuple(_parse_thing(item) for item in value if isinstance(item, Mapping))
 
 
-def _parse_thing(one: Mapping[str, object]) -> Thing:
-    colour = one.get("colour", one.get("color"))
-    size = one.get("radius", one.get("size"))
+def _parse_thing(item: Mapping[str, object]) -> Thing:
+    colour = item.get("colour", item.get("color"))
+    size = item.get("radius", item.get("size"))
     return Thing(
-        kind=bounded_str(one.get("kind") or "box"),
-        x=_parse_number(one.get("x")),
-        y=_parse_number(one.get("y")),
-        name=bounded_str(one.get("name") or ""),
+        kind=bounded_str(item.get("kind") or "box"),
+        x=_parse_number(item.get("x")),
+        y=_parse_number(item.get("y")),
+        name=bounded_str(item.get("name") or ""),
         colour=_parse_colour(colour, "") or None,
         size_m=_parse_number(size) if size is not None else None,
-        height_m=_parse_number(one.get("height")) if one.get("height") is not None else None,
+        height_m=_parse_number(item.get("height")) if item.get("height") is not None else None,
     )
 
 
@@ -186,6 +186,8 @@ def _parse_room(value: object) -> RoomBounds:
     if "x_min" in value and "y_min" in value:
         sides = [_parse_number(value.get(side)) for side in ("x_min", "x_max", "y_min", "y_max")]
         return RoomBounds(*sides) if sides[1] - sides[0] > 0.1 and sides[3] - sides[2] > 0.1 else RoomBounds()
-    wide = _parse_number(value.get("width"), 6.0)
-    deep = _parse_number(value.get("depth"), 5.0)
-    return RoomBounds(-wide / 2, wide / 2, -deep / 2, deep / 2) if min(wide, deep) > 0.1 else RoomBounds()
+    width = _parse_number(value.get("width"), 6.0)
+    depth = _parse_number(value.get("depth"), 5.0)
+    return (
+        RoomBounds(-width / 2, width / 2, -depth / 2, depth / 2) if min(width, depth) > 0.1 else RoomBounds()
+    )

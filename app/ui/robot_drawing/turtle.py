@@ -54,16 +54,16 @@ def point_on_body(azimuth: float, share: float = 1.0, height: float = 0.0) -> QP
     return QPointF(RADIUS * share * math.sin(azimuth), RADIUS * share * FLAT * math.cos(azimuth) + height)
 
 
-def side_at(own: QPointF, theta_deg: float) -> str:
+def side_at(point: QPointF, theta_deg: float) -> str:
     """Return the side of the bumper that a click presses: "left", "right", "front" or "back".
 
     A click on the top presses the front.
 
     Args:
-        own: Position of the click in the coordinates of the figure.
+        point: Position of the click in the coordinates of the figure.
         theta_deg: Heading of the robot.
     """
-    across, along = own.x() / RADIUS, (own.y() - HIGH) / (RADIUS * FLAT)
+    across, along = point.x() / RADIUS, (point.y() - HIGH) / (RADIUS * FLAT)
     if math.hypot(across, along) < TOP_TOUCH_FRACTION or along < -1.0:
         return "front"
     if along > 0:  # near edge of the deck and drum below it: counts as the side that faces the viewer
@@ -77,16 +77,21 @@ def side_at(own: QPointF, theta_deg: float) -> str:
 
 def _paint_wheel(p: QPainter, azimuth: float) -> None:
     # Painted on the body's side, facing in the direction of the azimuth.
-    wide = max(2.6, WHEEL_RADIUS * abs(math.cos(azimuth)))
+    half_width = max(2.6, WHEEL_RADIUS * abs(math.cos(azimuth)))
     middle = point_on_body(azimuth, 0.98, -WHEEL_RADIUS + 1.5)
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(RUBBER))
     thick = 5.0 * abs(math.sin(azimuth)) + 1.0
-    box = QRectF(middle.x() - wide - thick / 2, middle.y() - WHEEL_RADIUS, 2 * wide + thick, 2 * WHEEL_RADIUS)
+    box = QRectF(
+        middle.x() - half_width - thick / 2,
+        middle.y() - WHEEL_RADIUS,
+        2 * half_width + thick,
+        2 * WHEEL_RADIUS,
+    )
     p.drawRoundedRect(box, min(box.width() / 2, WHEEL_RADIUS), WHEEL_RADIUS)
     if math.cos(azimuth) > 0.15:
         p.setBrush(QColor(METAL))
-        p.drawEllipse(middle, wide * 0.5, WHEEL_RADIUS * 0.5)
+        p.drawEllipse(middle, half_width * 0.5, WHEEL_RADIUS * 0.5)
 
 
 def _paint_body(p: QPainter, state: RobotState) -> None:
@@ -96,12 +101,12 @@ def _paint_body(p: QPainter, state: RobotState) -> None:
     drum.arcTo(QRectF(-RADIUS, LOW - flat, 2 * RADIUS, 2 * flat), 180, 180)
     drum.lineTo(RADIUS, HIGH)
     drum.closeSubpath()
-    across = QLinearGradient(-RADIUS, 0, RADIUS, 0)
-    across.setColorAt(0.0, QColor(SHELL_DARK))
-    across.setColorAt(0.32, QColor(SHELL))
-    across.setColorAt(1.0, QColor(SHELL_DARK).darker(115))
+    gradient = QLinearGradient(-RADIUS, 0, RADIUS, 0)
+    gradient.setColorAt(0.0, QColor(SHELL_DARK))
+    gradient.setColorAt(0.32, QColor(SHELL))
+    gradient.setColorAt(1.0, QColor(SHELL_DARK).darker(115))
     p.setPen(Qt.PenStyle.NoPen)
-    p.setBrush(QBrush(across))
+    p.setBrush(QBrush(gradient))
     p.drawPath(drum)
     ring = QColor(state.eyes)
     ring.setAlpha(235)
@@ -161,9 +166,9 @@ def _paint_deck(p: QPainter, heading: float, light: str) -> None:
 
 def _paint_mast(p: QPainter, heading: float) -> None:
     # The lens is visible if it faces the viewer.
-    foot, top = QPointF(0, HIGH - 1), QPointF(0, MAST_TOP + 6)
+    base, top = QPointF(0, HIGH - 1), QPointF(0, MAST_TOP + 6)
     p.setPen(QPen(QColor(METAL), 5.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
-    p.drawLine(foot, top)
+    p.drawLine(base, top)
     half = 10.5 - 2.5 * abs(math.sin(heading))
     p.setPen(QPen(QColor("#9AA2B4"), 0.8))
     p.setBrush(QColor("#E9EDF4"))
@@ -171,11 +176,11 @@ def _paint_mast(p: QPainter, heading: float) -> None:
     towards = math.cos(heading)
     if towards > -0.2:
         eye = QPointF(half * 0.85 * math.sin(heading), MAST_TOP)
-        wide = max(1.4, 5.0 * max(0.0, towards))
+        radius_x = max(1.4, 5.0 * max(0.0, towards))
         p.setPen(Qt.PenStyle.NoPen)
         p.setBrush(QColor("#1B1E2A"))
-        p.drawEllipse(eye, wide, 5.0)
+        p.drawEllipse(eye, radius_x, 5.0)
         p.setBrush(QColor("#5FA8E8"))
-        p.drawEllipse(eye, wide * 0.5, 2.5)
+        p.drawEllipse(eye, radius_x * 0.5, 2.5)
         p.setBrush(QColor(255, 255, 255, 220))
-        p.drawEllipse(eye + QPointF(-wide * 0.25, -1.6), wide * 0.22, 1.1)
+        p.drawEllipse(eye + QPointF(-radius_x * 0.25, -1.6), radius_x * 0.22, 1.1)

@@ -32,8 +32,8 @@ RECORDING, LAYOUT = OTHER_SUFFIXES = (".mcap", ".nep-layout")
 class SupportsFlush(Protocol):
     """Interface of a panel that can hold an edit which the document doesn't contain yet."""
 
-    def flush(self, done: Callable[[], None]) -> None:
-        """Apply the pending edit to the document, then call ``done``."""
+    def flush(self, callback: Callable[[], None]) -> None:
+        """Apply the pending edit to the document, then call ``callback``."""
 
 
 @runtime_checkable
@@ -49,12 +49,12 @@ class ClosedTab:
 
     Args:
         document: Document of the tab.
-        words: Text for the toast, or "" if nothing was saved.
+        message: Text for the toast, or "" if nothing was saved.
         earlier: Previous version of the file, or None if no file was overwritten.
     """
 
-    def __init__(self, document: Document, words: str = "", earlier: SavedVersion | None = None) -> None:
-        self.words, self.earlier = words, earlier
+    def __init__(self, document: Document, message: str = "", earlier: SavedVersion | None = None) -> None:
+        self.words, self.earlier = message, earlier
         self.workspace = document.workspace
         self.stamp = stamp_of(document.path) if document.path is not None else None
 
@@ -64,9 +64,9 @@ class DocumentController:
 
     Args:
         session: Session with the documents.
-        asks: File dialogs.
-        say: Shows a toast.
-        shown: Called when a behaviour was opened or reopened.
+        dialogs: File dialogs.
+        show_toast: Shows a toast.
+        show_editor: Called when a behaviour was opened or reopened.
         editor: Returns the panel with the block editor, or None before it is created.
         clock: Returns the Unix time in s.
     """
@@ -74,14 +74,14 @@ class DocumentController:
     def __init__(
         self,
         session: Session,
-        asks: FileDialogs,
-        say: Callable[..., object],
-        shown: Callable[[], object],
+        dialogs: FileDialogs,
+        show_toast: Callable[..., object],
+        show_editor: Callable[[], object],
         editor: Callable[[], object],
         clock: Callable[[], float] = time.time,
     ) -> None:
         # `editor` returns the behaviour panel, or None before it exists.
-        self._session, self.asks, self._say, self._shown = session, asks, say, shown
+        self._session, self.asks, self._say, self._shown = session, dialogs, show_toast, show_editor
         self._documents = session.documents
         self._editor, self._clock = editor, clock
         self.open_recording: Callable[[Path], object] = lambda _path: None
@@ -145,9 +145,9 @@ class DocumentController:
 
         self.run_after_flush(lambda: self._open_tab(open_copy))
 
-    def recover(self, left: Sequence[UnsavedWork]) -> None:
+    def recover(self, unsaved: Sequence[UnsavedWork]) -> None:
         """Open behaviours with unsaved changes in tabs, and show the most recently used one."""
-        self.run_after_flush(lambda: self._open_tab(lambda: self._session.tabs.recover(left)))
+        self.run_after_flush(lambda: self._open_tab(lambda: self._session.tabs.recover(unsaved)))
 
     def close(self, *documents: Document) -> None:
         """Close the tabs of documents, stopping their programs.
@@ -158,17 +158,17 @@ class DocumentController:
 
         def close_documents() -> None:
             runs = self._session.runs
-            gone = []
+            closed_tabs = []
             for document in documents:
                 if runs.is_running_or_pending(document):
                     runs.stop()
-                kept = self._save_before_close(document)
-                if kept is None:
+                closed_tab = self._save_before_close(document)
+                if closed_tab is None:
                     continue
                 self._documents.close(document)
-                gone.append(kept)
+                closed_tabs.append(closed_tab)
             self._session.tabs.save()
-            self._notify_closed([each for each in gone if each.words])
+            self._notify_closed([each for each in closed_tabs if each.words])
 
         self.run_after_flush(close_documents)
 
@@ -211,13 +211,13 @@ class DocumentController:
                 self._session.settings.rename_recent(old, document.path)
             except SettingsError as error:
                 self._session.console.add("warn", "studio", str(error))
-        words = _("Renamed {name} to {other}").format(name=before, other=document.name)
-        self._say(words, _("Undo"), lambda: self.rename(document, before))
+        message = _("Renamed {name} to {other}").format(name=before, other=document.name)
+        self._say(message, _("Undo"), lambda: self.rename(document, before))
         return True
 
-    def move(self, document: Document, place: int) -> None:
+    def move(self, document: Document, position: int) -> None:
         """Move the tab of a document to a position, counted from 0."""
-        self._documents.move(document, place)
+        self._documents.move(document, position)
         self._session.tabs.save()
 
     def save(self) -> None:
@@ -230,8 +230,12 @@ class DocumentController:
     def save_as(self) -> None:
         """Ask for a file and save the current behaviour to it."""
         document = self._session.document
-        own = document.path
-        folder = own.parent if own is not None and own.parent != closed_tabs_folder() else Path.home()
+        current_path = document.path
+        folder = (
+            current_path.parent
+            if current_path is not None and current_path.parent != closed_tabs_folder()
+            else Path.home()
+        )
         suggestion = str(folder / f"{document.name}{SUFFIX}")
         self.asks.save(suggestion, lambda path: self.run_after_flush(lambda: self._save(path)))
 
@@ -254,18 +258,18 @@ class DocumentController:
         self.run_after_flush(apply_fix)
         return True
 
-    def run_after_flush(self, then: Callable[[], None]) -> None:
+    def run_after_flush(self, callback: Callable[[], None]) -> None:
         """Call a function after the pending edit of the block editor was applied to the document."""
         editor = self._editor()
         if isinstance(editor, SupportsFlush):
-            editor.flush(then)
+            editor.flush(callback)
         else:
-            then()
+            callback()
 
     def _save(self, path: Path | None) -> None:
         document = self._session.document
         try:
-            earlier, words = self._back_up(document, path)
+            earlier, template = self._back_up(document, path)
             document.save(path)
         except AppError as error:
             self._report_save_error(error)
@@ -278,27 +282,27 @@ class DocumentController:
         if earlier is None:
             self._say(_("Saved {name}").format(name=document.name))
             return
-        then = _("{name} (previous version)").format(name=document.name)
-        said = words.format(name=document.name)
-        self._say(said, _("Open"), lambda: self.copy(earlier.copy, then))
+        copy_name = _("{name} (previous version)").format(name=document.name)
+        message = template.format(name=document.name)
+        self._say(message, _("Open"), lambda: self.copy(earlier.copy, copy_name))
 
     def _back_up(self, document: Document, path: Path | None) -> tuple[SavedVersion | None, str]:
         # Backs up a file before it is overwritten; returns the text for the toast with the placeholder
         # "name". Raises DocumentError if content from elsewhere can't be backed up; Studio's own content is
         # backed up without text if possible.
-        own = document.path
-        if path is not None and (own is None or path.resolve() != own.resolve()):
+        current_path = document.path
+        if path is not None and (current_path is None or path.resolve() != current_path.resolve()):
             return save_version(path), _("Saved {name}. The previous file is under Earlier versions.")
-        if own is not None and document.is_changed_externally:
-            return save_version(own), _(
+        if current_path is not None and document.is_changed_externally:
+            return save_version(current_path), _(
                 "Saved {name}. Another program had changed the file; its version is under Earlier versions."
             )
-        if own is not None and document.dirty:
+        if current_path is not None and document.dirty:
             try:
-                save_version(own)
+                save_version(current_path)
             except DocumentError as error:
-                words = _("No earlier versions: {error}").format(error=error)
-                self._session.console.add("warn", "studio", words)
+                message = _("No earlier versions: {error}").format(error=error)
+                self._session.console.add("warn", "studio", message)
         return None, ""
 
     def _open_tab(self, act: Callable[[], object]) -> None:
@@ -328,38 +332,38 @@ class DocumentController:
             return None
         if document.path is not None:
             self._add_recent(document.path, name)
-        words = _("Saved {name}") if path is not None else _("Closed {name}. You'll find it under Recent.")
-        return ClosedTab(document, words.format(name=name), earlier)
+        message = _("Saved {name}") if path is not None else _("Closed {name}. You'll find it under Recent.")
+        return ClosedTab(document, message.format(name=name), earlier)
 
     def _notify_closed(self, closed: Sequence[ClosedTab]) -> None:
         # Shows a toast that names the saved behaviours and offers undo.
         if not closed:
             return
-        words = closed[0].words
+        message = closed[0].words
         if len(closed) > 1:
-            words = ngettext("Saved {count} behaviour", "Saved {count} behaviours", len(closed))
-            words = words.format(count=len(closed))
+            message = ngettext("Saved {count} behaviour", "Saved {count} behaviours", len(closed))
+            message = message.format(count=len(closed))
         back = [each for each in closed if each.earlier is not None]
         if back:
-            self._say(words, _("Undo"), lambda: self._open_tab(lambda: self._undo_close(back)))
+            self._say(message, _("Undo"), lambda: self._open_tab(lambda: self._undo_close(back)))
         else:
-            self._say(words)
+            self._say(message)
 
     def _undo_close(self, closed: Sequence[ClosedTab]) -> None:
         # Restores the files, and reopens the tabs with unsaved work.
-        for each in closed:
-            if each.earlier is None:
+        for tab in closed:
+            if tab.earlier is None:
                 continue
-            if stamp_of(each.earlier.path) != each.stamp:
-                name = _("{name} (previous version)").format(name=each.earlier.path.stem)
-                self._documents.copy(each.earlier.copy, name)  # the file was changed since then
+            if stamp_of(tab.earlier.path) != tab.stamp:
+                name = _("{name} (previous version)").format(name=tab.earlier.path.stem)
+                self._documents.copy(tab.earlier.copy, name)  # the file was changed since then
                 continue
-            there = self._documents.find_by_path(each.earlier.path)  # reopened before "Undo" was pressed
-            each.earlier.restore()
-            if there is not None:
-                there.on_file_reverted()
+            opened = self._documents.find_by_path(tab.earlier.path)  # reopened before "Undo" was pressed
+            tab.earlier.restore()
+            if opened is not None:
+                opened.on_file_reverted()
             else:
-                self._documents.open(each.earlier.path).apply_edit(each.workspace)
+                self._documents.open(tab.earlier.path).apply_edit(tab.workspace)
 
     def _add_recent(self, path: Path, name: str | None = None) -> None:
         try:
@@ -370,9 +374,9 @@ class DocumentController:
     def _report_save_error(self, error: Exception) -> None:
         self._raise_alert(alert_text(error), "file.save_as", _("Save somewhere else"))
 
-    def _raise_alert(self, words: AlertText, action: str, button: str, alert: str = "file") -> None:
+    def _raise_alert(self, text: AlertText, action: str, button: str, alert: str = "file") -> None:
         self._session.alerts.raise_alert(
-            alert, "error", words.title, words.detail, button=button, action=action
+            alert, "error", text.title, text.detail, button=button, action=action
         )
 
 
@@ -392,24 +396,26 @@ def alert_text(error: Exception) -> AlertText:
     """Return the text of the alert for an error while a file is opened or saved."""
     if not isinstance(error, DocumentError):
         return AlertText(_as_sentence(str(error)), "")
-    named = error.path is not None and error.reason.startswith(error.path.name)  # the name is not capitalised
-    title = f"{error.reason}." if named else _as_sentence(error.reason)
+    has_file_name = error.path is not None and error.reason.startswith(
+        error.path.name
+    )  # the name is not capitalised
+    title = f"{error.reason}." if has_file_name else _as_sentence(error.reason)
     return AlertText(title, _as_sentence(error.advice))
 
 
 def unknown_type_text(paths: Sequence[Path]) -> AlertText:
     """Return the text of the alert for files of unknown types."""
     names = [path.name or str(path) for path in paths]
-    words, others = _("{file} isn't a behaviour"), len(names) - 1
+    text, others = _("{file} isn't a behaviour"), len(names) - 1
     if others:
-        words = ngettext(
+        text = ngettext(
             "{file} and {count} more aren't behaviours", "{file} and {count} more aren't behaviours", others
         )
-    return AlertText(f"{words.format(file=names[0], count=others)}.", _as_sentence(file_type_hint()))
+    return AlertText(f"{text.format(file=names[0], count=others)}.", _as_sentence(file_type_hint()))
 
 
-def _as_sentence(words: str) -> str:
-    return f"{words[:1].upper()}{words[1:]}." if words else ""
+def _as_sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
 class FlushBeforeClose(QObject):

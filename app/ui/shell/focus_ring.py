@@ -93,14 +93,16 @@ class FocusRing(QWidget):
 
     def _accepts_ring(self, widget: QWidget) -> bool:
         window = widget.window()
-        ours = window is self._home or (isinstance(window, QDockWidget) and self._home.isAncestorOf(window))
-        if not ours or widget is window or widget.property("ownFocus"):
+        is_own_window = window is self._home or (
+            isinstance(window, QDockWidget) and self._home.isAncestorOf(window)
+        )
+        if not is_own_window or widget is window or widget.property("ownFocus"):
             return False
         parent = widget.parentWidget()
         if parent is not None and parent.inherits("QWebEngineView"):  # the page draws its focus itself
             return False
-        own = QAbstractItemView | QAbstractScrollArea | QMainWindow | QMenu | QMenuBar
-        return not isinstance(widget, own)
+        excluded_types = QAbstractItemView | QAbstractScrollArea | QMainWindow | QMenu | QMenuBar
+        return not isinstance(widget, excluded_types)
 
     def _set_target(self, target: QWidget | None) -> None:
         for widget in self._chain:
@@ -151,20 +153,20 @@ class FocusRing(QWidget):
         inset = int(target.property("focusInset") or 0)
         out = self._theme.size("focusRing", "offset") + self._theme.size("focusRing", "width") - inset
         rect = QRect(target.mapTo(self._window, QPoint(0, 0)), target.size()).adjusted(-out, -out, out, out)
-        shown = rect
+        visible_rect = rect
         for widget in self._chain[1:]:
             scroller = widget.parentWidget()
             if isinstance(scroller, QAbstractScrollArea) and scroller.viewport() is widget:
                 view = QRect(widget.mapTo(self._window, QPoint(0, 0)), widget.size())
-                shown = shown.intersected(view)
+                visible_rect = visible_rect.intersected(view)
         self.setGeometry(rect)
-        if shown.isEmpty():
+        if visible_rect.isEmpty():
             self.hide()
             return
-        if shown == rect:
+        if visible_rect == rect:
             self.clearMask()
         else:
-            self.setMask(shown.translated(-rect.topLeft()))
+            self.setMask(visible_rect.translated(-rect.topLeft()))
         self.show()
         self.raise_()
         self.update()

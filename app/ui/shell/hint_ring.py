@@ -40,8 +40,8 @@ class HintRing(QWidget):
         """Highlight the button of a command, given by name; return False if no such button is visible."""
         self.clear()
         buttons = self._window.findChildren(QAbstractButton)
-        found = (each for each in buttons if each.isVisible() and each.property("command") == command)
-        self.target = next(found, None)
+        matches = (each for each in buttons if each.isVisible() and each.property("command") == command)
+        self.target = next(matches, None)
         if self.target is None:
             return False
         self.target.clicked.connect(self.clear)
@@ -81,9 +81,9 @@ class HintRing(QWidget):
             return
         inset = int(target.property("focusInset") or 0)
         out = OUT + HALO - inset
-        place = QRect(target.mapTo(self._window, QPoint()), target.size()).adjusted(-out, -out, out, out)
-        if place != self.geometry():
-            self.setGeometry(place)
+        geometry = QRect(target.mapTo(self._window, QPoint()), target.size()).adjusted(-out, -out, out, out)
+        if geometry != self.geometry():
+            self.setGeometry(geometry)
         self.show()
         self.raise_()
 

@@ -34,8 +34,8 @@ class PanelFocus(QObject):
         if bench is None or not docks:
             return
         current = self.dock()
-        place = docks.index(current) if current in docks else (-1 if step > 0 else 0)
-        bench.focus_panel(docks[(place + step) % len(docks)])
+        index = docks.index(current) if current in docks else (-1 if step > 0 else 0)
+        bench.focus_panel(docks[(index + step) % len(docks)])
 
     def number(self, number: int) -> None:
         """Focus an open panel by its number, counted from 1."""

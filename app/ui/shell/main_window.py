@@ -83,7 +83,7 @@ class MainWindow(QMainWindow):
         panels: Mapping[str, Panel],
         examples: Sequence[Example] = (),
         *,
-        asks: FileDialogs | None = None,
+        dialogs: FileDialogs | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         # `asks` opens file dialogs, by default those of the system or Studio. `clock` returns monotonic
@@ -106,10 +106,11 @@ class MainWindow(QMainWindow):
         self._shut = False
         self._flush_before_close = FlushBeforeClose(self, self.editor, self.close)
         self._build(examples)
-        files = asks if asks is not None else self._file_dialogs()
-        asked = self.asked.focus_input
+        files = dialogs if dialogs is not None else self._file_dialogs()
+        focus_question = self.asked.focus_input
         self.context = PanelContext(
-            session, theme, self.open_topic, self.show_toast, self._run_command, files, asked, self.plot,
+            session, theme, self.open_topic, self.show_toast, self._run_command, files, focus_question,
+            self.plot,
             partial(self.open_topic, beside=True), self._diagnose,
             lambda: self.bench.visible_panels() if self.bench is not None else (),
         )  # fmt: skip
@@ -251,9 +252,9 @@ class MainWindow(QMainWindow):
         """Update the recent files on the start page."""
         self.start.show_recent(recent_titles(self.session.settings.recent_files))
 
-    def log_problem(self, sentence: str) -> None:
+    def log_problem(self, message: str) -> None:
         """Log a sentence to the Console, about a problem that requires no action."""
-        self.session.console.add("warn", "studio", sentence)
+        self.session.console.add("warn", "studio", message)
 
     def show_layout(self, name: str) -> Workbench:
         """Show a layout and return its workbench, which is created and restored on first use."""
@@ -267,10 +268,10 @@ class MainWindow(QMainWindow):
             self.bench_created.emit()
         bench = self.benches[layout.name]
         focus = QApplication.focusWidget()
-        inside = focus is None or self.pages.isAncestorOf(focus)
+        had_focus = focus is None or self.pages.isAncestorOf(focus)
         self._showing = layout.name
         self.pages.setCurrentWidget(bench)
-        if inside:  # focus the layout only if the focus was in it, not in the switch or a menu
+        if had_focus:  # focus the layout only if the focus was in it, not in the switch or a menu
             bench.focus_main_panel()
         self._show_bars(layout.name)
         self.state.save_layout(layout.name)
@@ -329,8 +330,8 @@ class MainWindow(QMainWindow):
         The panel "behaviour" is always shown in the Behaviour layout, as are all panels from the start
         page.
         """
-        wanted = "behaviour" if name == "behaviour" or self.bench is None else self.current_layout
-        return self.show_layout(wanted).open(name)
+        layout_name = "behaviour" if name == "behaviour" or self.bench is None else self.current_layout
+        return self.show_layout(layout_name).open(name)
 
     def open_topic(self, topic: str, *, beside: bool = False) -> None:
         """Show a topic in the open panel that suits its type best, or else in the Inspector.
@@ -339,8 +340,8 @@ class MainWindow(QMainWindow):
             topic: Key of the topic.
             beside: True to open an additional panel, unless the existing one is empty.
         """
-        known = self.session.topic(topic)
-        kinds = {known.codec, known.msg_type} if known is not None else set()
+        topic_state = self.session.topic(topic)
+        kinds = {topic_state.codec, topic_state.msg_type} if topic_state is not None else set()
         bench = self.bench if self.bench is not None else self.show_layout("developer")
         dock = dock_for_kinds(bench.docks, bench.recently_used(), kinds)
         if dock is None:
@@ -365,20 +366,20 @@ class MainWindow(QMainWindow):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Handle keys that no widget has accepted, such as those to copy and paste blocks."""
-        what = next((what for key, what in BLOCK_KEYS.items() if event.matches(key)), "")
+        edit = next((edit for key, edit in BLOCK_KEYS.items() if event.matches(key)), "")
         if event.keyCombination() == DUPLICATE_KEY:
-            what = "duplicate"
-        if what:
-            self._run_command(f"blocks.edit:{what}")
+            edit = "duplicate"
+        if edit:
+            self._run_command(f"blocks.edit:{edit}")
         elif event.key() == Qt.Key.Key_Space and self.session.replay is not None and not event.modifiers():
             self._run_command("replay.play")
         elif event.keyCombination() == BOOKMARK_KEY and self.session.replay is not None:
             self._run_command("replay.bookmark")
         elif event.keyCombination() == MENU_KEY and (focus := QApplication.focusWidget()) is not None:
             # Qt itself handles only the Menu key, which many keyboards lack.
-            place = focus.rect().center()
-            asked = QContextMenuEvent.Reason.Keyboard
-            QApplication.sendEvent(focus, QContextMenuEvent(asked, place, focus.mapToGlobal(place)))
+            position = focus.rect().center()
+            reason = QContextMenuEvent.Reason.Keyboard
+            QApplication.sendEvent(focus, QContextMenuEvent(reason, position, focus.mapToGlobal(position)))
         else:
             super().keyPressEvent(event)
 
@@ -415,7 +416,7 @@ class MainWindow(QMainWindow):
 
     def tick(self) -> None:
         """Process pending changes of the session and refresh the visible parts of the window."""
-        began = time.perf_counter()
+        start_s = time.perf_counter()
         self._ticks += 1
         guarded = self.session.guarded
         with guarded(lazy("apply changes")):
@@ -431,21 +432,21 @@ class MainWindow(QMainWindow):
         with guarded(lazy("show panels")):
             if self.bench is not None:
                 self.bench.refresh()
-        spent = (time.perf_counter() - began) * 1000
+        spent = (time.perf_counter() - start_s) * 1000
         self._facts.window_ms += 0.1 * (spent - self._facts.window_ms)
 
     def _show_session(self) -> None:
         view = self.session.runs.view()
-        words, status = robots_chip(self.session)
-        self.bar.show_robots(words, status)
+        text, status = robots_chip(self.session)
+        self.bar.show_robots(text, status)
         self.toast.refresh()
-        self.asked.show_question(self.session.runs.asking.question, held=view.state == "paused")
+        self.asked.show_question(self.session.runs.asking.question, paused=view.state == "paused")
         if self.current_layout == START_PAGE:
             self.bar.stop.show_state(
                 _(view.stop_label), ring=view.state == "stopping", filled=self._may_move()
             )
-            there = any(link.state in {"ready", "busy", STOPPING} for link in self.session.fleet.links)
-            self.start.show_robot(words if there else "", status)
+            is_connected = any(link.state in {"ready", "busy", STOPPING} for link in self.session.fleet.links)
+            self.start.show_robot(text if is_connected else "", status)
             self.start.show_open(open_work(self.session))
         elif self.current_layout == "behaviour":
             self.run_bar.show_view(view)
@@ -460,42 +461,48 @@ class MainWindow(QMainWindow):
 
     def _update_status_bar(self) -> None:
         # Called less often than the tick, because numbers can't be read at 30 Hz.
-        facts, document = self._facts, self.session.document
-        alerts = facts.alerts(for_developers=self.current_layout == "developer")
-        web = facts.web_pages()
+        formatter, document = self._facts, self.session.document
+        alerts = formatter.alerts(for_developers=self.current_layout == "developer")
+        web = formatter.web_pages()
         self.status.commands = {
             alerts[1]: ALERTS_COMMAND,
-            facts.remote_access()[1]: "network.others",
+            formatter.remote_access()[1]: "network.others",
             web[1]: "network.web",
         }
         if self.current_layout == "behaviour":
             self.status.show_entries(
-                (facts.health(), facts.save_state()),
-                (facts.arming(), facts.recording(), web, facts.topics(), facts.remote_access_plain()),
+                (formatter.health(), formatter.save_state()),
+                (
+                    formatter.arming(),
+                    formatter.recording(),
+                    web,
+                    formatter.topics(),
+                    formatter.remote_access_plain(),
+                ),
             )
         elif self.current_layout == "developer":
             left: tuple[StatusEntry, ...] = (
                 alerts,
-                facts.master(),
-                facts.remote_access(),
+                formatter.master(),
+                formatter.remote_access(),
                 web,
-                facts.traffic(),
+                formatter.traffic(),
             )
-            left = (*left, facts.arming(), facts.lost())
+            left = (*left, formatter.arming(), formatter.lost())
             right: tuple[StatusEntry, ...] = (
-                facts.recording(),
-                facts.flight_recorder(),
-                facts.displayed_messages(),
-                facts.window(),
+                formatter.recording(),
+                formatter.flight_recorder(),
+                formatter.displayed_messages(),
+                formatter.window(),
             )
             if self.session.replay is not None:
-                left = (alerts, *facts.replayed_recording(), web)
+                left = (alerts, *formatter.replayed_recording(), web)
                 right = (
-                    facts.recording(),
-                    facts.flight_recorder(),
-                    facts.live_network_note(),
-                    facts.master(),
-                    facts.window(),
+                    formatter.recording(),
+                    formatter.flight_recorder(),
+                    formatter.live_network_note(),
+                    formatter.master(),
+                    formatter.window(),
                 )
             self.status.show_entries(left, right)
         title = (
@@ -524,16 +531,16 @@ class MainWindow(QMainWindow):
         alerts, is_developer = self.session.alerts, self.current_layout == "developer"
         if (alerts.revision, is_developer) != self._alerts_seen:
             self._alerts_seen = (alerts.revision, is_developer)
-            told = alerts.errors_and_warnings(for_developers=is_developer)
-            self.banner.show_alerts([alert for alert in told if not alerts.is_dismissed(alert.id)])
+            reported = alerts.errors_and_warnings(for_developers=is_developer)
+            self.banner.show_alerts([alert for alert in reported if not alerts.is_dismissed(alert.id)])
         hosts: Mapping[str, StartPage | RunBar] = {START_PAGE: self.start, "behaviour": self.run_bar}
         host = hosts.get(self.current_layout, self.tool_bar)
         self.run_bar.reserve_banner_room(has_banner=bool(self.banner.identity))
         area = host.banner_area() if self.banner.identity else QRect()
         self.banner.move_to(QRect(host.mapTo(self.middle, area.topLeft()), area.size()))
 
-    def _panel_failed(self, name: str, sentence: str) -> None:
-        self.session.console.add("error", f"panel {name}", sentence)
+    def _panel_failed(self, name: str, message: str) -> None:
+        self.session.console.add("error", f"panel {name}", message)
 
     def start_session(self) -> None:
         """Start the session and the tick timer."""
@@ -605,9 +612,9 @@ class Placeholder(QWidget):
 
     def __init__(self, layout: str) -> None:
         super().__init__()
-        words = _(LOADING_TEXTS.get(layout, OTHER_LOADING_TEXT))
-        self.setAccessibleName(words)
+        text = _(LOADING_TEXTS.get(layout, OTHER_LOADING_TEXT))
+        self.setAccessibleName(text)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setProperty("ownFocus", True)  # it only holds the focus, so it needs no focus ring
         column = QVBoxLayout(self)
-        column.addWidget(label(words, "bodyLarge", role="textSecondary"), 1, Qt.AlignmentFlag.AlignCenter)
+        column.addWidget(label(text, "bodyLarge", role="textSecondary"), 1, Qt.AlignmentFlag.AlignCenter)

@@ -42,8 +42,8 @@ class WindowState:
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the saved mode, text size, motion and contrast to the theme in one update."""
-        chosen = self._settings.get("theme", "system")
-        mode: Mode = next((mode for mode in MODES if mode == chosen), "system")
+        saved_mode = self._settings.get("theme", "system")
+        mode: Mode = next((mode for mode in MODES if mode == saved_mode), "system")
         motion = parse_preference(self._settings.get("less_motion", None))
         contrast = parse_preference(self._settings.get("high_contrast", None))
         theme.apply_settings(mode, self._settings.get("text_percent", 100), motion, contrast)
@@ -66,10 +66,10 @@ class WindowState:
             data = base64.b64decode(text, validate=True)
         except (binascii.Error, ValueError):
             return False
-        placed = bool(data) and window.restoreGeometry(QByteArray(data))
+        restored = bool(data) and window.restoreGeometry(QByteArray(data))
         if window.isFullScreen():  # only the robot's room uses full screen, and it isn't shown at startup
             window.setWindowState(window.windowState() & ~Qt.WindowState.WindowFullScreen)
-        return placed
+        return restored
 
     def save_geometry(self, window: QMainWindow) -> None:
         """Save position and size of the window."""
@@ -91,8 +91,8 @@ class WindowState:
 
     def layout_state(self, name: str) -> Mapping[str, object]:
         """Return the saved arrangement of a layout; empty if there is none."""
-        found = self.layouts().get(name)
-        return found if isinstance(found, Mapping) else {}
+        state = self.layouts().get(name)
+        return state if isinstance(state, Mapping) else {}
 
     def delete_layout(self, name: str) -> bool:
         """Delete the saved arrangement of a layout; return False if the settings can't be saved."""
@@ -104,8 +104,8 @@ class WindowState:
         Args:
             base: Name of the workbench's built-in layout.
         """
-        kept: SettingsDict = self._settings.get("chosen_layouts", {})
-        name = kept.get(base)
+        names_by_base: SettingsDict = self._settings.get("chosen_layouts", {})
+        name = names_by_base.get(base)
         return name if isinstance(name, str) else ""
 
     def save_selected_layout(self, base: str, name: str) -> None:
@@ -115,12 +115,12 @@ class WindowState:
             base: Name of the workbench's built-in layout.
             name: Name of the custom layout, or "" for the built-in one.
         """
-        kept: SettingsDict = self._settings.get("chosen_layouts", {})
-        self._set("chosen_layouts", {**kept, base: name})
+        names_by_base: SettingsDict = self._settings.get("chosen_layouts", {})
+        self._set("chosen_layouts", {**names_by_base, base: name})
 
-    def save_layouts(self, found: Mapping[str, Mapping[str, object]]) -> bool:
+    def save_layouts(self, layouts: Mapping[str, Mapping[str, object]]) -> bool:
         """Save arrangements of layouts, by name; return False if the settings can't be saved."""
-        return self._set("layouts", {**self.layouts(), **found})
+        return self._set("layouts", {**self.layouts(), **layouts})
 
     def _set(self, key: str, value: object) -> bool:
         try:

@@ -18,12 +18,12 @@ class FileDropFilter(QObject):
 
     Args:
         window: Window on which files can be dropped.
-        take: Called with the paths of dropped files.
+        handler: Called with the paths of dropped files.
     """
 
-    def __init__(self, window: QWidget, take: Callable[[Sequence[Path]], object]) -> None:
+    def __init__(self, window: QWidget, handler: Callable[[Sequence[Path]], object]) -> None:
         super().__init__(window)
-        self._take = take
+        self._take = handler
         window.setAcceptDrops(True)
         window.installEventFilter(self)
 
@@ -54,16 +54,16 @@ class Application(QApplication):
         self._take: Callable[[Sequence[Path]], object] | None = None
         self._waiting: list[Path] = []
 
-    def set_file_opener(self, take: Callable[[Sequence[Path]], object]) -> None:
+    def set_file_opener(self, handler: Callable[[Sequence[Path]], object]) -> None:
         """Set the function that opens files, and call it with the files that have arrived before.
 
         Args:
-            take: Called with the paths.
+            handler: Called with the paths.
         """
-        self._take = take
+        self._take = handler
         waiting, self._waiting = self._waiting, []
         if waiting:
-            take(waiting)
+            handler(waiting)
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.FileOpen and (name := cast("QFileOpenEvent", event).file()):

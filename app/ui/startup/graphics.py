@@ -28,19 +28,19 @@ _ATTACHED = 0x1
 
 
 def use_software_renderer(
-    environ: MutableMapping[str, str], platform: str, there: Callable[[str], bool] | None = None
+    environ: MutableMapping[str, str], platform: str, has_gpu: Callable[[str], bool] | None = None
 ) -> bool:
     """Select Qt's software renderer on a machine without a GPU; call this before Qt is used.
 
     Args:
         environ: Environment variables, modified in place. A renderer that is already set isn't changed.
         platform: Value of `sys.platform`.
-        there: Returns True if there is a GPU, given the platform; default: `has_graphics_processor`.
+        has_gpu: Returns True if there is a GPU, given the platform; default: `has_graphics_processor`.
 
     Returns:
         True if the software renderer is selected.
     """
-    if not environ.get(CHOICE) and not (there or has_graphics_processor)(platform):
+    if not environ.get(CHOICE) and not (has_gpu or has_graphics_processor)(platform):
         environ[CHOICE] = BY_SOFTWARE
     return environ.get(CHOICE) == BY_SOFTWARE
 
@@ -61,7 +61,7 @@ def has_driver(names: Sequence[str]) -> bool:
 
 def adapters() -> list[str]:
     """Return the names of the active graphics adapters; empty except on Windows."""
-    found: list[str] = []
+    names: list[str] = []
     if sys.platform == "win32":
 
         class Device(ctypes.Structure):
@@ -79,5 +79,5 @@ def adapters() -> list[str]:
         while ctypes.windll.user32.EnumDisplayDevicesW(None, number, ctypes.byref(device), 0):
             number += 1
             if device.state & _ATTACHED:
-                found.append(device.words)
-    return found
+                names.append(device.words)
+    return names

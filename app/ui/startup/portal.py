@@ -31,15 +31,15 @@ def has_file_chooser() -> bool:
     try:
         if not bus.isConnected():
             return False
-        ask = QDBusMessage.createMethodCall(NAME, OBJECT, "org.freedesktop.DBus.Properties", "Get")
-        ask.setArguments([FILE_CHOOSER_INTERFACE, "version"])
-        return bus.call(ask, timeout=REPLY_TIMEOUT_MS).type() == QDBusMessage.MessageType.ReplyMessage
+        request = QDBusMessage.createMethodCall(NAME, OBJECT, "org.freedesktop.DBus.Properties", "Get")
+        request.setArguments([FILE_CHOOSER_INTERFACE, "version"])
+        return bus.call(request, timeout=REPLY_TIMEOUT_MS).type() == QDBusMessage.MessageType.ReplyMessage
     finally:
         QDBusConnection.disconnectFromBus("studio-portal")
 
 
 def use_portal(
-    environ: MutableMapping[str, str], platform: str, answers: Callable[[], bool] = has_file_chooser
+    environ: MutableMapping[str, str], platform: str, is_available: Callable[[], bool] = has_file_chooser
 ) -> None:
     """Select the portal's file dialogs if they are available; call this before the application is created.
 
@@ -47,9 +47,9 @@ def use_portal(
         environ: Environment variables, modified in place. A platform theme that is already set isn't
             changed.
         platform: Value of `sys.platform`.
-        answers: Returns True if the portal has a file chooser.
+        is_available: Returns True if the portal has a file chooser.
     """
-    if platform.startswith("linux") and not environ.get(CHOICE) and has_bus(environ) and answers():
+    if platform.startswith("linux") and not environ.get(CHOICE) and has_bus(environ) and is_available():
         environ[CHOICE] = THEME
 
 

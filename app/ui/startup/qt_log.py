@@ -53,14 +53,14 @@ def quiet_chromium(environ: MutableMapping[str, str]) -> None:
         environ[FLAGS_VARIABLE] = f"{flags} {QUIET_FLAG}".strip()
 
 
-def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> None:
+def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, message: str) -> None:
     """Log a message of Qt, unless it is known to be harmless.
 
     If Qt can't open a window, the process exits with code 2 after a log message of our own, because Qt
     would abort and advise to reinstall the application. This happens during startup, so no work is
     lost.
     """
-    if kind == QtMsgType.QtFatalMsg and NO_PLATFORM_MESSAGE in words:
+    if kind == QtMsgType.QtFatalMsg and NO_PLATFORM_MESSAGE in message:
         _log.critical(
             "no window can open; see that the screen is there and lets you in (DISPLAY is %r), and that the "
             "libraries that Qt names above are installed, or run a behaviour with no window: "
@@ -69,8 +69,8 @@ def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> 
         )
         logging.shutdown()
         os._exit(2)
-    if kind == QtMsgType.QtFatalMsg or NOISE_PATTERN.match(words) is None:
-        _log.log(LEVELS.get(kind, logging.WARNING), "%s", words)
+    if kind == QtMsgType.QtFatalMsg or NOISE_PATTERN.match(message) is None:
+        _log.log(LEVELS.get(kind, logging.WARNING), "%s", message)
 
 
 class ConsoleHandler(logging.Handler):

@@ -101,11 +101,11 @@ def try_isolation() -> bool:
     system = ctypes.CDLL(None, use_errno=True)
     if system.unshare(NEW_USER | NEW_PROCESSES) != 0:
         return False
-    own = Path("/proc/self")
+    process_folder = Path("/proc/self")
     try:
-        (own / "setgroups").write_text("deny")
-        (own / "uid_map").write_text(f"{user} {user} 1")
-        (own / "gid_map").write_text(f"{group} {group} 1")
+        (process_folder / "setgroups").write_text("deny")
+        (process_folder / "uid_map").write_text(f"{user} {user} 1")
+        (process_folder / "gid_map").write_text(f"{group} {group} 1")
     except OSError:
         return False
     return bool(system.chroot(EMPTY_ROOT) == 0)

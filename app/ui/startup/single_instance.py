@@ -67,14 +67,20 @@ def socket_name(folder: Path) -> str:
     if os.name != "posix":
         return f"nep-studio-{mark}"  # a named pipe that only this user may open
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
-    own = [Path(runtime) / "nep-studio"] if Path(runtime).is_absolute() and is_private(Path(runtime)) else []
-    for each in (*own, folder.resolve(), Path(tempfile.gettempdir()) / f"nep-studio-{os.geteuid()}"):
-        path = each / f"window-{mark}.socket"
+    runtime_folders = (
+        [Path(runtime) / "nep-studio"] if Path(runtime).is_absolute() and is_private(Path(runtime)) else []
+    )
+    for candidate in (
+        *runtime_folders,
+        folder.resolve(),
+        Path(tempfile.gettempdir()) / f"nep-studio-{os.geteuid()}",
+    ):
+        path = candidate / f"window-{mark}.socket"
         if len(os.fsencode(path)) >= MAX_PATH_LENGTH:
             continue
         with contextlib.suppress(OSError):
-            create_private_folder(each)
-            if is_private(each):
+            create_private_folder(candidate)
+            if is_private(candidate):
                 return str(path)
     return ""
 
@@ -108,30 +114,30 @@ def peer_user(descriptor: int) -> int | None:
     Args:
         descriptor: File descriptor of the socket.
     """
-    asked = getattr(socket, "SO_PEERCRED", None)
+    peer_option = getattr(socket, "SO_PEERCRED", None)
     copy = os.dup(descriptor)
     try:
-        ours = socket.socket(fileno=copy)
+        socket_copy = socket.socket(fileno=copy)
     except OSError:
         os.close(copy)
         return None
     try:
-        with ours:
-            if asked is not None:  # Linux: pid, user, group
-                return int(struct.unpack("3i", ours.getsockopt(socket.SOL_SOCKET, asked, 12))[1])
+        with socket_copy:
+            if peer_option is not None:  # Linux: pid, user, group
+                return int(struct.unpack("3i", socket_copy.getsockopt(socket.SOL_SOCKET, peer_option, 12))[1])
             if sys.platform == "darwin":  # xucred: version, user, ...; SOL_LOCAL is 0, LOCAL_PEERCRED 1
-                return int(struct.unpack_from("2I", ours.getsockopt(0, 1, 76))[1])
+                return int(struct.unpack_from("2I", socket_copy.getsockopt(0, 1, 76))[1])
     except (OSError, struct.error):
         return None
     return None
 
 
-def send_request(name: str, asked: StartRequest) -> bool:
+def send_request(name: str, request: StartRequest) -> bool:
     """Send a request to the running instance. Blocks for about 3 s at most.
 
     Args:
         name: Name of the socket; a socket of another user is ignored.
-        asked: Request.
+        request: Request.
 
     Returns:
         True if the instance accepted the request, False if there is none.
@@ -142,25 +148,25 @@ def send_request(name: str, asked: StartRequest) -> bool:
     line.connectToServer(name)
     if not line.waitForConnected(CONNECT_TIMEOUT_MS) or _belongs_to_other_user(line):
         return False
-    files = [str(path.absolute()) for path in asked.files]
-    line.write(json.dumps({"files": files, "demo": asked.demo}).encode() + b"\n")
+    files = [str(path.absolute()) for path in request.files]
+    line.write(json.dumps({"files": files, "demo": request.demo}).encode() + b"\n")
     line.flush()
-    answer, until = b"", time.monotonic() + REPLY_TIMEOUT_MS / 1000
-    while len(answer) < len(OK_REPLY) and (left_ms := int((until - time.monotonic()) * 1000)) > 0:
+    reply, until = b"", time.monotonic() + REPLY_TIMEOUT_MS / 1000
+    while len(reply) < len(OK_REPLY) and (left_ms := int((until - time.monotonic()) * 1000)) > 0:
         if not line.waitForReadyRead(left_ms):
             break
-        answer += line.readAll().data()
+        reply += line.readAll().data()
     line.disconnectFromServer()
-    return answer == OK_REPLY
+    return reply == OK_REPLY
 
 
-def pass_to_running(name: str, asked: StartRequest, turn: FileLock, within_s: float = START_S) -> bool:
+def pass_to_running(name: str, request: StartRequest, lock: FileLock, within_s: float = START_S) -> bool:
     """Send a request to a running instance, or to one that is just starting.
 
     Args:
         name: Name of the socket.
-        asked: Request.
-        turn: Lock of the instance that is starting.
+        request: Request.
+        lock: Lock of the instance that is starting.
         within_s: Maximum time to wait for an instance that is starting.
 
     Returns:
@@ -169,12 +175,12 @@ def pass_to_running(name: str, asked: StartRequest, turn: FileLock, within_s: fl
         exceeded.
     """
     until, pause, waited = time.monotonic() + within_s, threading.Event(), False
-    while not send_request(name, asked):
+    while not send_request(name, request):
         if not name or time.monotonic() >= until:
             return False
-        if turn.acquire():
-            if waited and send_request(name, asked):  # the window appeared between the two attempts
-                turn.release()
+        if lock.acquire():
+            if waited and send_request(name, request):  # the window appeared between the two attempts
+                lock.release()
                 return True
             return False
         waited = True
@@ -193,11 +199,11 @@ class SingleInstanceServer(QObject):
     """Server that receives the requests of later starts until it is closed."""
 
     def __init__(
-        self, name: str, do: Callable[[StartRequest], object], parent: QObject | None = None
+        self, name: str, on_request: Callable[[StartRequest], object], parent: QObject | None = None
     ) -> None:
         # `do` is called with each request.
         super().__init__(parent)
-        self._do = do
+        self._do = on_request
         self._received: dict[QtNetwork.QLocalSocket, bytes] = {}
         self._server = QtNetwork.QLocalServer(self)
         self._server.setSocketOptions(QtNetwork.QLocalServer.SocketOption.UserAccessOption)
@@ -239,13 +245,13 @@ class SingleInstanceServer(QObject):
             socket.abort()
         elif data.endswith(b"\n"):
             self._received[socket] = b""
-            asked = parse(data)
-            if asked is None:
+            request = parse(data)
+            if request is None:
                 socket.abort()
                 return
             socket.write(OK_REPLY)
             socket.flush()
-            self._do(asked)
+            self._do(request)
 
     def _on_disconnected(self, socket: QtNetwork.QLocalSocket) -> None:
         self._received.pop(socket, None)

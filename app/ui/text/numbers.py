@@ -107,8 +107,10 @@ def shortcut_text(shortcut: str, platform: str = sys.platform) -> str:
 
 def _mac_key(shortcut: str) -> str:
     # In the order of menus on a Mac.
-    *held, key = re.split(r"\+(?=.)", shortcut)
-    return "".join(sign for name, sign in MAC_KEYS.items() if name in held) + _translate_keys(key, MAC_KEYS)
+    *modifiers, key = re.split(r"\+(?=.)", shortcut)
+    return "".join(sign for name, sign in MAC_KEYS.items() if name in modifiers) + _translate_keys(
+        key, MAC_KEYS
+    )
 
 
 def tip_with_key(tip: str, shortcut: str, platform: str = sys.platform) -> str:
@@ -128,7 +130,7 @@ def _translate_keys(shortcut: str, signs: Mapping[str, str]) -> str:
 
 def length_text(seconds: float) -> str:
     """Format a duration of a recording, such as "0:42", "12:04" or "1:32:10"."""
-    whole = int(seconds) if 0 <= seconds < 1e9 else 0
-    minutes, rest = divmod(whole, 60)
+    total_s = int(seconds) if 0 <= seconds < 1e9 else 0
+    minutes, rest = divmod(total_s, 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

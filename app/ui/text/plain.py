@@ -15,9 +15,9 @@ LONG_WORD, PIECE = 20, 4
 ZERO_WIDTH_SPACE = "\u200b"  # zero-width space, at which a line may break
 
 
-def make_breakable(words: str) -> str:
+def make_breakable(text: str) -> str:
     """Insert zero-width spaces into long words, so that a label can wrap instead of truncating them."""
-    return " ".join(_break_word(word) if len(word) > LONG_WORD else word for word in words.split(" "))
+    return " ".join(_break_word(word) if len(word) > LONG_WORD else word for word in text.split(" "))
 
 
 def _break_word(word: str) -> str:
@@ -30,11 +30,11 @@ def _break_word(word: str) -> str:
     return result
 
 
-def tip(words: str) -> str:
+def tip(text: str) -> str:
     """Escape a text for a tooltip, so that Qt shows it as plain text."""
-    if not Qt.mightBeRichText(words):
-        return words
-    return f'<span style="white-space: pre-wrap">{html.escape(words)}</span>'
+    if not Qt.mightBeRichText(text):
+        return text
+    return f'<span style="white-space: pre-wrap">{html.escape(text)}</span>'
 
 
 def escape_menu_text(name: str) -> str:

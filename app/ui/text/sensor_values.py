@@ -62,15 +62,15 @@ def quantity_text(value: float, unit: str | None) -> str:
         unit: Unit to append, or None.
     """
     if isinstance(value, int) or float(value).is_integer():
-        words = f"{value:.0f}"
+        text = f"{value:.0f}"
     elif abs(value) < 10:
-        words = number(value, ".2f")
+        text = number(value, ".2f")
     else:
-        words = number(value, ".1f" if abs(value) < 100 else ".0f")
-    words = words.replace("-", MINUS)
+        text = number(value, ".1f" if abs(value) < 100 else ".0f")
+    text = text.replace("-", MINUS)
     if not unit:
-        return words
-    return f"{words}{unit}" if unit.startswith("°") else f"{words} {unit}"
+        return text
+    return f"{text}{unit}" if unit.startswith("°") else f"{text} {unit}"
 
 
 def _fraction(sensor: Sensor, value: float) -> float | None:
@@ -82,35 +82,38 @@ def _fraction(sensor: Sensor, value: float) -> float | None:
 
 def _detections_text(value: Mapping[str, object]) -> ReadingText:
     items = value.get("items")
-    found = [item for item in items if isinstance(item, Mapping)] if isinstance(items, list) else []
+    detections = [item for item in items if isinstance(item, Mapping)] if isinstance(items, list) else []
     count = value.get("count")
     name = value.get("name")
     names = (
         bounded_str(name)
         if name
-        else ", ".join(bounded_str(item.get("name", "")) for item in found[:_MAX_NAMES])
+        else ", ".join(bounded_str(item.get("name", "")) for item in detections[:_MAX_NAMES])
     )
-    return ReadingText(str(count if isinstance(count, int) else len(found)), names)
+    return ReadingText(str(count if isinstance(count, int) else len(detections)), names)
 
 
 def _object_text(sensor: Sensor, value: Mapping[str, object]) -> ReadingText:
     # Fields with the same unit are combined ("1.3, 0.3 m"); others follow ("facing 31°").
     fields = sensor.fields or tuple(DataField(str(name), str(name), "number") for name in value)
-    known = [(field, value.get(field.name)) for field in fields]
-    numbers = [(field, measured) for field, measured in known if _is_number(measured)]
+    values = [(field, value.get(field.name)) for field in fields]
+    numbers = [(field, measured) for field, measured in values if _is_number(measured)]
     if not numbers:
         return ReadingText(
-            "", ", ".join(f"{field.title} {words}" for field, words in known if words is not None)
+            "",
+            ", ".join(
+                f"{field.title} {field_value}" for field, field_value in values if field_value is not None
+            ),
         )
     unit = numbers[0][0].unit
     together = [
         number(measured, ".1f").replace("-", MINUS) for field, measured in numbers if field.unit == unit
     ]
     others = [(field, measured) for field, measured in numbers if field.unit != unit]
-    beside = ", ".join(
+    details = ", ".join(
         f"{field.title} {quantity_text(round(measured), field.unit)}" for field, measured in others
     )
-    return ReadingText(f"{', '.join(together)}{f' {unit}' if unit else ''}", beside)
+    return ReadingText(f"{', '.join(together)}{f' {unit}' if unit else ''}", details)
 
 
 def _is_number(value: object) -> TypeGuard[float]:

@@ -51,8 +51,8 @@ def _source(name: str) -> str:
 
 
 def _suggestion(name: str) -> str:
-    near = difflib.get_close_matches(name[:80], names(), 1)
-    return f" (did you mean '{near[0]}'?)" if near else ""
+    matches = difflib.get_close_matches(name[:80], names(), 1)
+    return f" (did you mean '{matches[0]}'?)" if matches else ""
 
 
 @lru_cache(maxsize=512)
@@ -108,8 +108,8 @@ def paint_cached_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor
     Faster than `paint_icon`, for widgets that are repainted often.
     """
     ratio = painter.device().devicePixelRatioF()
-    place = QPointF(round(rect.x() * ratio) / ratio, round(rect.y() * ratio) / ratio)
-    painter.drawPixmap(place, _cached_pixmap(name, rect.width(), colour.rgba(), ratio))
+    position = QPointF(round(rect.x() * ratio) / ratio, round(rect.y() * ratio) / ratio)
+    painter.drawPixmap(position, _cached_pixmap(name, rect.width(), colour.rgba(), ratio))
 
 
 @guard  # not a QObject
@@ -125,9 +125,9 @@ class IconEngine(QIconEngine):
 
     def paint(self, painter: QPainter, rect: QRect, mode: QIcon.Mode, state: QIcon.State) -> None:
         side = min(rect.width(), rect.height())
-        square = QRectF(0, 0, side, side)
-        square.moveCenter(QRectF(rect).center())
-        paint_icon(painter, square, self._name, self._colour(mode, state))
+        icon_rect = QRectF(0, 0, side, side)
+        icon_rect.moveCenter(QRectF(rect).center())
+        paint_icon(painter, icon_rect, self._name, self._colour(mode, state))
 
     def pixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State) -> QPixmap:
         return self.scaledPixmap(size, mode, state, 1.0)

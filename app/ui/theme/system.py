@@ -15,27 +15,30 @@ PREFERENCES: tuple[Preference, ...] = ("system", "on", "off")
 SPI_GETCLIENTAREAANIMATION = 0x1042  # SPI_GETCLIENTAREAANIMATION of Windows
 
 
-def parse_preference(kept: object) -> Preference:
+def parse_preference(value: object) -> Preference:
     """Parse a preference from the settings; "system" for an unknown value.
 
     Older versions stored a boolean.
     """
-    if isinstance(kept, bool):
-        return "on" if kept else "system"
-    return next((wish for wish in PREFERENCES if wish == kept), "system")
+    if isinstance(value, bool):
+        return "on" if value else "system"
+    return next((preference for preference in PREFERENCES if preference == value), "system")
 
 
 def prefers_contrast(hints: QStyleHints) -> bool:
     """Return True if the system requests high contrast; False if Qt is too old to report it."""
-    asked = getattr(hints, "accessibility", None)
-    return asked is not None and asked().contrastPreference() == Qt.ContrastPreference.HighContrast
+    accessibility = getattr(hints, "accessibility", None)
+    return (
+        accessibility is not None
+        and accessibility().contrastPreference() == Qt.ContrastPreference.HighContrast
+    )
 
 
 def on_contrast_changed(hints: QStyleHints, call: Callable[[], object]) -> None:
     """Register a callback for changes of the system's contrast preference, if Qt reports them."""
-    asked = getattr(hints, "accessibility", None)
-    if asked is not None:
-        asked().contrastPreferenceChanged.connect(call)
+    accessibility = getattr(hints, "accessibility", None)
+    if accessibility is not None:
+        accessibility().contrastPreferenceChanged.connect(call)
 
 
 def prefers_reduced_motion(platform: str = sys.platform) -> bool:

@@ -123,18 +123,20 @@ class Theme(QObject):
         self._fonts.clear()
         self.apply()
 
-    def set_motion(self, wish: Preference) -> None:
+    def set_motion(self, preference: Preference) -> None:
         """Set reduced motion: "on", "off", or "system" to follow the system."""
-        self.motion = wish
-        self.reduced_motion = wish == "on" or (wish == "system" and system.prefers_reduced_motion())
+        self.motion = preference
+        self.reduced_motion = preference == "on" or (
+            preference == "system" and system.prefers_reduced_motion()
+        )
         self.changed.emit()
 
-    def set_contrast(self, wish: Preference) -> None:
+    def set_contrast(self, preference: Preference) -> None:
         """Set high contrast: "on", "off", or "system" to follow the system.
 
         High contrast has strong borders and no tinted backgrounds.
         """
-        self.contrast = wish
+        self.contrast = preference
         if self._resolve_contrast() != self.high_contrast:
             self.high_contrast = not self.high_contrast
             self.apply()
@@ -142,8 +144,8 @@ class Theme(QObject):
             self.changed.emit()
 
     def _resolve_contrast(self) -> bool:
-        asked = self.contrast == "system" and system.prefers_contrast(self._hints)
-        return self.contrast == "on" or asked
+        is_requested = self.contrast == "system" and system.prefers_contrast(self._hints)
+        return self.contrast == "on" or is_requested
 
     @property
     def text_percent(self) -> int:

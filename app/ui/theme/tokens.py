@@ -140,15 +140,15 @@ def parse(raw: Mapping[str, object]) -> Tokens:
 
 
 def _parse_statuses(raw: Mapping[str, object]) -> Mapping[str, Status]:
-    found: dict[str, Status] = {}
+    statuses: dict[str, Status] = {}
     for name, value in raw.items():
         if isinstance(value, dict):
             icon = str(value["icon"])
             tint = value["tint"]
-            found[name] = Status(
+            statuses[name] = Status(
                 str(value["colour"]), None if tint is None else str(tint), _DRAWN_ICONS.get(icon, icon)
             )
-    return found
+    return statuses
 
 
 def _parse_text_kinds(raw: Mapping[str, Mapping[str, int]]) -> Mapping[str, TextKind]:

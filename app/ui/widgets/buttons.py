@@ -221,20 +221,20 @@ class Button(PaintedButton):
         return round(width) + 1
 
     def sizeHint(self) -> QSize:
-        high = round(paint.height_of(self._theme.font(self.measure.font))) + 8
-        return QSize(self.width_with(self.text()), max(self.measure.height, high))
+        text_height = round(paint.height_of(self._theme.font(self.measure.font))) + 8
+        return QSize(self.width_with(self.text()), max(self.measure.height, text_height))
 
     def minimumSizeHint(self) -> QSize:
-        wanted = self.sizeHint()
-        return wanted if self._least is None else QSize(min(self._least, wanted.width()), wanted.height())
+        hint = self.sizeHint()
+        return hint if self._least is None else QSize(min(self._least, hint.width()), hint.height())
 
-    def allow_shrinking(self, least: int = 72) -> None:
+    def allow_shrinking(self, min_width: int = 72) -> None:
         """Allow layouts to make the button narrower than its text, which is then elided.
 
         Args:
-            least: Minimum width in px.
+            min_width: Minimum width in px.
         """
-        self._least = least
+        self._least = min_width
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
 
     def icon_side(self) -> int:
@@ -246,39 +246,41 @@ class Button(PaintedButton):
         return self.text()
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        fill, border, ink = self._colours()
+        fill, border, colour = self._colours()
         paint.box(painter, rect, self._theme.radius(self.measure.radius), fill, border)
-        self.paint_content(painter, ink)
+        self.paint_content(painter, colour)
 
-    def paint_content(self, painter: QPainter, ink: QColor) -> None:
+    def paint_content(self, painter: QPainter, colour: QColor) -> None:
         """Paint icon and text, centred together.
 
         Args:
             painter: Painter.
-            ink: Colour of the text and, by default, of the icon.
+            colour: Colour of the text and, by default, of the icon.
         """
         font = self._theme.font(self.measure.font)
         if self.measure.font == "body":
             font.setWeight(font.Weight.Medium)
         frame = QRectF(self.rect())
-        word = self.displayed_text()
-        text_width = paint.width_of(font, word)
+        text = self.displayed_text()
+        text_width = paint.width_of(font, text)
         icon = self.icon_side() if self.icon_name is not None else 0
-        gap = self.measure.gap if icon and word else 0
+        gap = self.measure.gap if icon and text else 0
         left = max(frame.left() + 6, frame.center().x() - (icon + gap + text_width) / 2)
         if self.icon_name is not None:
             top = frame.center().y() - icon / 2
             filled = self.fill_icon and self.isEnabled()
-            own = self._theme.colour(self.icon_role) if self.icon_role and self.isEnabled() else ink
-            paint_icon(painter, QRectF(left, top, icon, icon), self.icon_name, own, filled=filled)
+            icon_colour = (
+                self._theme.colour(self.icon_role) if self.icon_role and self.isEnabled() else colour
+            )
+            paint_icon(painter, QRectF(left, top, icon, icon), self.icon_name, icon_colour, filled=filled)
         end = frame.bottomRight() - QPointF(4, 0)
         area = QRectF(QPointF(left + icon + gap, frame.top()), end)
-        paint.text_line(painter, area, word, font, ink)
+        paint.text_line(painter, area, text, font, colour)
 
     def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
         # Colours of fill, border and text.
         theme = self._theme
-        rest, hover, pressed, border, ink = _COLOURS[self.kind]
+        rest, hover, pressed, border, text_role = _COLOURS[self.kind]
         if not self.isEnabled():
             edge = "border" if self.kind != "ghost" else None
             return None, theme.colour(edge) if edge else None, theme.colour("textDisabled")
@@ -286,7 +288,7 @@ class Button(PaintedButton):
         return (
             theme.colour(role) if role else None,
             theme.colour(border) if border else None,
-            theme.colour(ink),
+            theme.colour(text_role),
         )
 
 
@@ -296,15 +298,15 @@ class MenuButton(Button):
     def sizeHint(self) -> QSize:
         return super().sizeHint() + QSize(round(self._theme.scaled(CHEVRON)) + CHEVRON_GAP, 0)
 
-    def paint_content(self, painter: QPainter, ink: QColor) -> None:
+    def paint_content(self, painter: QPainter, colour: QColor) -> None:
         side = self._theme.scaled(CHEVRON)
-        whole = QRectF(self.rect())
-        square = QRectF(whole.right() - side - CHEVRON_GAP, whole.center().y() - side / 2, side, side)
-        paint_icon(painter, square, "chevron-down", ink)
+        bounds = QRectF(self.rect())
+        icon_rect = QRectF(bounds.right() - side - CHEVRON_GAP, bounds.center().y() - side / 2, side, side)
+        paint_icon(painter, icon_rect, "chevron-down", colour)
         painter.save()
-        painter.setClipRect(whole.adjusted(0, 0, -side - CHEVRON_GAP, 0))
+        painter.setClipRect(bounds.adjusted(0, 0, -side - CHEVRON_GAP, 0))
         painter.translate(-(side + CHEVRON_GAP) / 2, 0)
-        super().paint_content(painter, ink)
+        super().paint_content(painter, colour)
         painter.restore()
 
 
@@ -364,19 +366,21 @@ class IconButton(PaintedButton):
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        fill, ink = None, "textSecondary"
+        fill, icon_role = None, "textSecondary"
         if self.isChecked():
-            fill, ink = "accentTint", "accentText"
+            fill, icon_role = "accentTint", "accentText"
         elif self.isDown():
-            fill, ink = "pressed", "text"
+            fill, icon_role = "pressed", "text"
         elif self.is_hovered:
-            fill, ink = "hover", "text"
+            fill, icon_role = "hover", "text"
         if fill is not None:
             paint.box(painter, rect, theme.radius("small"), theme.colour(fill))
         side = self._icon_side()
-        square = QRectF(0, 0, side, side)
-        square.moveCenter(rect.center())
-        paint_icon(painter, square, self._icon, theme.colour(ink if self.isEnabled() else "textDisabled"))
+        icon_rect = QRectF(0, 0, side, side)
+        icon_rect.moveCenter(rect.center())
+        paint_icon(
+            painter, icon_rect, self._icon, theme.colour(icon_role if self.isEnabled() else "textDisabled")
+        )
 
 
 class LinkButton(PaintedButton):
@@ -405,15 +409,15 @@ class LinkButton(PaintedButton):
         return QSize(80, self.sizeHint().height())
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        font, ink = self._theme.font("title"), self._theme.colour("accentText")
+        font, colour = self._theme.font("title"), self._theme.colour("accentText")
         font.setUnderline(self.is_hovered)
         if self._icon is not None:
-            square = QRectF(
+            icon_rect = QRectF(
                 rect.right() - ARROW_SIZE, rect.center().y() - ARROW_SIZE / 2, ARROW_SIZE, ARROW_SIZE
             )
-            paint_icon(painter, square, self._icon, ink)
+            paint_icon(painter, icon_rect, self._icon, colour)
             rect.adjust(0, 0, -ARROW_SIZE - 6, 0)
-        paint.text_line(painter, rect, self.text(), font, ink)
+        paint.text_line(painter, rect, self.text(), font, colour)
 
 
 class RunButton(Button):
@@ -433,10 +437,10 @@ class RunButton(Button):
         self.fill_icon = filled
         self.set_kind("run" if filled else "plain")
 
-    def set_icon_only(self, bare: bool) -> None:
-        """Show only the icon if `bare`, else the icon and the text. The accessible name doesn't change."""
-        if bare != self._bare:
-            self._bare = bare
+    def set_icon_only(self, icon_only: bool) -> None:
+        """Show only the icon if `icon_only`, else icon and text. The accessible name doesn't change."""
+        if icon_only != self._bare:
+            self._bare = icon_only
             self.updateGeometry()
             self.update()
 
@@ -458,8 +462,8 @@ class RunButton(Button):
 
     def full_width(self) -> int:
         """Return the width in px with the longest text that the button can show."""
-        words = paint.width_of(self._theme.font("button"), self._widest)
-        return max(RUN_WIDTH, round(self.icon_side() + self.measure.gap + words) + 28)
+        text_width = paint.width_of(self._theme.font("button"), self._widest)
+        return max(RUN_WIDTH, round(self.icon_side() + self.measure.gap + text_width) + 28)
 
 
 class StopButton(PaintedButton):
@@ -469,10 +473,10 @@ class StopButton(PaintedButton):
     for it.
     """
 
-    def __init__(self, theme: Theme, place: BarName = "runBar", parent: QWidget | None = None) -> None:
-        self._corners = "large" if place == "runBar" else "control"
+    def __init__(self, theme: Theme, bar: BarName = "runBar", parent: QWidget | None = None) -> None:
+        self._corners = "large" if bar == "runBar" else "control"
         super().__init__(theme, _("Stop"), radius=self._corners, parent=parent)
-        self._place: BarName = place
+        self._place: BarName = bar
         self._ring = False
         self.filled = True
         # A click doesn't take the focus, so sheets stay open and typing continues.
@@ -480,41 +484,41 @@ class StopButton(PaintedButton):
         assign_command(self, "run.stop")
         self.setProperty("focusInset", STOP_RING_WIDTH)
 
-    def show_state(self, word: str, *, ring: bool = False, filled: bool = True) -> None:
+    def show_state(self, caption: str, *, ring: bool = False, filled: bool = True) -> None:
         """Set the state of the button.
 
         Args:
-            word: "Stop", "Stopping" or "Stop again", translated.
+            caption: "Stop", "Stopping" or "Stop again", translated.
             ring: True while replies of robots are pending.
             filled: False to paint only the outline, because nothing can move.
         """
-        if (word, ring, filled) == (self.text(), self._ring, self.filled):
+        if (caption, ring, filled) == (self.text(), self._ring, self.filled):
             return
-        self.set_text(word)
+        self.set_text(caption)
         self._ring = ring
         self.filled = filled
         self.update()
 
     def sizeHint(self) -> QSize:
-        wanted = self._theme.size_pair("stop", self._place)
-        word, key = self._fonts()
+        size = self._theme.size_pair("stop", self._place)
+        font, key = self._fonts()
         captions = (_("Stop"), _("Stopping"), _("Stop again"))  # the same size in every state
-        least = self._icon_side() + 26 + max(paint.width_of(word, each) for each in captions)
+        min_width = self._icon_side() + 26 + max(paint.width_of(font, each) for each in captions)
         if self._place != "runBar":
-            least += paint.width_of(key, "F12") + 8
-        height = max(wanted.height(), round(paint.height_of(word)) + 10)
-        return QSize(max(wanted.width(), round(least)) + 2 * STOP_RING_WIDTH, height + 2 * STOP_RING_WIDTH)
+            min_width += paint.width_of(key, "F12") + 8
+        height = max(size.height(), round(paint.height_of(font)) + 10)
+        return QSize(max(size.width(), round(min_width)) + 2 * STOP_RING_WIDTH, height + 2 * STOP_RING_WIDTH)
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
     def _fonts(self) -> tuple[QFont, QFont]:
         large = self._place == "runBar"
-        word = self._theme.font("heading" if large else "title")
-        word.setWeight(word.Weight.Bold)
+        font = self._theme.font("heading" if large else "title")
+        font.setWeight(font.Weight.Bold)
         if large:
-            word.setPixelSize(round(self._theme.scaled(17)))
-        return word, self._theme.font("small" if large else "caption")
+            font.setPixelSize(round(self._theme.scaled(17)))
+        return font, self._theme.font("small" if large else "caption")
 
     def _icon_side(self) -> int:
         return 16 if self._place == "runBar" else 12
@@ -526,14 +530,14 @@ class StopButton(PaintedButton):
             paint.box(painter, rect, radius + STOP_RING_WIDTH, None, theme.colour("stop"), 2)
         if self.filled:
             paint.box(painter, frame, radius, theme.colour("stopHover" if self.is_highlighted else "stop"))
-            ink = theme.colour("onStop")
+            colour = theme.colour("onStop")
         else:
             fill = theme.colour("errorTint" if self.is_highlighted else "panel")
             paint.box(painter, frame, radius, fill, theme.colour("stop"))
-            ink = theme.colour("error")
-        self._paint_text(painter, frame, ink)
+            colour = theme.colour("error")
+        self._paint_text(painter, frame, colour)
 
-    def _paint_text(self, painter: QPainter, frame: QRectF, ink: QColor) -> None:
+    def _paint_text(self, painter: QPainter, frame: QRectF, colour: QColor) -> None:
         font, key_font = self._fonts()
         key = "F12" if self.text() == _("Stop") or self._place != "runBar" else ""
         side = self._icon_side()
@@ -542,10 +546,10 @@ class StopButton(PaintedButton):
         word_width = paint.width_of(font, self.text())
         key_width = paint.width_of(key_font, key) + key_gap if key else 0
         left = frame.center().x() - (side + gap + word_width + key_width) / 2
-        square = QRectF(left, frame.center().y() - side / 2, side, side)
-        paint.box(painter, square, side / 6, ink)
-        area = QRectF(QPointF(square.right() + gap, frame.top()), frame.bottomRight())
-        paint.text_line(painter, area, self.text(), font, ink)
+        icon_rect = QRectF(left, frame.center().y() - side / 2, side, side)
+        paint.box(painter, icon_rect, side / 6, colour)
+        area = QRectF(QPointF(icon_rect.right() + gap, frame.top()), frame.bottomRight())
+        paint.text_line(painter, area, self.text(), font, colour)
         if key:
             area.setLeft(area.left() + word_width + key_gap)
-            paint.text_line(painter, area, key, key_font, ink)
+            paint.text_line(painter, area, key, key_font, colour)

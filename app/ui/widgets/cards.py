@@ -46,8 +46,8 @@ class Tile(QWidget):
         rect = QRectF(self.rect())
         paint.box(painter, rect, self._theme.radius("small"), self._theme.block_colour(self._category))
         inset = rect.width() * 0.22
-        ink = self._theme.block_text(self._category)
-        paint_icon(painter, rect.adjusted(inset, inset, -inset, -inset), self._icon, ink)
+        colour = self._theme.block_text(self._category)
+        paint_icon(painter, rect.adjusted(inset, inset, -inset, -inset), self._icon, colour)
         painter.end()
 
 
@@ -68,8 +68,8 @@ class AlertBox(QWidget):
         self.text_column, self.button_row = QVBoxLayout(), QHBoxLayout()
         self.button_row.setSpacing(self.gap)
         self._whole = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
-        high = self.high if framed else 4
-        self._whole.setContentsMargins(self.left, high, 12, high)
+        vertical_margin = self.high if framed else 4
+        self._whole.setContentsMargins(self.left, vertical_margin, 12, vertical_margin)
         self._whole.setSpacing(self.gap)
         self._whole.addLayout(self.text_column, 1)
         self._whole.addLayout(self.button_row)
@@ -91,12 +91,12 @@ class AlertBox(QWidget):
     def _fit(self) -> None:
         # If the text is large or long, the buttons are below it.
         room = self.width() - self.button_row.sizeHint().width()
-        beside = self.button_row.isEmpty() or room >= self._theme.scaled(self.min_text_width)
-        wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
-        if self._whole.direction() != wanted:
-            self._whole.setDirection(wanted)
+        fits_beside = self.button_row.isEmpty() or room >= self._theme.scaled(self.min_text_width)
+        direction = QBoxLayout.Direction.LeftToRight if fits_beside else QBoxLayout.Direction.TopToBottom
+        if self._whole.direction() != direction:
+            self._whole.setDirection(direction)
             right = Qt.AlignmentFlag.AlignRight
-            self._whole.setAlignment(self.button_row, Qt.AlignmentFlag(0) if beside else right)
+            self._whole.setAlignment(self.button_row, Qt.AlignmentFlag(0) if fits_beside else right)
 
     def icon_top(self) -> float:
         """Return the distance in px between the upper edges of the box and the icon."""
@@ -109,8 +109,8 @@ class AlertBox(QWidget):
             edge = theme.colour(BORDER_ROLES.get(self._status, "borderStrong"))
             fill = theme.colour(status.tint or "panel")
             paint.box(painter, QRectF(self.rect()), theme.radius("panel"), fill, edge)
-        square = QRectF(self.icon_left, self.icon_top(), self.icon_side, self.icon_side)
-        paint_icon(painter, square, status.icon, theme.colour(status.colour))
+        icon_rect = QRectF(self.icon_left, self.icon_top(), self.icon_side, self.icon_side)
+        paint_icon(painter, icon_rect, status.icon, theme.colour(status.colour))
         painter.end()
 
 

@@ -51,8 +51,8 @@ class _Tile(QWidget):
         painter = QPainter(self)
         paint.box(painter, QRectF(0, 0, TILE, TILE), theme.radius("palette"), theme.colour("sunken"))
         side = theme.size("icon", "empty")
-        square = QRectF((TILE - side) / 2, (TILE - side) / 2, side, side)
-        paint_icon(painter, square, self.icon, theme.colour("textSecondary"))
+        icon_rect = QRectF((TILE - side) / 2, (TILE - side) / 2, side, side)
+        paint_icon(painter, icon_rect, self.icon, theme.colour("textSecondary"))
         painter.end()
 
 
@@ -68,10 +68,10 @@ class EmptyState(QWidget):
         self._tile = _Tile(theme, icon)
         self._title = label(title, "empty", wrap=True)
         self._text = label(text, "bodyLarge", role="textSecondary", wrap=True)
-        for words in (self._title, self._text):
-            words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        inside = QWidget()
-        column = QVBoxLayout(inside)
+        for text_label in (self._title, self._text):
+            text_label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        content = QWidget()
+        column = QVBoxLayout(content)
         column.setContentsMargins(16, MARGIN, 16, MARGIN)
         column.setSpacing(0)
         column.addStretch(1)
@@ -90,11 +90,11 @@ class EmptyState(QWidget):
         self._column = column
         column.addStretch(1)
         self._buttons: list[Button] = []
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 0, 0, 0)
-        area = ContentScrollArea(inside)
+        outer_layout = QVBoxLayout(self)
+        outer_layout.setContentsMargins(0, 0, 0, 0)
+        area = ContentScrollArea(content)
         area.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        whole.addWidget(area)
+        outer_layout.addWidget(area)
         self.set_actions(actions)
 
     def set_texts(self, title: str, text: str, icon: str | None = None) -> None:
@@ -112,10 +112,10 @@ class EmptyState(QWidget):
         text = self._text.heightForWidth(min(width, TEXT_WIDTH))
         # otherwise the last line would be cut off if the height is low
         self._text.setMinimumHeight(max(0, text))
-        high = self._title.heightForWidth(width) + text + 4
-        high += ROW_TOP_MARGIN + self._buttons[0].sizeHint().height() if self._buttons else 0
-        self._tile.setVisible(self.height() - 2 * MARGIN >= high + TILE + BELOW_TILE)
-        is_low = bool(self._buttons) and self.height() - 2 * MARGIN < high
+        content_height = self._title.heightForWidth(width) + text + 4
+        content_height += ROW_TOP_MARGIN + self._buttons[0].sizeHint().height() if self._buttons else 0
+        self._tile.setVisible(self.height() - 2 * MARGIN >= content_height + TILE + BELOW_TILE)
+        is_low = bool(self._buttons) and self.height() - 2 * MARGIN < content_height
         self._text.setVisible(not is_low)
         self._title.setToolTip(plain.tip(self._text.text()) if is_low else "")
         self._row.setContentsMargins(0, 0 if is_low else ROW_TOP_MARGIN, 0, 0)

@@ -34,11 +34,11 @@ def dropped_field(data: QMimeData) -> tuple[str, str] | None:
     if not data.hasFormat(MIME_TYPE):
         return None
     try:
-        found = json.loads(bytes(data.data(MIME_TYPE).data()))
+        decoded = json.loads(bytes(data.data(MIME_TYPE).data()))
     except (ValueError, RecursionError):
         return None
-    if isinstance(found, list) and len(found) == 2 and all(isinstance(each, str) for each in found):
-        return found[0], found[1]
+    if isinstance(decoded, list) and len(decoded) == 2 and all(isinstance(each, str) for each in decoded):
+        return decoded[0], decoded[1]
     return None
 
 
@@ -103,8 +103,8 @@ def drag_field(source: QWidget, topic: str, path: str, *, press: Callable[[str],
 
 
 def _drag_pixmap(text: str) -> QPixmap:
-    shown = label(text, "code")
-    shown.setProperty("raised", "true")
-    shown.setContentsMargins(8, 4, 8, 4)
-    shown.adjustSize()
-    return shown.grab()
+    widget = label(text, "code")
+    widget.setProperty("raised", "true")
+    widget.setContentsMargins(8, 4, 8, 4)
+    widget.adjustSize()
+    return widget.grab()

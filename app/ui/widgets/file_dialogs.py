@@ -27,21 +27,21 @@ class FileKind:
     suffix: str
 
 
-def resolve_kind(chosen: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple[Path, FileKind]:
+def resolve_kind(path: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple[Path, FileKind]:
     """Return the path with a file extension, and the type of the file to save.
 
     An extension that was typed takes precedence over the selected type.
 
     Args:
-        chosen: Path that was entered.
+        path: Path that was entered.
         kind: Selected type.
         kinds: Types that were offered.
     """
-    ending = chosen.suffix.lower()
+    ending = path.suffix.lower()
     if ending != kind.suffix:
         typed = next((each for each in kinds if each.suffix == ending), None)
-        return (chosen, typed) if typed is not None else (chosen.with_name(chosen.name + kind.suffix), kind)
-    return chosen, kind
+        return (path, typed) if typed is not None else (path.with_name(path.name + kind.suffix), kind)
+    return path, kind
 
 
 class FileDialogs(Protocol):
@@ -50,10 +50,10 @@ class FileDialogs(Protocol):
     The callback ``take`` of each method is called with the path; it isn't called on cancel.
     """
 
-    def open(self, folder: str, take: Callable[[Path], None]) -> None:
+    def open(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Ask for a behaviour to open."""
 
-    def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
+    def save(self, suggestion: str, callback: Callable[[Path], None]) -> None:
         """Ask for the folder and name to save a behaviour."""
 
     def save_as(
@@ -61,7 +61,7 @@ class FileDialogs(Protocol):
         title: str,
         suggestion: Path,
         kinds: Sequence[FileKind],
-        take: Callable[[Path, FileKind], None],
+        callback: Callable[[Path, FileKind], None],
     ) -> None:
         """Ask for folder, name and type to save a file other than a behaviour.
 
@@ -69,19 +69,19 @@ class FileDialogs(Protocol):
             title: Title of the dialog.
             suggestion: Suggested path, without extension.
             kinds: Types that are offered.
-            take: Called with the path, which has the extension of the type, and the type.
+            callback: Called with the path, which has the extension of the type, and the type.
         """
 
-    def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
+    def open_picture(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Ask for an image file, starting in a folder or, for "", in the user's picture folder."""
 
-    def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
+    def open_recording(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Ask for a recording to open."""
 
-    def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
+    def open_layout(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Ask for a layout file to import."""
 
-    def select_folder(self, folder: str, take: Callable[[Path], None]) -> None:
+    def select_folder(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Ask for a folder."""
 
 
@@ -90,8 +90,8 @@ PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 def pictures_folder() -> str:
     """Return the user's picture folder, or the home folder if there is none."""
-    place = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
-    return place if place and Path(place).is_dir() else str(Path.home())
+    folder = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
+    return folder if folder and Path(folder).is_dir() else str(Path.home())
 
 
 BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
@@ -111,13 +111,13 @@ class SystemDialogs:
     def __init__(self, window: QWidget) -> None:
         self._window = window
 
-    def open(self, folder: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Open a behaviour"), folder, take, BEHAVIOURS)
+    def open(self, folder: str, callback: Callable[[Path], None]) -> None:
+        dialog = self._dialog(_("Open a behaviour"), folder, callback, BEHAVIOURS)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 
-    def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Save behaviour"), str(Path(suggestion).parent), take, BEHAVIOURS)
+    def save(self, suggestion: str, callback: Callable[[Path], None]) -> None:
+        dialog = self._dialog(_("Save behaviour"), str(Path(suggestion).parent), callback, BEHAVIOURS)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix(SUFFIX.lstrip("."))
         dialog.selectFile(Path(suggestion).name)
@@ -128,12 +128,12 @@ class SystemDialogs:
         title: str,
         suggestion: Path,
         kinds: Sequence[FileKind],
-        take: Callable[[Path, FileKind], None],
+        callback: Callable[[Path, FileKind], None],
     ) -> None:
         offered = {f"{_(kind.label)} (*{kind.suffix})": kind for kind in kinds}
 
         def take_path(path: Path) -> None:
-            take(*resolve_kind(path, offered.get(dialog.selectedNameFilter(), kinds[0]), kinds))
+            callback(*resolve_kind(path, offered.get(dialog.selectedNameFilter(), kinds[0]), kinds))
 
         dialog = self._dialog(title, str(suggestion.parent), take_path)
         dialog.setNameFilters(list(offered))
@@ -145,32 +145,32 @@ class SystemDialogs:
         dialog.selectFile(suggestion.name)
         dialog.show()
 
-    def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Choose an image"), folder or pictures_folder(), take, PICTURES)
+    def open_picture(self, folder: str, callback: Callable[[Path], None]) -> None:
+        dialog = self._dialog(_("Choose an image"), folder or pictures_folder(), callback, PICTURES)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 
-    def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Open a recording"), folder, take, RECORDINGS)
+    def open_recording(self, folder: str, callback: Callable[[Path], None]) -> None:
+        dialog = self._dialog(_("Open a recording"), folder, callback, RECORDINGS)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 
-    def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Open a layout"), folder, take, LAYOUTS)
+    def open_layout(self, folder: str, callback: Callable[[Path], None]) -> None:
+        dialog = self._dialog(_("Open a layout"), folder, callback, LAYOUTS)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 
-    def select_folder(self, folder: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Choose a folder"), folder, take)
+    def select_folder(self, folder: str, callback: Callable[[Path], None]) -> None:
+        dialog = self._dialog(_("Choose a folder"), folder, callback)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.show()
 
     def _dialog(
-        self, title: str, folder: str, take: Callable[[Path], None], kind: tuple[str, str] | None = None
+        self, title: str, folder: str, callback: Callable[[Path], None], kind: tuple[str, str] | None = None
     ) -> QFileDialog:
         offered = f"{_(kind[0])} ({kind[1]})" if kind is not None else ""
         dialog = QFileDialog(self._window, title, folder, offered)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setWindowModality(Qt.WindowModality.NonModal)
-        dialog.fileSelected.connect(lambda chosen: take(Path(chosen)))
+        dialog.fileSelected.connect(lambda chosen: callback(Path(chosen)))
         return dialog

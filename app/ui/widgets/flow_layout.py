@@ -62,16 +62,16 @@ class Flow(QLayout):
         return self._arrange(QRect(0, 0, width, 0), move=False)
 
     def sizeHint(self) -> QSize:
-        shown = [*self._visible_items()]
-        wide = sum(self._preferred_width(item) for item in shown) + self._gap * max(0, len(shown) - 1)
-        high = max((item.sizeHint().height() for item in shown), default=0)
-        return self._with_margins(QSize(wide, high))
+        items = [*self._visible_items()]
+        width = sum(self._preferred_width(item) for item in items) + self._gap * max(0, len(items) - 1)
+        height = max((item.sizeHint().height() for item in items), default=0)
+        return self._with_margins(QSize(width, height))
 
     def minimumSize(self) -> QSize:
-        shown = [*self._visible_items()]
-        wide = max((self._minimum_width(item) for item in shown), default=0)
-        high = max((item.minimumSize().height() for item in shown), default=0)
-        return self._with_margins(QSize(wide, high))
+        items = [*self._visible_items()]
+        width = max((self._minimum_width(item) for item in items), default=0)
+        height = max((item.minimumSize().height() for item in items), default=0)
+        return self._with_margins(QSize(width, height))
 
     def setGeometry(self, rect: QRect) -> None:
         super().setGeometry(rect)
@@ -110,20 +110,22 @@ class Flow(QLayout):
         # Returns the height; places the items only if `move`.
         edge = self.contentsMargins()
         room = rect.marginsRemoved(edge)
-        shown = [*self._visible_items()]
-        rows = [self._one_row(shown, room.width())] if shown else []
+        items = [*self._visible_items()]
+        rows = [self._one_row(items, room.width())] if items else []
         if rows and not rows[0]:
-            rows = self._rows(shown, room.width())
+            rows = self._rows(items, room.width())
         top = room.top()
         for row in rows:
-            high = max(_height_for_width(item, wide) for item, _rect, wide in row)
-            for item, left, wide in row:
+            row_height = max(_height_for_width(item, width) for item, _rect, width in row)
+            for item, left, width in row:
                 if move:
-                    height = min(high, _height_for_width(item, wide))
-                    item.setGeometry(QRect(room.left() + left, top + (high - height) // 2, wide, height))
-            top += high + self._row_gap
-        used = top - room.top() - (self._row_gap if rows else 0)
-        return used + edge.top() + edge.bottom()
+                    height = min(row_height, _height_for_width(item, width))
+                    item.setGeometry(
+                        QRect(room.left() + left, top + (row_height - height) // 2, width, height)
+                    )
+            top += row_height + self._row_gap
+        used_height = top - room.top() - (self._row_gap if rows else 0)
+        return used_height + edge.top() + edge.bottom()
 
     def _one_row(self, items: list[QLayoutItem], room: int) -> list[tuple[QLayoutItem, int, int]]:
         # Rows of (item, left, width); empty if the items do not fit.
@@ -134,18 +136,18 @@ class Flow(QLayout):
         spare = room - sum(widths) - self._gap * (len(items) - 1)
         if spare < 0:
             return []
-        for place, item in enumerate(items):
+        for index, item in enumerate(items):
             if self._is_elastic(item):
-                more = max(0, min(spare, self._maximum_width(item, room) - widths[place]))
-                widths[place] += more
+                more = max(0, min(spare, self._maximum_width(item, room) - widths[index]))
+                widths[index] += more
                 spare -= more
         pushed = self._items[self._push :] if self._push >= 0 else []
-        first = next((place for place, item in enumerate(items) if item in pushed), len(items))
+        first = next((index for index, item in enumerate(items) if item in pushed), len(items))
         row, left = [], 0
-        for place, (item, wide) in enumerate(zip(items, widths, strict=True)):
-            left += spare if place == first else 0
-            row.append((item, left, wide))
-            left += wide + self._gap
+        for index, (item, width) in enumerate(zip(items, widths, strict=True)):
+            left += spare if index == first else 0
+            row.append((item, left, width))
+            left += width + self._gap
         return row
 
     def _rows(self, items: list[QLayoutItem], room: int) -> list[list[tuple[QLayoutItem, int, int]]]:
@@ -153,19 +155,19 @@ class Flow(QLayout):
         rows: list[list[tuple[QLayoutItem, int, int]]] = []
         left = room + 1
         for item in items:
-            wide = min(room, self._maximum_width(item, room))
+            width = min(room, self._maximum_width(item, room))
             rest = room - left
-            if wide > rest >= self._minimum_width(item):
-                wide = rest
-            if wide > rest:
+            if width > rest >= self._minimum_width(item):
+                width = rest
+            if width > rest:
                 rows.append([])
                 left = 0
-            rows[-1].append((item, left, wide))
-            left += wide + self._gap
+            rows[-1].append((item, left, width))
+            left += width + self._gap
         return rows
 
 
-def _height_for_width(item: QLayoutItem, wide: int) -> int:
+def _height_for_width(item: QLayoutItem, width: int) -> int:
     if item.hasHeightForWidth():
-        return max(item.heightForWidth(wide), item.minimumSize().height())
+        return max(item.heightForWidth(width), item.minimumSize().height())
     return item.sizeHint().expandedTo(item.minimumSize()).height()

@@ -108,10 +108,10 @@ class Chip(QWidget):
         self.updateGeometry()
         self.update()
 
-    def set_icon_only(self, bare: bool) -> None:
-        """Show only the icon if `bare`, with the text as tooltip, else the icon and the text."""
-        if bare != self._bare:
-            self._bare = bare
+    def set_icon_only(self, icon_only: bool) -> None:
+        """Show only the icon if `icon_only`, with the text as tooltip, else the icon and the text."""
+        if icon_only != self._bare:
+            self._bare = icon_only
             self.updateGeometry()
             self.update()
 
@@ -136,8 +136,8 @@ class Chip(QWidget):
         return max(self._preferred_height(), round(self._icon_side()) + CHIP_PADDING)
 
     def _preferred_height(self) -> int:
-        least = CHIP_HEIGHT + (4 if self._large else 0)
-        return max(least, round(paint.height_of(self._font())) + 6)
+        min_height = CHIP_HEIGHT + (4 if self._large else 0)
+        return max(min_height, round(paint.height_of(self._font())) + 6)
 
     def sizeHint(self) -> QSize:
         return QSize(self.icon_only_width() if self._bare else self.full_width(), self._preferred_height())
@@ -163,28 +163,30 @@ class Chip(QWidget):
         edge = theme.colour("controlBorder") if theme.high_contrast else None
         tint = status.tint or "sunken"
         paint.box(painter, rect, rect.height() / 2, theme.colour(tint), edge)
-        plain = {"off": "textSecondary", "running": "text"}
-        ink = theme.colour(plain.get(self._status, status.colour))
+        text_roles = {"off": "textSecondary", "running": "text"}
+        text_colour = theme.colour(text_roles.get(self._status, status.colour))
         left = float(CHIP_PADDING + (1 if self._large else 0))
         name = self._icon_name()
         if name:
             side = self._icon_side()
             left = (rect.width() - side) / 2 if self._bare else left
-            square = QRectF(left, (rect.height() - side) / 2, side, side)
-            paint_icon(painter, square, name, theme.colour(status.colour) if name == "dot" else ink)
+            icon_rect = QRectF(left, (rect.height() - side) / 2, side, side)
+            paint_icon(
+                painter, icon_rect, name, theme.colour(status.colour) if name == "dot" else text_colour
+            )
             left += side + CHIP_GAP
         if not self._bare:
-            paint.text_line(painter, rect.adjusted(left, 0, -3, 0), self._text, self._font(), ink)
+            paint.text_line(painter, rect.adjusted(left, 0, -3, 0), self._text, self._font(), text_colour)
         painter.end()
 
 
 class StatusIcon(QWidget):
     """Icon of a status, next to a text with the same meaning."""
 
-    def __init__(self, theme: Theme, status: str = "off", *, height: int = 0, ink: str = "") -> None:
+    def __init__(self, theme: Theme, status: str = "off", *, height: int = 0, colour: str = "") -> None:
         # `height` is that of the adjacent line of text (0: the icon's own); `ink` overrides the colour.
         super().__init__()
-        self._theme, self._status, self._height, self._ink = theme, "", height, ink
+        self._theme, self._status, self._height, self._ink = theme, "", height, colour
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.set(status)
 
@@ -201,8 +203,8 @@ class StatusIcon(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         status, painter = self._theme.status(self._status), QPainter(self)
-        square = QRectF(0, (self.height() - self.width()) / 2, self.width(), self.width())
-        paint_icon(painter, square, status.icon, self._theme.colour(self._ink or status.colour))
+        icon_rect = QRectF(0, (self.height() - self.width()) / 2, self.width(), self.width())
+        paint_icon(painter, icon_rect, status.icon, self._theme.colour(self._ink or status.colour))
         painter.end()
 
 
@@ -273,13 +275,13 @@ class StatusItem(QWidget):
         font = self._theme.font("small")
         # All digits count with the same width: values change many times a second, and each new width would
         # cause a relayout.
-        words = re.sub(r"\d", "0", self._text)
-        width = paint.width_of(font, words) + (self._icon_side() + 6 if self._icon else 0)
+        text = re.sub(r"\d", "0", self._text)
+        width = paint.width_of(font, text) + (self._icon_side() + 6 if self._icon else 0)
         return QSize(round(width) + 1, round(paint.height_of(font)))
 
     def minimumSizeHint(self) -> QSize:
-        wanted = self.sizeHint()
-        return QSize(min(wanted.width(), round(self._theme.scaled(MIN_ITEM_WIDTH))), wanted.height())
+        preferred = self.sizeHint()
+        return QSize(min(preferred.width(), round(self._theme.scaled(MIN_ITEM_WIDTH))), preferred.height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -290,15 +292,17 @@ class StatusItem(QWidget):
         theme = self._theme
         rect = QRectF(self.rect())
         loud = self._status in {"warn", "error"}
-        ink = theme.colour(theme.status(self._status).colour) if self._status and loud else None
+        status_colour = theme.colour(theme.status(self._status).colour) if self._status and loud else None
         if self._icon:
-            colour = ink or theme.colour(
+            colour = status_colour or theme.colour(
                 theme.status(self._status).colour if self._status else "textSecondary"
             )
             side = self._icon_side()
             paint_icon(painter, QRectF(0, rect.center().y() - side / 2, side, side), self._icon, colour)
             rect.setLeft(side + 6)
-        paint.text_line(painter, rect, self._text, theme.font("small"), ink or theme.colour("textSecondary"))
+        paint.text_line(
+            painter, rect, self._text, theme.font("small"), status_colour or theme.colour("textSecondary")
+        )
         painter.end()
 
 

@@ -53,14 +53,14 @@ def next_in_focus_chain(widget: QWidget, *, forward: bool = True) -> QWidget:
         widget: Widget in the chain.
         forward: False to return the previous widget.
     """
-    found = widget.nextInFocusChain() if forward else widget.previousInFocusChain()
-    return widget if found is None else _restore_parent(found)
+    neighbour = widget.nextInFocusChain() if forward else widget.previousInFocusChain()
+    return widget if neighbour is None else _restore_parent(neighbour)
 
 
 def focus_proxy(widget: QWidget) -> QWidget | None:
     """Return the focus proxy of a widget, or None."""
-    found = widget.focusProxy()
-    return None if found is None else _restore_parent(found)
+    proxy = widget.focusProxy()
+    return None if proxy is None else _restore_parent(proxy)
 
 
 def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Iterator[QWidget]:
@@ -94,9 +94,9 @@ def tab_stops_of(widget: QWidget) -> list[QWidget]:
     ]
 
 
-def _restore_parent(found: QWidget) -> QWidget:
+def _restore_parent(widget: QWidget) -> QWidget:
     # Restores the ownership in PySide; has no effect in Qt.
-    if not isValid(found):
-        return found
-    QObject.setParent(found, found.parentWidget())
-    return found
+    if not isValid(widget):
+        return widget
+    QObject.setParent(widget, widget.parentWidget())
+    return widget

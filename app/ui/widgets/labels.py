@@ -28,12 +28,12 @@ def label(text: str = "", kind: str = "body", *, role: str = "text", wrap: bool 
     return result
 
 
-def set_role(shown: QLabel, role: str) -> None:
+def set_role(widget: QLabel, role: str) -> None:
     """Set the colour role of a label."""
-    if shown.property("role") != role:
-        shown.setProperty("role", role)
-        shown.style().unpolish(shown)
-        shown.style().polish(shown)
+    if widget.property("role") != role:
+        widget.setProperty("role", role)
+        widget.style().unpolish(widget)
+        widget.style().polish(widget)
 
 
 class ElidedLabel(QLabel):
@@ -41,10 +41,10 @@ class ElidedLabel(QLabel):
 
     mode = Qt.TextElideMode.ElideMiddle
 
-    def __init__(self, kind: str, role: str, least: int = 0) -> None:
+    def __init__(self, kind: str, role: str, min_width: int = 0) -> None:
         # `least` is the minimum width in px.
         super().__init__()
-        self._least = least
+        self._least = min_width
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setProperty("kind", kind)
         self.setProperty("role", role)
@@ -54,13 +54,13 @@ class ElidedLabel(QLabel):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         room = self.contentsRect()
-        fits = self.fontMetrics().elidedText(self.text(), self.mode, room.width() + 1)
-        whole = self.text() if fits != self.text() else ""
-        if plain.tip(whole) != self.toolTip():
-            self.setToolTip(plain.tip(whole))
+        elided = self.fontMetrics().elidedText(self.text(), self.mode, room.width() + 1)
+        full_text = self.text() if elided != self.text() else ""
+        if plain.tip(full_text) != self.toolTip():
+            self.setToolTip(plain.tip(full_text))
         painter = QPainter(self)
         painter.setPen(self.palette().color(self.foregroundRole()))
-        painter.drawText(room, int(paint.LEFT), fits)
+        painter.drawText(room, int(paint.LEFT), elided)
         painter.end()
 
 
@@ -88,9 +88,9 @@ class FixedWidthLabel(ElidedLabel):
 class SteadyLabel(ElidedLabel):
     """Label for a text that changes about once a second, as wide as the widest text so far."""
 
-    def __init__(self, kind: str, role: str, least: int = 0) -> None:
+    def __init__(self, kind: str, role: str, min_width: int = 0) -> None:
         self._words = ""
-        super().__init__(kind, role, least)
+        super().__init__(kind, role, min_width)
 
     def text(self) -> str:
         return self._words
@@ -112,19 +112,19 @@ class PartlyBoldLabel(QWidget):
 
     Args:
         theme: Theme.
-        sentence: Text.
+        text: Text.
         subject: Part of the text to show in bold.
         kind: Kind of text, which determines the font.
     """
 
-    def __init__(self, theme: Theme, sentence: str, subject: str, kind: str = "bodyLarge") -> None:
+    def __init__(self, theme: Theme, text: str, subject: str, kind: str = "bodyLarge") -> None:
         super().__init__()
         self._theme, self._kind = theme, kind
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.setAccessibleName(sentence)
-        self.setToolTip(plain.tip(sentence))
-        before, found, after = sentence.partition(subject) if subject else (sentence, "", "")
-        self._parts = ((before, False), (found, True), (after, False))
+        self.setAccessibleName(text)
+        self.setToolTip(plain.tip(text))
+        before, match, after = text.partition(subject) if subject else (text, "", "")
+        self._parts = ((before, False), (match, True), (after, False))
 
     def sizeHint(self) -> QSize:
         return QSize(200, round(QFontMetricsF(self._theme.font(self._kind)).height()) + 2)
@@ -132,13 +132,13 @@ class PartlyBoldLabel(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         rect = QRectF(self.rect())
-        for words, strong in self._parts:
+        for text, strong in self._parts:
             font = self._theme.font(self._kind)
             if strong:
                 font.setWeight(font.Weight.Bold)
-            if words and rect.width() > 4:
-                paint.text_line(painter, rect, words, font, self._theme.colour("text"))
-            rect.setLeft(rect.left() + QFontMetricsF(font).horizontalAdvance(words))
+            if text and rect.width() > 4:
+                paint.text_line(painter, rect, text, font, self._theme.colour("text"))
+            rect.setLeft(rect.left() + QFontMetricsF(font).horizontalAdvance(text))
         painter.end()
 
 

@@ -21,15 +21,19 @@ def mnemonic_positions(texts: Sequence[str]) -> list[int]:
 
     First letters of texts take precedence, then first letters of other words, then any letter.
     """
-    found, taken = [-1] * len(texts), set[str]()
-    for places in (_first_position, _word_positions, _all_positions):
+    positions, used_keys = [-1] * len(texts), set[str]()
+    for find_positions in (_first_position, _word_positions, _all_positions):
         for number, text in enumerate(texts):
-            free = (place for place in places(text) if (key := key_of(text[place])) and key not in taken)
-            place = next(free, -1) if found[number] < 0 else -1
-            if place >= 0:
-                found[number] = place
-                taken.add(key_of(text[place]))
-    return found
+            free = (
+                position
+                for position in find_positions(text)
+                if (key := key_of(text[position])) and key not in used_keys
+            )
+            position = next(free, -1) if positions[number] < 0 else -1
+            if position >= 0:
+                positions[number] = position
+                used_keys.add(key_of(text[position]))
+    return positions
 
 
 def key_of(letter: str) -> str:
@@ -43,10 +47,10 @@ def with_mnemonics(texts: Sequence[str]) -> list[str]:
 
     Accented letters aren't used, because Alt can't be combined with them.
     """
-    bare = [re.sub(r"[^\x00-\x7f]", "\N{BULLET}", text) for text in texts]
+    ascii_texts = [re.sub(r"[^\x00-\x7f]", "\N{BULLET}", text) for text in texts]
     return [
-        text if place < 0 else f"{text[:place]}&{text[place:]}"
-        for text, place in zip(texts, mnemonic_positions(bare), strict=True)
+        text if position < 0 else f"{text[:position]}&{text[position:]}"
+        for text, position in zip(texts, mnemonic_positions(ascii_texts), strict=True)
     ]
 
 
@@ -56,7 +60,7 @@ def _first_position(text: str) -> Iterator[int]:
 
 
 def _word_positions(text: str) -> Iterator[int]:
-    return (found.start() for found in re.finditer(r"\b\w", text))
+    return (match.start() for match in re.finditer(r"\b\w", text))
 
 
 def _all_positions(text: str) -> Iterator[int]:

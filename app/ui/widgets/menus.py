@@ -77,25 +77,25 @@ def geometry_beside_stop(menu: QRect, stop: QRect, screen: QRect) -> QRect:
     narrow.setRight(stop.left() - 1)
     if narrow.width() < MIN_WIDTH:
         narrow = menu
-    return next((place for place in (left, low) if screen.contains(place)), narrow)
+    return next((rect for rect in (left, low) if screen.contains(rect)), narrow)
 
 
-def stop_button_at(place: QPoint) -> QAbstractButton | None:
+def stop_button_at(position: QPoint) -> QAbstractButton | None:
     """Return the Stop button at a screen position; None if there is none or a popup covers it."""
     windows = [window for window in QApplication.topLevelWidgets() if window.isVisible()]
-    inside = [window for window in windows if window.rect().contains(window.mapFromGlobal(place))]
-    if any(window.windowType() == Qt.WindowType.Popup for window in inside):
+    candidates = [window for window in windows if window.rect().contains(window.mapFromGlobal(position))]
+    if any(window.windowType() == Qt.WindowType.Popup for window in candidates):
         return None
-    for window in inside:
-        under = window.childAt(window.mapFromGlobal(place))
+    for window in candidates:
+        under = window.childAt(window.mapFromGlobal(position))
         if isinstance(under, StopButton) or (isinstance(under, Button) and under.kind == "stop"):
             return under
     return None
 
 
-def press_stop(place: QPoint) -> bool:
+def press_stop(position: QPoint) -> bool:
     """Close all popups and click the Stop button at a screen position; return False if there is none."""
-    stop = stop_button_at(place)
+    stop = stop_button_at(position)
     if stop is None:
         return False
     while (popup := QApplication.activePopupWidget()) is not None and popup.close():
@@ -132,17 +132,21 @@ class Menu(QMenu):
     def mnemonics(self) -> dict[QAction, int]:
         """Return the position of the mnemonic letter in the text of each entry, or -1 for none."""
         entries = [action for action in self.actions() if action.isVisible() and not action.isSeparator()]
-        places = mnemonic_positions([strip_mnemonic(action.text()) for action in entries])
-        return dict(zip(entries, places, strict=True))
+        positions = mnemonic_positions([strip_mnemonic(action.text()) for action in entries])
+        return dict(zip(entries, positions, strict=True))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Activate an entry when its mnemonic letter is pressed."""
         self._by_keys = True
         self.update()
-        held = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.AltModifier)
-        pressed = "" if held else key_of(event.text())
-        for action, place in self.mnemonics().items() if pressed else ():
-            if place >= 0 and key_of(strip_mnemonic(action.text())[place]) == pressed and action.isEnabled():
+        modifiers = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.AltModifier)
+        pressed = "" if modifiers else key_of(event.text())
+        for action, position in self.mnemonics().items() if pressed else ():
+            if (
+                position >= 0
+                and key_of(strip_mnemonic(action.text())[position]) == pressed
+                and action.isEnabled()
+            ):
                 self.setActiveAction(action)
                 if action.menu() is None:
                     nothing = Qt.KeyboardModifier.NoModifier
@@ -152,8 +156,8 @@ class Menu(QMenu):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        held = QGuiApplication.queryKeyboardModifiers() & Qt.KeyboardModifier.AltModifier
-        self._by_keys = bool(held) or is_keyboard_navigation()
+        modifiers = QGuiApplication.queryKeyboardModifiers() & Qt.KeyboardModifier.AltModifier
+        self._by_keys = bool(modifiers) or is_keyboard_navigation()
         cut(self, self._theme.radius("panel"))
         self._avoid_stop()
 
@@ -167,8 +171,8 @@ class Menu(QMenu):
         screen = self.screen().availableGeometry()
         for stop in owner.window().findChildren(StopButton):
             if stop.isVisible():
-                place = QRect(stop.mapToGlobal(QPoint()), stop.size())
-                self.setGeometry(geometry_beside_stop(self.geometry(), place, screen))
+                stop_rect = QRect(stop.mapToGlobal(QPoint()), stop.size())
+                self.setGeometry(geometry_beside_stop(self.geometry(), stop_rect, screen))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Trigger Stop on a click on a Stop button; otherwise close the menu on a click outside.
@@ -176,8 +180,8 @@ class Menu(QMenu):
         `app.ui.shell.stop_keys` doesn't receive this event for submenus, because they don't become the
         active window.
         """
-        left = event.button() == Qt.MouseButton.LeftButton
-        if not (left and press_stop(event.globalPosition().toPoint())):
+        is_left_button = event.button() == Qt.MouseButton.LeftButton
+        if not (is_left_button and press_stop(event.globalPosition().toPoint())):
             super().mousePressEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -188,79 +192,83 @@ class Menu(QMenu):
         theme, painter = self._theme, QPainter(self)
         rect = QRectF(self.rect())
         box(painter, rect, theme.radius("panel"), theme.colour("raised"), theme.colour("borderStrong"))
-        shown = [action for action in self.actions() if action.isVisible()]
-        above, below = self._hidden_ends(shown)
-        inside = rect.adjusted(1, 1 + above * SCROLLER_HEIGHT, -1, -1 - below * SCROLLER_HEIGHT)
+        visible_actions = [action for action in self.actions() if action.isVisible()]
+        above, below = self._hidden_ends(visible_actions)
+        contents = rect.adjusted(1, 1 + above * SCROLLER_HEIGHT, -1, -1 - below * SCROLLER_HEIGHT)
         for hidden, icon, top in (
             (above, "chevron-up", 1),
             (below, "chevron-down", rect.height() - SCROLLER_HEIGHT),
         ):
             if hidden:
-                square = QRectF((rect.width() - 14) / 2, top + (SCROLLER_HEIGHT - 14) / 2, 14, 14)
-                paint_icon(painter, square, icon, theme.colour("textSecondary"))
-        painter.setClipRect(inside)
+                icon_rect = QRectF((rect.width() - 14) / 2, top + (SCROLLER_HEIGHT - 14) / 2, 14, 14)
+                paint_icon(painter, icon_rect, icon, theme.colour("textSecondary"))
+        painter.setClipRect(contents)
         letters = self.mnemonics()
-        for action in shown:
-            place = QRectF(self.actionGeometry(action))
-            place.setRight(min(place.right(), rect.right() - 6))
-            if place.intersects(inside):
-                self._paint_action(painter, place, action, letters.get(action, -1))
+        for action in visible_actions:
+            action_rect = QRectF(self.actionGeometry(action))
+            action_rect.setRight(min(action_rect.right(), rect.right() - 6))
+            if action_rect.intersects(contents):
+                self._paint_action(painter, action_rect, action, letters.get(action, -1))
         painter.end()
 
-    def _hidden_ends(self, shown: list[QAction]) -> tuple[bool, bool]:
+    def _hidden_ends(self, visible_actions: list[QAction]) -> tuple[bool, bool]:
         # On a low screen some entries are hidden; the mouse at the edge scrolls to them.
-        if not shown:
+        if not visible_actions:
             return False, False
-        first, last = self.actionGeometry(shown[0]), self.actionGeometry(shown[-1])
+        first, last = self.actionGeometry(visible_actions[0]), self.actionGeometry(visible_actions[-1])
         return first.top() < 0, last.bottom() > self.height()
 
-    def _paint_underline(self, painter: QPainter, inside: QRectF, said: str, letter: int) -> None:
+    def _paint_underline(self, painter: QPainter, text_rect: QRectF, text: str, letter: int) -> None:
         font = self.font()
-        left, wide = width_of(font, said[:letter]), width_of(font, said[letter])
-        low = inside.center().y() + QFontMetricsF(font).ascent() / 2 + 1
-        painter.fillRect(QRectF(inside.left() + left, round(low), wide, 1), painter.pen().color())
+        left, width = width_of(font, text[:letter]), width_of(font, text[letter])
+        low = text_rect.center().y() + QFontMetricsF(font).ascent() / 2 + 1
+        painter.fillRect(QRectF(text_rect.left() + left, round(low), width, 1), painter.pen().color())
 
-    def _paint_action(self, painter: QPainter, place: QRectF, action: QAction, letter: int) -> None:
+    def _paint_action(self, painter: QPainter, action_rect: QRectF, action: QAction, letter: int) -> None:
         theme = self._theme
         if action.isSeparator():
-            line = QRectF(place.left() + 6, round(place.center().y()), place.width() - 12, 1)
+            line = QRectF(
+                action_rect.left() + 6, round(action_rect.center().y()), action_rect.width() - 12, 1
+            )
             painter.fillRect(line, theme.colour("border"))
             return
         if action is self.activeAction() and action.isEnabled():
-            box(painter, place, theme.radius("small"), theme.colour("hover"))
+            box(painter, action_rect, theme.radius("small"), theme.colour("hover"))
         side = min(theme.scaled(MARK), MAX_MARK)
-        mark = QRectF(place.left() + 9 - (side - MARK) / 4, place.center().y() - side / 2, side, side)
+        mark = QRectF(
+            action_rect.left() + 9 - (side - MARK) / 4, action_rect.center().y() - side / 2, side, side
+        )
         if action.isChecked():
             paint_icon(painter, mark, "check", theme.colour("accentText"))
         elif not action.icon().isNull():
             mode = QIcon.Mode.Normal if action.isEnabled() else QIcon.Mode.Disabled
             action.icon().paint(painter, mark.toRect(), Qt.AlignmentFlag.AlignCenter, mode)
-        own = action.shortcut().toString(QKeySequence.SequenceFormat.PortableText)
-        key = shortcut_text(own or action.text().partition("\t")[2])
-        ink = theme.colour("text" if action.isEnabled() else "textDisabled")
-        inside = place.adjusted(TEXT_LEFT, 0, -12, 0)
+        shortcut = action.shortcut().toString(QKeySequence.SequenceFormat.PortableText)
+        key = shortcut_text(shortcut or action.text().partition("\t")[2])
+        colour = theme.colour("text" if action.isEnabled() else "textDisabled")
+        text_rect = action_rect.adjusted(TEXT_LEFT, 0, -12, 0)
         text = strip_mnemonic(action.text())
-        whole = width_of(self.font(), text)
-        if whole + 12 + width_of(self.font(), key) > inside.width():
+        text_width = width_of(self.font(), text)
+        if text_width + 12 + width_of(self.font(), key) > text_rect.width():
             key = ""  # in a narrow menu the text takes precedence; shortcuts are listed on F1
-        text_line(painter, inside, text, self.font(), ink)
-        if self._by_keys and letter >= 0 and whole <= inside.width():
-            self._paint_underline(painter, inside, text, letter)
+        text_line(painter, text_rect, text, self.font(), colour)
+        if self._by_keys and letter >= 0 and text_width <= text_rect.width():
+            self._paint_underline(painter, text_rect, text, letter)
         if action.menu() is not None:
-            chevron = QRectF(inside.right() - 12, place.center().y() - 7, 14, 14)
+            chevron = QRectF(text_rect.right() - 12, action_rect.center().y() - 7, 14, 14)
             paint_icon(painter, chevron, "chevron-right", theme.colour("textTertiary"))
         elif key:
             quiet = theme.colour("textTertiary" if action.isEnabled() else "textDisabled")
-            text_line(painter, inside, key, self.font(), quiet, RIGHT)
+            text_line(painter, text_rect, key, self.font(), quiet, RIGHT)
 
 
 def open_below(menu: Menu, anchor: QWidget) -> None:
     """Open a menu below a button, aligned so that the menu stays within the window's width."""
-    place = anchor.rect().bottomLeft() + QPoint(0, 3)
-    over = anchor.mapTo(anchor.window(), place).x() + menu.sizeHint().width() - anchor.window().width()
-    if over > 0:
-        place.setX(anchor.width() - menu.sizeHint().width())
-    menu.popup(anchor.mapToGlobal(place))
+    position = anchor.rect().bottomLeft() + QPoint(0, 3)
+    overflow = anchor.mapTo(anchor.window(), position).x() + menu.sizeHint().width() - anchor.window().width()
+    if overflow > 0:
+        position.setX(anchor.width() - menu.sizeHint().width())
+    menu.popup(anchor.mapToGlobal(position))
 
 
 class ContextMenuFilter(QObject):
@@ -272,10 +280,10 @@ class ContextMenuFilter(QObject):
         field.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         field.customContextMenuRequested.connect(self._show)
 
-    def _show(self, at: QPoint) -> None:
+    def _show(self, position: QPoint) -> None:
         standard = self._field.createStandardContextMenu()
         menu = Menu(self._theme, self._field)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.destroyed.connect(standard.deleteLater)  # the standard menu owns the actions
         menu.addActions(standard.actions())
-        menu.popup(self._field.mapToGlobal(at))
+        menu.popup(self._field.mapToGlobal(position))

@@ -50,8 +50,8 @@ def box(
         return
     painter.setPen(QPen(border, width))
     inner = rect.adjusted(width / 2, width / 2, -width / 2, -width / 2)
-    inside = max(0.0, radius - width / 2)
-    painter.drawRoundedRect(inner, inside, inside)
+    inner_radius = max(0.0, radius - width / 2)
+    painter.drawRoundedRect(inner, inner_radius, inner_radius)
 
 
 def hairline(painter: QPainter, rect: QRectF, edge: Qt.Edge, colour: QColor) -> None:
@@ -87,8 +87,8 @@ def text_line(
     """Paint one line of text, elided at its end if it doesn't fit."""
     painter.setFont(font)
     painter.setPen(colour)
-    fitting = QFontMetricsF(font).elidedText(text, Qt.TextElideMode.ElideRight, rect.width() + 1)
-    painter.drawText(rect, int(align), fitting)
+    elided = QFontMetricsF(font).elidedText(text, Qt.TextElideMode.ElideRight, rect.width() + 1)
+    painter.drawText(rect, int(align), elided)
 
 
 def two_lines(font: QFont, text: str, width: float) -> list[str]:
@@ -138,28 +138,28 @@ def key_cap(painter: QPainter, theme: Theme, right: float, middle: float, key: s
     return rect
 
 
-def set_elision_tooltip(widget: QWidget, words: str) -> None:
+def set_elision_tooltip(widget: QWidget, text: str) -> None:
     """Show the full text as tooltip if the widget elides it, unless the widget has its own tooltip."""
-    own = widget.property("tip") or (widget.toolTip() and not widget.property("shortened"))
-    if own:
+    has_own_tooltip = widget.property("tip") or (widget.toolTip() and not widget.property("shortened"))
+    if has_own_tooltip:
         return
     short = widget.width() < widget.sizeHint().width() - 1
     widget.setProperty("shortened", short)
-    widget.setToolTip(plain.tip(words if short else ""))
+    widget.setToolTip(plain.tip(text if short else ""))
 
 
-def announce(widget: QWidget, words: str) -> None:
+def announce(widget: QWidget, text: str) -> None:
     """Announce a text to screen readers, for events such as alerts; not for values that change often."""
     if QAccessible.isActive():
-        QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, words))
+        QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, text))
 
 
-def show_when(widget: QWidget, shown: bool) -> None:
-    """Show a widget if `shown`, else hide it.
+def show_when(widget: QWidget, visible: bool) -> None:
+    """Show a widget if `visible`, else hide it.
 
     Unlike `setVisible`, this doesn't show a widget without a parent as a window.
     """
-    if not shown:
+    if not visible:
         widget.hide()
     elif widget.parentWidget() is not None:
         widget.show()

@@ -60,10 +60,10 @@ class _Hub(ServiceHub):
         """Subscribers to patterns."""
 
     def subscribers_of(self, topic: str) -> tuple[MemorySubscriber, ...]:
-        found = self.subscribers.get(topic, ())
+        subscribers = self.subscribers.get(topic, ())
         if not self.patterns:
-            return found
-        return (*found, *(each for each in self.patterns if matches(each.spec.topic, topic)))
+            return subscribers
+        return (*subscribers, *(each for each in self.patterns if matches(each.spec.topic, topic)))
 
     def remove_node(self, node_id: str) -> None:
         with self.lock:
@@ -170,9 +170,9 @@ class MemoryPublisher:
         with self.hub.lock:
             if not self.is_closed:
                 self.is_closed = True
-                left = [each for each in self.hub.publishers[self.spec.topic] if each is not self]
-                self.hub.publishers[self.spec.topic] = left
-                if not left:
+                remaining = [each for each in self.hub.publishers[self.spec.topic] if each is not self]
+                self.hub.publishers[self.spec.topic] = remaining
+                if not remaining:
                     del self.hub.publishers[self.spec.topic]
                 self._transport.discard(self)
                 self.hub.apply(requests.RemovePublisher(self._transport.node.id, self.spec.id, self.count))

@@ -55,9 +55,9 @@ class ServiceHub:
     def apply(self, request: requests.Request) -> None:
         """Apply a request to the graph. Raises `RequestRefusedError` if it is rejected."""
         with self.lock:
-            for each in self.graph.apply(request, 0, time.monotonic(), ""):
-                if isinstance(each.body, requests.RejectedReply):
-                    raise RequestRefusedError(each.body.reason)
+            for outgoing in self.graph.apply(request, 0, time.monotonic(), ""):
+                if isinstance(outgoing.body, requests.RejectedReply):
+                    raise RequestRefusedError(outgoing.body.reason)
 
 
 @dataclass(eq=False)
@@ -123,10 +123,12 @@ class MemoryServer:
     def begin_close(self) -> None:
         """Unregister the server and reject its queued calls."""
         with self.hub.lock:
-            left = tuple(each for each in self.hub.servers.get(self.spec.service, ()) if each is not self)
+            remaining = tuple(
+                each for each in self.hub.servers.get(self.spec.service, ()) if each is not self
+            )
             is_listed = self in self.hub.servers.get(self.spec.service, ())
-            self.hub.servers[self.spec.service] = left
-            if not left:
+            self.hub.servers[self.spec.service] = remaining
+            if not remaining:
                 del self.hub.servers[self.spec.service]
             if is_listed:
                 self.hub.apply(requests.RemovePublisher(self._node_id, self.spec.id, self.stats.calls))
@@ -138,15 +140,15 @@ class MemoryServer:
         self.begin_close()
         with self.hub.lock:
             self.is_closed = True
-            left = [
+            in_flight = [
                 call
                 for client in self.hub.clients.get(self.spec.service, ())
                 for call in client.calls
                 if call.server is self and client.remove_locked(call)
             ]
-            for call in left:
+            for call in in_flight:
                 call.client.failed += 1
-        for call in left:
+        for call in in_flight:
             call.run_callback(ServerGoneError(self.spec.service))
 
     def forked(self) -> None:
@@ -180,16 +182,16 @@ class MemoryClient:
         return list(self._calls.values())
 
     def start_call(
-        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> OpenCall:
         """Send a call. See `ClientTransport.start_call`."""
-        return self._start_call(data, timeout_s, then, None)
+        return self._start_call(data, timeout_s, callback, None)
 
     def _start_call(
         self,
         data: bytes | memoryview,
         timeout_s: float | None,
-        then: OutcomeCallback,
+        callback: OutcomeCallback,
         server: MemoryServer | None,
     ) -> OpenCall:
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
@@ -198,7 +200,7 @@ class MemoryClient:
             if self.is_closed:
                 raise self._closed_error()
             check_call_limits(self.spec.service, len(self._calls), self._bytes, len(copied))
-            call = _Call(next(self._numbers), self, copied, timeout_s, deadline, then)
+            call = _Call(next(self._numbers), self, copied, timeout_s, deadline, callback)
             self._calls[call.number] = call
             self._bytes += len(copied)
             server = server or next(iter(self.hub.servers.get(self.spec.service, ())), None)
@@ -213,12 +215,12 @@ class MemoryClient:
         return len(self.hub.servers.get(self.spec.service, ()))
 
     def start_survey(
-        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> list[OpenCall]:
         """Send a call to each server. See `SurveyTransport.start_survey`."""
         with self.hub.lock:
             servers = self.hub.servers.get(self.spec.service, ())
-            return [self._start_call(data, timeout_s, then, server) for server in servers]
+            return [self._start_call(data, timeout_s, callback, server) for server in servers]
 
     def cancel_all(self, calls: Sequence[OpenCall]) -> None:
         """Cancel several calls; their callbacks aren't called."""
@@ -238,9 +240,9 @@ class MemoryClient:
     def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self.hub.lock:
-            known = self._calls.get(call.number)
-            if known is not None:
-                self.remove_locked(known)
+            existing = self._calls.get(call.number)
+            if existing is not None:
+                self.remove_locked(existing)
 
     def send_waiting_calls(self, server: MemoryServer) -> None:
         """Send the calls that are waiting for a server to `server`. Call with the hub's lock held."""
@@ -279,9 +281,9 @@ class MemoryClient:
             if not others:
                 del self.hub.clients[self.spec.service]
             self._deadlines.remove_client(self)
-            left, self._calls = self.calls, {}
+            in_flight, self._calls = self.calls, {}
             self.hub.apply(requests.RemoveSubscriber(self._node_id, self.spec.id))
-        for call in left:
+        for call in in_flight:
             call.run_callback(self._closed_error())
 
     def forked(self) -> None:

@@ -172,9 +172,9 @@ class NanomsgServer:
                 return
             self.is_closed = True
         self._on_close(self)
-        left = min(timeout_s, self._answered_at + _LINGER_S - time.monotonic())
-        if left > 0.0 and self._socket.pipes:
-            self._disconnected.wait(left)
+        remaining_s = min(timeout_s, self._answered_at + _LINGER_S - time.monotonic())
+        if remaining_s > 0.0 and self._socket.pipes:
+            self._disconnected.wait(remaining_s)
         with self._lock:
             contexts, self._contexts = tuple(self._contexts), set()
         for context in contexts:  # before the socket: pynng can't close contexts of a closed socket

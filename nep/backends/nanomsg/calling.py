@@ -87,7 +87,7 @@ class NanomsgClient(ClientCalls[_Call]):
     # ---- calling
 
     def start_call(
-        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> OpenCall:
         """Send a call. See `ClientTransport.start_call`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
@@ -95,7 +95,7 @@ class NanomsgClient(ClientCalls[_Call]):
             if self.is_closed:
                 raise self._closed_error()
             check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
-            call = _Call(next(self._numbers), data, timeout_s, deadline, then, self._socket.new_context())
+            call = _Call(next(self._numbers), data, timeout_s, deadline, callback, self._socket.new_context())
             call.thread = threading.Thread(
                 target=self._run, args=(call,), name=f"nep-call-{self.spec.service}", daemon=True
             )
@@ -150,11 +150,11 @@ class NanomsgClient(ClientCalls[_Call]):
     def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self._lock:
-            known = self._calls.get(call.number)
-            if known is not None:
-                self._remove_locked(known)
-        if known is not None:
-            self._abandon(known)
+            existing = self._calls.get(call.number)
+            if existing is not None:
+                self._remove_locked(existing)
+        if existing is not None:
+            self._abandon(existing)
 
     def _abandon(self, call: _Call) -> None:
         # Waits for the late reply of a call that is no longer in flight. Call without the lock.
@@ -199,14 +199,14 @@ class NanomsgClient(ClientCalls[_Call]):
             if self.is_closed:
                 return
             self.is_closed = True
-            left, self._calls = list(self._calls.values()), {}
+            in_flight, self._calls = list(self._calls.values()), {}
             abandoned, self._late_calls = list(self._late_calls.values()), {}
             threads = tuple(self._threads)
         self._deadlines.remove_client(self)
         self._on_close(self)
         for call in abandoned:
             close_context(call.context)
-        for call in left:
+        for call in in_flight:
             close_context(call.context)
             self._run_callback(call, self._closed_error())
         deadline = time.monotonic() + _JOIN_TIMEOUT_S

@@ -48,14 +48,14 @@ def check_direct(direct: Direct) -> None:
         )
 
 
-def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str:  # noqa: ANN401 - pynng is not typed
+def attach(socket: Any, direct: Direct, *, is_publisher: bool, owner: str) -> str:  # noqa: ANN401 - pynng is not typed
     """Listen or dial, depending on the mode, and return the endpoint.
 
     Args:
         socket: Socket of pynng.
         direct: Address and mode.
         is_publisher: True for a publisher's socket, False for a subscriber's.
-        what: Owner of the socket, for error messages.
+        owner: Owner of the socket, for error messages.
 
     Raises:
         AddressInUseError: The address can't be bound.
@@ -63,7 +63,7 @@ def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str
     """
     address = f"{direct.ip}:{direct.port}"
     if is_publisher == (direct.mode == "one2many"):
-        listen(socket, address, what)
+        listen(socket, address, owner)
         return f"tcp://{address}"
     return dial(socket, address)
 
@@ -109,7 +109,7 @@ class DirectPublisher:
         self._socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
         try:
             self.endpoint = attach(
-                self._socket, direct, is_publisher=True, what=f"a publisher of '{spec.topic}'"
+                self._socket, direct, is_publisher=True, owner=f"a publisher of '{spec.topic}'"
             )
         except BaseException:
             self.release()
@@ -218,7 +218,7 @@ class DirectSubSocket(UnbatchedReader):
         self._sub.socket.subscribe(b"")  # frames of generation B don't start with the topic
         try:
             self.endpoint = attach(
-                self._sub.socket, direct, is_publisher=False, what=f"a subscriber of '{spec.topic}'"
+                self._sub.socket, direct, is_publisher=False, owner=f"a subscriber of '{spec.topic}'"
             )
         except BaseException:
             self.close()

@@ -61,7 +61,7 @@ class DirectServices:
         """Create a respondent."""
 
         def attach_socket(socket: object) -> str:
-            return attach(socket, direct, is_publisher=False, what=f"a respondent of '{spec.service}'")
+            return attach(socket, direct, is_publisher=False, owner=f"a respondent of '{spec.service}'")
 
         return self._create_server(spec, "Respondent0", ORIGINAL, attach_socket)
 

@@ -28,10 +28,10 @@ def format_endpoint(host: str, messages: int, hellos: int) -> str:
 
 def parse_endpoint(endpoint: str) -> tuple[str, str] | None:
     """Return the addresses (`HOST:PORT`) for messages and for hellos; None for endpoints of other schemes."""
-    found = _ENDPOINT.fullmatch(endpoint)
-    if found is None or not all(0 < int(port) < 65536 for port in found.groups()[1:]):
+    match = _ENDPOINT.fullmatch(endpoint)
+    if match is None or not all(0 < int(port) < 65536 for port in match.groups()[1:]):
         return None
-    host, messages, hellos = found.groups()
+    host, messages, hellos = match.groups()
     return f"{host}:{messages}", f"{host}:{hellos}"
 
 

@@ -113,9 +113,9 @@ class NanomsgPublisher(HandshakePublisher):
         `AddressInUseError` and `TooManyFilesError`.
         """
         if not self._endpoint:
-            what = f"a publisher of '{self.spec.topic}'"
+            owner = f"a publisher of '{self.spec.topic}'"
             messages, hellos = (
-                listen(each, f"{LOOPBACK}:0", what) for each in (self._message_socket, self._hello_socket)
+                listen(each, f"{LOOPBACK}:0", owner) for each in (self._message_socket, self._hello_socket)
             )
             self._endpoint = format_endpoint(LOOPBACK, bound_port(messages), bound_port(hellos))
         return (self._endpoint,)
@@ -188,9 +188,9 @@ class NanomsgPublisher(HandshakePublisher):
             self._pipes[pipe] = address
             self._complete_handshake_locked(address)
             return
-        gone = self._hellos.pop(self._pipes.pop(pipe, ""), None)
-        if gone is not None and gone not in self._hellos.values():  # otherwise it has reconnected
-            self._seen.pop(gone, None)
+        subscriber = self._hellos.pop(self._pipes.pop(pipe, ""), None)
+        if subscriber is not None and subscriber not in self._hellos.values():  # otherwise it has reconnected
+            self._seen.pop(subscriber, None)
             self._changed.notify_all()
 
     def _process_hello_locked(self, received: bytes) -> None:
@@ -209,8 +209,8 @@ class NanomsgPublisher(HandshakePublisher):
 
     def _discard_unconnected_hellos_locked(self) -> None:
         # Discards hellos whose connection was never established or is closed. Call with the lock held.
-        there = set(self._pipes.values())
-        self._hellos = {remote: each for remote, each in self._hellos.items() if remote in there}
+        connected = set(self._pipes.values())
+        self._hellos = {remote: each for remote, each in self._hellos.items() if remote in connected}
 
     def _complete_handshake_locked(self, address: str) -> None:
         # Sends the history, then the echo, after which the subscriber counts losses. Call with the lock held.
@@ -218,8 +218,10 @@ class NanomsgPublisher(HandshakePublisher):
         if subscriber is None or self._is_released:
             return
         self._seen[subscriber] = self.count
-        for kept in self._history:
-            self._message_socket.send(subscriber_topic_part(subscriber, self.spec.topic) + kept, block=False)
+        for message in self._history:
+            self._message_socket.send(
+                subscriber_topic_part(subscriber, self.spec.topic) + message, block=False
+            )
         self._send_notice_locked(subscriber, 0)
         self._changed.notify_all()
 
@@ -247,10 +249,12 @@ class NanomsgPublisher(HandshakePublisher):
         `deadline` is a time of `time.monotonic`.
         """
         with self._changed:
-            while self._seen and (left := deadline - time.monotonic()) > 0.0:
-                if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_RETRY_S)):
+            while self._seen and (remaining_s := deadline - time.monotonic()) > 0.0:
+                if not wait_until(self._changed, lambda: not self._seen, min(remaining_s, _BYE_RETRY_S)):
                     self._send_bye_locked()  # a full queue drops the bye like any other message
-            undelivered = [max(self.count - seen, len(self._history)) for seen in self._seen.values()]
+            undelivered = [
+                max(self.count - seen_count, len(self._history)) for seen_count in self._seen.values()
+            ]
             if any(undelivered):
                 _logger.warning(
                     "'%s' was closed before %d subscriber(s) received everything: "

@@ -120,8 +120,8 @@ class NanomsgSubSocket(UnbatchedReader):
     @property
     def problem(self) -> str:
         """Reason why messages of a listed publisher can't be received; "" if there is none."""
-        listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_silent)
-        return next((each.problem for each in listed), "")
+        failing = (each for each in self.sources.by_id.values() if each.problem and not each.is_silent)
+        return next((each.problem for each in failing), "")
 
     @property
     def has_input(self) -> bool:
@@ -149,16 +149,16 @@ class NanomsgSubSocket(UnbatchedReader):
             self._remove_link(remote.publisher.id)
             source.has_echoed = False
         source.failed_endpoint = source.problem = source.endpoint = ""
-        places = parse_endpoint(endpoint)
-        why = "" if places is None else self._create_link(remote.publisher.id, endpoint, *places)
-        if places is not None and not why:
-            source.endpoint = f"tcp://{places[0]}"
+        addresses = parse_endpoint(endpoint)
+        reason = "" if addresses is None else self._create_link(remote.publisher.id, endpoint, *addresses)
+        if addresses is not None and not reason:
+            source.endpoint = f"tcp://{addresses[0]}"
             return
         source.failed_endpoint = endpoint
         source.problem = _("can't connect to the endpoint '{shown}' of '{name}': {why}").format(
             shown=ascii(endpoint[:100])[1:-1],
             name=remote.node_name,
-            why=why or _("not an endpoint of 'nanomsg'"),
+            why=reason or _("not an endpoint of 'nanomsg'"),
         )
         if self.rejections.add(source.problem):
             _logger.warning("subscription to '%s': %s", self._name, source.problem)

@@ -62,7 +62,7 @@ class NanomsgSurveyor:
         self._socket.add_post_pipe_connect_cb(self._handle_pipe_added)
         self._socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
         try:
-            attach(self._socket, direct, is_publisher=True, what=f"a surveyor of '{spec.service}'")
+            attach(self._socket, direct, is_publisher=True, owner=f"a surveyor of '{spec.service}'")
         except BaseException:
             self._socket.close()
             raise
@@ -87,7 +87,7 @@ class NanomsgSurveyor:
             wait_until(self._changed, lambda: bool(self._pipes), timeout_s)
 
     def start_survey(
-        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> list[OpenCall]:
         """Send a request to all respondents; return one entry per respondent.
 
@@ -108,7 +108,7 @@ class NanomsgSurveyor:
             )
             self._socket.survey_time = max(1, limit_ms)
             self._survey_count += 1
-            survey = _Survey(self._survey_count, self._socket.new_context(), count, then)
+            survey = _Survey(self._survey_count, self._socket.new_context(), count, callback)
             survey.thread = threading.Thread(
                 target=self._receive_replies, args=(survey,), name=f"nep-{self.spec.service}", daemon=True
             )

@@ -13,17 +13,17 @@ from nep.text import quotable
 _DEFAULT_PORT = 11311
 
 
-def ros_master_address(given: str | None) -> str:
+def ros_master_address(address: str | None) -> str:
     """Return the ROS master's address as `HOST:PORT`.
 
     Args:
-        given: `HOST:PORT` or `http://HOST:PORT`; the port defaults to 11311. None selects $ROS_MASTER_URI,
+        address: `HOST:PORT` or `http://HOST:PORT`; the port defaults to 11311. None selects $ROS_MASTER_URI,
             or 127.0.0.1:11311 if the variable is not set.
 
     Raises:
         NepError: The address is invalid.
     """
-    text = given or os.environ.get("ROS_MASTER_URI") or f"127.0.0.1:{_DEFAULT_PORT}"
+    text = address or os.environ.get("ROS_MASTER_URI") or f"127.0.0.1:{_DEFAULT_PORT}"
     if not isinstance(text, str):
         raise NepError(
             _("an address must be a 'str' such as '{example}'").format(example=f"127.0.0.1:{_DEFAULT_PORT}")

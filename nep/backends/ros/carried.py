@@ -84,26 +84,28 @@ def installed_definition(name: str) -> Definition:
     Raises `NepError`, whose message names the package to install.
     """
     if name not in _definitions:
-        found = message_definition(name)
-        if found is None:
+        definition = message_definition(name)
+        if definition is None:
             raise not_installed_error(name, _("ROS message"))
-        _definitions[name] = parse(name, found[0])
+        _definitions[name] = parse(name, definition[0])
     return _definitions[name]
 
 
-def not_installed_error(name: str, what: str) -> NepError:
+def not_installed_error(name: str, kind: str) -> NepError:
     """Return the error for a type that isn't installed.
 
     Args:
         name: Name of the type.
-        what: Kind of the type, for the error message, such as "message type".
+        kind: Kind of the type, for the error message, such as "message type".
     """
-    known = escaped(shortened(name, 100))
+    display_name = escaped(shortened(name, 100))
     return NepError(
         _(
             "unknown {what} '{name}'; check the spelling, or install it with 'sudo apt install "
             "python3-{package}'"
-        ).format(what=what, name=known, package=known.partition("/")[0].replace("_", "-").lower())
+        ).format(
+            what=kind, name=display_name, package=display_name.partition("/")[0].replace("_", "-").lower()
+        )
     )
 
 
@@ -143,8 +145,8 @@ def _with_stamp(payload: object) -> object:
         stamp = header["stamp"]
         if not isinstance(stamp, Mapping) or stamp.keys() != {"sec", "nanosec"}:
             return payload
-        named = {"secs": stamp["sec"], "nsecs": stamp["nanosec"]}
-        return {**payload, "header": {**header, "stamp": named}}
+        ros_stamp = {"secs": stamp["sec"], "nsecs": stamp["nanosec"]}
+        return {**payload, "header": {**header, "stamp": ros_stamp}}
     secs, nsecs = divmod(time.time_ns(), 1_000_000_000)
     return {**payload, "header": {**header, "stamp": {"secs": secs, "nsecs": nsecs}}}
 
@@ -191,18 +193,18 @@ def to_ros_body(ros_type: str, codec: str, encoded: Encoded) -> bytes:
     """
     data, extension = encoded.data, encoded.extension
     if codec == "image" and extension:
-        head = bytes(4) + _current_stamp() + bytes(4)
+        header = bytes(4) + _current_stamp() + bytes(4)
         if ros_type == _RAW_IMAGE_TYPE:
-            return head + _raw_image_body(data, extension)
+            return header + _raw_image_body(data, extension)
         kind = _check_file(encoded, type(data).__name__).encode()
-        return b"".join((head, _LENGTH.pack(len(kind)), kind, _LENGTH.pack(len(data)), data))
+        return b"".join((header, _LENGTH.pack(len(kind)), kind, _LENGTH.pack(len(data)), data))
     if extension:
         raise WireError(_("a '{name}' can't carry an extension").format(name=ros_type), len(data))
     if codec == "image" and ros_type == _COMPRESSED_IMAGE_TYPE and _has_image_magic(data):
-        known = image_info(data)
-        if known is None:
+        info = image_info(data)
+        if info is None:
             raise EncodeError("image", type(data).__name__, _("not a readable image"))
-        return to_ros_body(ros_type, codec, Encoded(data, known))
+        return to_ros_body(ros_type, codec, Encoded(data, info))
     if codec in {"ros", "image"}:
         return bytes(data)
     size = _LENGTH.pack(len(data))
@@ -268,22 +270,22 @@ def unpacker_for(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> 
     Raises:
         NepError: The types aren't compatible.
     """
-    wanted = codec_for(msg_type)
+    codec = codec_for(msg_type)
     if md5sum not in {"*", _MD5SUMS.get(ros_type, md5sum)}:
         raise version_error(ros_type)
     if is_ros_type(msg_type) and msg_type != ros_type:
         raise _type_mismatch_error(msg_type, ros_type)
-    if ros_type in _IMAGE_TYPES and (msg_type in _IMAGE_TYPES or wanted is IMAGE):
+    if ros_type in _IMAGE_TYPES and (msg_type in _IMAGE_TYPES or codec is IMAGE):
         return Unpacker(
             IMAGE,
             IMAGE.name,
             _unpack_raw_image if ros_type == _RAW_IMAGE_TYPE else _unpack_compressed_image,
             True,
         )
-    if not is_ros_type(msg_type) and ros_type == _CARRIER_TYPES[wanted.name]:
+    if not is_ros_type(msg_type) and ros_type == _CARRIER_TYPES[codec.name]:
         read = _unpack_string if ros_type == _STRING_TYPE else _unpack_array
-        return Unpacker(wanted, msg_type, read, has_header=False)
-    if not is_ros_type(msg_type) and wanted is not CODECS["json"]:
+        return Unpacker(codec, msg_type, read, has_header=False)
+    if not is_ros_type(msg_type) and codec is not CODECS["json"]:
         raise _type_mismatch_error(msg_type, ros_type)
     definition = parse(ros_type, text) if text else _matching_definition(ros_type, md5sum)
     return Unpacker(ros_codec(definition), ros_type, lambda body: (body, None), definition.has_header)
@@ -291,8 +293,8 @@ def unpacker_for(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> 
 
 def _matching_definition(ros_type: str, md5sum: str) -> Definition:
     # For a publisher that doesn't announce its definition.
-    definition, found = installed_definition(ros_type), message_definition(ros_type)
-    if found is None or md5sum not in {"*", found[1]}:
+    definition, installed = installed_definition(ros_type), message_definition(ros_type)
+    if installed is None or md5sum not in {"*", installed[1]}:
         raise version_error(ros_type)
     return definition
 
@@ -316,16 +318,16 @@ def _type_mismatch_error(msg_type: str, ros_type: str) -> NepError:
     )
 
 
-def _read_sized(body: memoryview, at: int) -> tuple[memoryview, int]:
+def _read_sized(body: memoryview, offset: int) -> tuple[memoryview, int]:
     # Returns the bytes after the length at `at`, and the offset of their end.
-    (size,) = _LENGTH.unpack_from(body, at)
-    if at + 4 + size > len(body):
+    (size,) = _LENGTH.unpack_from(body, offset)
+    if offset + 4 + size > len(body):
         raise WireError(_("the data is truncated"), len(body))
-    return body[at + 4 : at + 4 + size], at + 4 + size
+    return body[offset + 4 : offset + 4 + size], offset + 4 + size
 
 
-def _read_all(body: memoryview, at: int) -> memoryview:
-    data, end = _read_sized(body, at)
+def _read_all(body: memoryview, offset: int) -> memoryview:
+    data, end = _read_sized(body, offset)
     if end != len(body):
         raise WireError(
             _("{count} unexpected bytes follow the message").format(count=len(body) - end), len(body)
@@ -339,20 +341,20 @@ def _unpack_string(body: memoryview) -> UnpackedData:
 
 def _unpack_array(body: memoryview) -> UnpackedData:
     (count,) = _LENGTH.unpack_from(body, 0)
-    at = 4
+    position = 4
     if count * 12 > len(body):
         raise WireError(_("the data is truncated"), len(body))
     for _number in range(count):
-        _label, at = _read_sized(body, at)
-        at += 8
-    (offset,) = _LENGTH.unpack_from(body, at)
-    return _read_all(body, at + 4)[offset:], None
+        _label, position = _read_sized(body, position)
+        position += 8
+    (offset,) = _LENGTH.unpack_from(body, position)
+    return _read_all(body, position + 4)[offset:], None
 
 
 def _unpack_compressed_image(body: memoryview) -> UnpackedData:
-    _frame, at = _read_sized(body, STAMP.size)
-    kind, at = _read_sized(body, at)
-    data = _read_all(body, at)
+    _frame, offset = _read_sized(body, STAMP.size)
+    kind, offset = _read_sized(body, offset)
+    data = _read_all(body, offset)
     if b"compressedDepth" in bytes(kind) and bytes(kind[:4]) == b"16UC":
         data = data[_DEPTH_HEADER_BYTES:]
     return data, image_info(data)
@@ -360,11 +362,11 @@ def _unpack_compressed_image(body: memoryview) -> UnpackedData:
 
 def _unpack_raw_image(body: memoryview) -> UnpackedData:
     # Returns the rows without padding, in little-endian order.
-    _frame, at = _read_sized(body, STAMP.size)
-    height, width = struct.unpack_from("<II", body, at)
-    name, at = _read_sized(body, at + 8)
-    is_big, step = struct.unpack_from("<BI", body, at)
-    pixels = _read_all(body, at + 5)
+    _frame, offset = _read_sized(body, STAMP.size)
+    height, width = struct.unpack_from("<II", body, offset)
+    name, offset = _read_sized(body, offset + 8)
+    is_big, step = struct.unpack_from("<BI", body, offset)
+    pixels = _read_all(body, offset + 5)
     encoding = str(name, "utf-8", "replace")
     encoding = f"{encoding}C1" if encoding in {"8U", "16U", "32F"} else encoding
     layout = raw_layout(encoding)
@@ -383,7 +385,7 @@ def _unpack_raw_image(body: memoryview) -> UnpackedData:
             )
         )
     if step != row:
-        pixels = memoryview(b"".join(pixels[at : at + row] for at in range(0, len(pixels), step)))
+        pixels = memoryview(b"".join(pixels[offset : offset + row] for offset in range(0, len(pixels), step)))
     if is_big and size > 1:
         pixels = _swap_bytes(pixels, size)
     return pixels, {"shape": [height, width, layout.channels], "encoding": encoding}

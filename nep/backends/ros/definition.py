@@ -162,9 +162,9 @@ def parse(name: str, text: str) -> Definition:
     sections = _SEPARATOR.split(text)
     texts = {name: sections[0]}
     for section in sections[1:]:
-        head = _SECTION_HEADER.match(section)
-        if head is not None:
-            texts[head[1]] = section[head.end() :]
+        header = _SECTION_HEADER.match(section)
+        if header is not None:
+            texts[header[1]] = section[header.end() :]
     parser = _Parser(name, texts)
     fields = parser.fields_of(name, 0)
     return Definition(name, text, fields, parser.has_header)
@@ -185,41 +185,41 @@ class _Parser:
             stripped = line.partition("#")[0].strip()
             if not stripped or _CONSTANT.match(line.strip()):
                 continue
-            found = _FIELD.fullmatch(stripped)
+            match = _FIELD.fullmatch(stripped)
             self._count += 1
-            if found is None or self._count > _MAX_FIELDS or found[4] in names:
+            if match is None or self._count > _MAX_FIELDS or match[4] in names:
                 raise self._definition_error(stripped)
-            names.add(found[4])
+            names.add(match[4])
             if depth == 0 and not fields:
-                self.has_header = found[1] in _HEADER_TYPES and not found[2] and found[4] == "header"
-            kind = self._kind(name, found[1], depth)
-            if found[2]:
-                kind = _array_kind(kind, int(found[3]) if found[3] else None)
-            fields.append(DefinitionField(found[4], kind))
+                self.has_header = match[1] in _HEADER_TYPES and not match[2] and match[4] == "header"
+            kind = self._kind(name, match[1], depth)
+            if match[2]:
+                kind = _array_kind(kind, int(match[3]) if match[3] else None)
+            fields.append(DefinitionField(match[4], kind))
         return tuple(fields)
 
-    def _kind(self, inside: str, written: str, depth: int) -> FieldKind:
+    def _kind(self, parent_name: str, written: str, depth: int) -> FieldKind:
         basic = _basic_kind(written)
         if basic is not None:
             return basic
-        name = self._resolve_name(inside, written)
-        known = self._known.get(name)
-        if known is None:
+        name = self._resolve_name(parent_name, written)
+        kind = self._known.get(name)
+        if kind is None:
             if depth >= _MAX_DEPTH:
                 raise self._definition_error(written)
-            known = self._known[name] = _nested_kind(name, self.fields_of(name, depth + 1))
-        return known
+            kind = self._known[name] = _nested_kind(name, self.fields_of(name, depth + 1))
+        return kind
 
-    def _resolve_name(self, inside: str, written: str) -> str:
+    def _resolve_name(self, parent_name: str, written: str) -> str:
         if written in _HEADER_TYPES:
             candidates = ["std_msgs/Header", written]
         elif "/" in written:
             candidates = [written]
         else:
-            candidates = [f"{inside.partition('/')[0]}/{written}"]
-        for each in candidates:
-            if each in self._texts:
-                return each
+            candidates = [f"{parent_name.partition('/')[0]}/{written}"]
+        for candidate in candidates:
+            if candidate in self._texts:
+                return candidate
         raise self._definition_error(written)
 
     def _definition_error(self, part: str) -> NepError:
@@ -317,8 +317,8 @@ def _to_secs_and_nsecs(value: object, path: str, name: str) -> tuple[int, int]:
         if secs is not None and nsecs is not None:
             return secs, nsecs
     elif isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1 << 33:
-        whole = round(value * 1_000_000_000) if isinstance(value, float) else value * 1_000_000_000
-        return divmod(whole, 1_000_000_000)
+        total_ns = round(value * 1_000_000_000) if isinstance(value, float) else value * 1_000_000_000
+        return divmod(total_ns, 1_000_000_000)
     raise _type_error(path, value, name)
 
 
@@ -407,14 +407,14 @@ def _list_writer(name: str, kind: FieldKind, length: int | None) -> Callable[[ob
         if not isinstance(values, Sequence) or isinstance(values, str | bytes | bytearray):
             raise _type_error(path, value, name)
         _write_length(len(values), length, path, out)
-        if format_char and not any(type(each) is bool for each in values):
+        if format_char and not any(type(item) is bool for item in values):
             try:
                 out += struct.pack(f"<{len(values)}{format_char}", *values)
                 return
             except (struct.error, OverflowError, TypeError, ValueError):
                 pass  # encode one by one to find the invalid item
-        for number, each in enumerate(values):
-            kind.write(each, f"{path}[{number}]", out)
+        for number, item in enumerate(values):
+            kind.write(item, f"{path}[{number}]", out)
 
     return write
 
@@ -463,13 +463,13 @@ def _write_fields(
         if not path:
             raise _FieldError("", _not_a_map_reason(fields))
         raise _type_error(path, payload, name)
-    for each in fields:
-        if each.name in payload:
-            each.kind.write(payload[each.name], f"{path}.{each.name}" if path else each.name, out)
+    for field in fields:
+        if field.name in payload:
+            field.kind.write(payload[field.name], f"{path}.{field.name}" if path else field.name, out)
         else:
-            out += bytes(each.kind.min_bytes)  # zero and empty values are zero bytes in every type
-    if len(payload) > len(fields) or not payload.keys() <= {each.name for each in fields}:
-        names = tuple(each.name for each in fields)
+            out += bytes(field.kind.min_bytes)  # zero and empty values are zero bytes in every type
+    if len(payload) > len(fields) or not payload.keys() <= {field.name for field in fields}:
+        names = tuple(field.name for field in fields)
         raise _unknown_field_error(path, next(key for key in payload if key not in names), names)
 
 
@@ -478,12 +478,12 @@ def _read_fields(fields: tuple[DefinitionField, ...], reader: _Reader, path: str
     reader.messages_left -= 1
     if reader.messages_left < 0:
         raise _FieldError(path, _("contains more nested messages than the data can hold"))
-    for each in fields:
-        where = f"{path}.{each.name}" if path else each.name
+    for field in fields:
+        field_path = f"{path}.{field.name}" if path else field.name
         try:
-            values[each.name] = each.kind.read(reader, where)
+            values[field.name] = field.kind.read(reader, field_path)
         except struct.error:
-            raise _FieldError(where, _("is truncated")) from None
+            raise _FieldError(field_path, _("is truncated")) from None
     return values
 
 
@@ -510,9 +510,9 @@ def _type_error(path: str, value: object, name: str) -> _FieldError:
 
 
 def _unknown_field_error(path: str, key: object, names: tuple[str, ...]) -> _FieldError:
-    where = f"{path}.{key}" if path else str(key)
+    field_path = f"{path}.{key}" if path else str(key)
     return _FieldError(
-        escaped(shortened(where, 200)),
+        escaped(shortened(field_path, 200)),
         _("doesn't exist; {did_you_mean}").format(did_you_mean=did_you_mean(str(key), names)),
     )
 

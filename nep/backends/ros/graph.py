@@ -54,43 +54,45 @@ class LocalNode:
     clients: tuple[tuple[str, SubscriberCount], ...] = ()
 
 
-def graph_view(known: RosSystemState, own: list[LocalNode]) -> GraphView:
+def graph_view(state: RosSystemState, local_nodes: list[LocalNode]) -> GraphView:
     """Return the graph of a ROS network.
 
     The process's own ROS node is listed as its nep nodes. The rates of other nodes are unknown, because ROS
     doesn't report them.
 
     Args:
-        known: Snapshot of the ROS master.
-        own: nep nodes of this process.
+        state: Snapshot of the ROS master.
+        local_nodes: nep nodes of this process.
     """
     graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
-    for topic, name in _foreign_entries(known.publishers, own, lambda each: each.publishers):
-        kind = known.types.get(topic, "*")
-        uri = known.uris.get(name, "")
+    for topic, name in _foreign_entries(state.publishers, local_nodes, lambda each: each.publishers):
+        kind = state.types.get(topic, "*")
+        uri = state.uris.get(name, "")
         codec = _CODECS.get(kind, "ros")
         record = PublisherRecord(publisher_id(name, topic), topic, kind, codec, (uri,) if uri else ())
         _apply_request(graph, AddPublisher(_node_record(name, uri), record))
-    for topic, name in _foreign_entries(known.subscribers, own, lambda each: each.subscribers):
-        subscriber_count = SubscriberRecord(_stable_id(name, topic, "i"), topic, known.types.get(topic, "*"))
-        _apply_request(graph, AddSubscriber(_node_record(name, known.uris.get(name, "")), subscriber_count))
-    for service, name in _foreign_entries(known.services, own, lambda each: each.servers):
-        node = _node_record(name, known.uris.get(name, ""))
+    for topic, name in _foreign_entries(state.subscribers, local_nodes, lambda each: each.subscribers):
+        subscriber_count = SubscriberRecord(_stable_id(name, topic, "i"), topic, state.types.get(topic, "*"))
+        _apply_request(graph, AddSubscriber(_node_record(name, state.uris.get(name, "")), subscriber_count))
+    for service, name in _foreign_entries(state.services, local_nodes, lambda each: each.servers):
+        node = _node_record(name, state.uris.get(name, ""))
         _apply_request(graph, _server_request(node, _stable_id(name, service, "s"), service))
-    for each in own:
-        if each.ros_name:
-            _add_local_node(graph, each, known.uris.get(each.ros_name, ""))
+    for local_node in local_nodes:
+        if local_node.ros_name:
+            _add_local_node(graph, local_node, state.uris.get(local_node.ros_name, ""))
     return graph.view()
 
 
 def _foreign_entries(
-    known: Mapping[str, Sequence[str]],
-    own: list[LocalNode],
+    nodes_by_name: Mapping[str, Sequence[str]],
+    local_nodes: list[LocalNode],
     rows_of: Callable[[LocalNode], Sequence[tuple[object, ...]]],
 ) -> Iterator[tuple[str, str]]:
     # Yields (topic or service, node name) of nodes other than this process's nep nodes.
-    mine = {(row[0], each.ros_name) for each in own for row in rows_of(each)}
-    return ((each, node) for each, nodes in known.items() for node in nodes if (each, node) not in mine)
+    mine = {(row[0], each.ros_name) for each in local_nodes for row in rows_of(each)}
+    return (
+        (each, node) for each, nodes in nodes_by_name.items() for node in nodes if (each, node) not in mine
+    )
 
 
 def _server_request(node: NodeRecord, server_id: int, service: str, uri: str = "") -> AddPublisher:
@@ -100,24 +102,24 @@ def _server_request(node: NodeRecord, server_id: int, service: str, uri: str = "
     )
 
 
-def _add_local_node(graph: Graph, own: LocalNode, uri: str) -> None:
-    node = replace(own.node, generation=_GENERATION)
-    for topic, kind, is_latched, count in own.publishers:
+def _add_local_node(graph: Graph, local_node: LocalNode, uri: str) -> None:
+    node = replace(local_node.node, generation=_GENERATION)
+    for topic, kind, is_latched, count in local_node.publishers:
         codec = _CODECS.get(kind, "ros")
         record = PublisherRecord(count.id, topic, kind, codec, (uri,) if uri else (), is_latched)
         _apply_request(graph, AddPublisher(node, record))
-    for topic, kind, subscriber_count in own.subscribers:
+    for topic, kind, subscriber_count in local_node.subscribers:
         _apply_request(graph, AddSubscriber(node, SubscriberRecord(subscriber_count.id, topic, kind)))
-    for service, count in own.servers:
+    for service, count in local_node.servers:
         _apply_request(graph, _server_request(node, count.id, service, uri))
-    for service, subscriber_count in own.clients:
+    for service, subscriber_count in local_node.clients:
         _apply_request(
             graph, AddSubscriber(node, SubscriberRecord(subscriber_count.id, topic_of(service), SERVICE_TYPE))
         )
-    counts = (*(each[-1] for each in own.publishers), *(count for _, count in own.servers))
+    counts = (*(each[-1] for each in local_node.publishers), *(count for _, count in local_node.servers))
     subscriber_counts = (
-        *(each[-1] for each in own.subscribers),
-        *(subscriber_count for _, subscriber_count in own.clients),
+        *(each[-1] for each in local_node.subscribers),
+        *(subscriber_count for _, subscriber_count in local_node.clients),
     )
     _apply_request(graph, Renew(node.id, graph.epoch, graph.revision, counts, subscriber_counts))
 
@@ -137,7 +139,7 @@ def publisher_id(node: str, topic: str) -> int:
     return _stable_id(node, topic, "o")
 
 
-def _stable_id(*words: str) -> int:
+def _stable_id(*parts: str) -> int:
     # The id must be the same in every process.
-    digest = hashlib.sha256("\0".join(words).encode()).digest()
+    digest = hashlib.sha256("\0".join(parts).encode()).digest()
     return int.from_bytes(digest[:8], "little") >> 1 or 1

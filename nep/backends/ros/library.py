@@ -38,11 +38,11 @@ class RosFinder(MetaPathFinder):
     """Import finder that searches system folders, but only for ROS packages.
 
     Args:
-        places: Folders to search.
+        folders: Folders to search.
     """
 
-    def __init__(self, places: Sequence[str]) -> None:
-        self._places = list(places)
+    def __init__(self, folders: Sequence[str]) -> None:
+        self._places = list(folders)
         self.extra: set[str] = set()
 
     def find_spec(
@@ -72,8 +72,8 @@ def _forked() -> None:
     if at_exit is not None:
         atexit.unregister(at_exit)  # it would unregister the parent's publishers and subscribers
     topics = sys.modules["rospy.impl.registration"].get_topic_manager()
-    for each in [*topics.pubs.values(), *topics.subs.values()]:
-        for connection in each.connections:
+    for impl in [*topics.pubs.values(), *topics.subs.values()]:
+        for connection in impl.connections:
             if connection.socket is not None:
                 connection.socket.close()
 
@@ -132,21 +132,21 @@ class ServiceDefinition(NamedTuple):
 
 def message_definition(name: str) -> tuple[str, str] | None:
     """Return the definition and MD5 sum of a message type, or None if it is not installed."""
-    found = _installed_class(name, "msg")
-    text, checksum = getattr(found, "_full_text", None), getattr(found, "_md5sum", None)
+    message_class = _installed_class(name, "msg")
+    text, checksum = getattr(message_class, "_full_text", None), getattr(message_class, "_md5sum", None)
     return (text, checksum) if isinstance(text, str) and isinstance(checksum, str) else None
 
 
 def service_definition(name: str) -> ServiceDefinition | None:
     """Return the definition of a service type such as "std_srvs/SetBool"; None if it is not installed."""
-    found = _installed_class(name, "srv")
-    request, answer = (
-        getattr(getattr(found, each, None), "_full_text", None)
+    service_class = _installed_class(name, "srv")
+    request, response = (
+        getattr(getattr(service_class, each, None), "_full_text", None)
         for each in ("_request_class", "_response_class")
     )
-    md5sum = getattr(found, "_md5sum", None)
-    if isinstance(request, str) and isinstance(answer, str) and isinstance(md5sum, str):
-        return ServiceDefinition(request, answer, md5sum)
+    md5sum = getattr(service_class, "_md5sum", None)
+    if isinstance(request, str) and isinstance(response, str) and isinstance(md5sum, str):
+        return ServiceDefinition(request, response, md5sum)
     return None
 
 
@@ -165,12 +165,12 @@ def _installed_class(name: str, folder: str) -> object:
 
 def _has_folder(package: str, folder: str) -> bool:
     # Checks for files, without importing the package.
-    if any(Path(place, package, folder, "__init__.py").is_file() for place in SEARCH_FOLDERS):
+    if any(Path(location, package, folder, "__init__.py").is_file() for location in SEARCH_FOLDERS):
         _finder.extra.add(package)
         return True
     try:
-        found = importlib.util.find_spec(package)
+        spec = importlib.util.find_spec(package)
     except (ImportError, ValueError):
         return False
-    places = () if found is None else found.submodule_search_locations or ()
-    return any(Path(place, folder, "__init__.py").is_file() for place in places)
+    locations = () if spec is None else spec.submodule_search_locations or ()
+    return any(Path(location, folder, "__init__.py").is_file() for location in locations)

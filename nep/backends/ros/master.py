@@ -132,9 +132,11 @@ class RosMaster:
         pause = threading.Event()
         while True:
             waited = time.monotonic() - started
-            left = _REQUEST_TIMEOUT_S if timeout_s is None else min(_REQUEST_TIMEOUT_S, timeout_s - waited)
+            request_timeout_s = (
+                _REQUEST_TIMEOUT_S if timeout_s is None else min(_REQUEST_TIMEOUT_S, timeout_s - waited)
+            )
             try:
-                _call(self.uri, left, "getPid", _CALLER_ID)
+                _call(self.uri, request_timeout_s, "getPid", _CALLER_ID)
                 return
             except _REQUEST_ERRORS as error:
                 waited = time.monotonic() - started
@@ -145,8 +147,8 @@ class RosMaster:
     def names(self, topic: str, timeout_s: float) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the names of a topic's publishing nodes and of its subscribing nodes."""
         state = self._request("getSystemState", timeout_s)
-        found = [next((tuple(names) for each, names in part if each == topic), ()) for part in state[:2]]
-        return found[0], found[1]
+        node_names = [next((tuple(names) for each, names in part if each == topic), ()) for part in state[:2]]
+        return node_names[0], node_names[1]
 
     def is_node_unknown(self, name: str, timeout_s: float) -> bool:
         """Return True if the master replies but doesn't list the node `name`, for example after a restart."""
@@ -173,8 +175,8 @@ class RosMaster:
             for service, address in node.services:
                 _call(self.uri, timeout_s, "registerService", name, service, address, uri)
             for topic, kind in node.subscriptions:
-                found = _call(self.uri, timeout_s, "registerSubscriber", name, topic, kind, uri)
-                _call(uri, timeout_s, "publisherUpdate", "/master", topic, found)
+                publishers = _call(self.uri, timeout_s, "registerSubscriber", name, topic, kind, uri)
+                _call(uri, timeout_s, "publisherUpdate", "/master", topic, publishers)
         except _REQUEST_ERRORS:
             return False
         return True
@@ -217,11 +219,11 @@ class RosMaster:
                 calls = xmlrpc.client.MultiCall(proxy)
                 for name in names:
                     calls.lookupNode(_CALLER_ID, name)
-                given: Any = calls() if names else []
-                answers: list[Any] = [given[number] for number in range(len(names))]
+                results: Any = calls() if names else []
+                replies: list[Any] = [results[number] for number in range(len(names))]
         except _REQUEST_ERRORS:
             return {}
-        return {name: str(each[2]) for name, each in zip(names, answers, strict=False) if each[0] == 1}
+        return {name: str(each[2]) for name, each in zip(names, replies, strict=False) if each[0] == 1}
 
     def _request(self, method: str, timeout_s: float) -> Any:  # noqa: ANN401 - any value
         try:

@@ -125,10 +125,10 @@ class RosProcess:
         registration = self.rospy.impl.registration
         topics, services = registration.get_topic_manager(), registration.get_service_manager().get_services()
         with topics.lock:  # a registration removed meanwhile must not be restored
-            known = NodeRegistrations(topics.get_publications(), topics.get_subscriptions(), services)
-            return bool(known.publications or known.subscriptions or services) and self.master.register(
-                self.name, self.uri, known, _REQUEST_TIMEOUT_S
-            )
+            registrations = NodeRegistrations(topics.get_publications(), topics.get_subscriptions(), services)
+            return bool(
+                registrations.publications or registrations.subscriptions or services
+            ) and self.master.register(self.name, self.uri, registrations, _REQUEST_TIMEOUT_S)
 
     def resolved(self, topic: str) -> str:
         """Return the full name of a topic."""
@@ -151,22 +151,22 @@ class RosProcess:
         with self._lock:
             impl = self.rospy.impl.registration.get_topic_manager().get_publisher_impl(topic)
             # may be the program's own, such as that of /rosout
-            own = definition.name if impl is None else impl.type
-            known, users = self._types.get(topic, (own, 0))
-            if known != definition.name:
+            default_type = definition.name if impl is None else impl.type
+            topic_type, users = self._types.get(topic, (default_type, 0))
+            if topic_type != definition.name:
                 raise NepError(
                     _(
                         "this program publishes '{known}' on '{topic}', and ROS allows only one type per "
                         "topic "
                         "in a program; publish '{name}' on another topic"
-                    ).format(known=known, topic=topic, name=definition.name)
+                    ).format(known=topic_type, topic=topic, name=definition.name)
                 )
-            made = self.rospy.Publisher(
+            publisher = self.rospy.Publisher(
                 topic, self._message_class(definition), subscriber_listener=self, tcp_nodelay=True,
                 latch=is_latched, queue_size=queue,
             )  # fmt: skip
             self._types[topic] = definition.name, users + 1
-        return made
+        return publisher
 
     def add_publisher(self, topic: str, id_: int, publisher: Any) -> None:  # noqa: ANN401 - rospy is not typed
         """Register a nep publisher that uses the rospy publisher returned by `advertise`."""
@@ -185,10 +185,10 @@ class RosProcess:
         have several publishers on the topic, or if the program itself also publishes on it.
         """
         with self._lock:
-            found = self._published.get(topic, {})
-            if len(found) != 1:
+            publishers = self._published.get(topic, {})
+            if len(publishers) != 1:
                 return None
-            ((id_, publisher),) = found.items()
+            ((id_, publisher),) = publishers.items()
             impl = publisher.impl
             return id_ if impl is not None and impl.ref_count == 1 else None
 
@@ -197,8 +197,8 @@ class RosProcess:
         if self.is_shut_down or not run_with_timeout(publisher.unregister, timeout_s):
             return  # rospy still has the topic
         with self._lock:
-            known, users = self._types[topic]
-            self._types[topic] = known, users - 1
+            topic_type, users = self._types[topic]
+            self._types[topic] = topic_type, users - 1
             if users == 1:
                 del self._types[topic]
 
@@ -217,9 +217,9 @@ class RosProcess:
         impl = publisher.impl
         pause = threading.Event()
         while True:
-            left = sum(_has_unsent_data(each) for each in ([] if impl is None else impl.connections))
-            if not left or time.monotonic() >= deadline:
-                return left
+            unsent_count = sum(_has_unsent_data(each) for each in ([] if impl is None else impl.connections))
+            if not unsent_count or time.monotonic() >= deadline:
+                return unsent_count
             pause.wait(_POLL_S)
 
     def send(self, publisher: Any, definition: Definition, topic: str, body: bytes, room: QueueLimit) -> int:  # noqa: ANN401
@@ -250,24 +250,25 @@ class RosProcess:
 
     def _message_class(self, definition: Definition) -> type:
         # Creates a message class whose instances hold encoded bodies.
-        made = self._classes.get(definition.name)
-        if made is None:
+        message_class = self._classes.get(definition.name)
+        if message_class is None:
             genpy = self.rospy.msg.genpy
-            known = genpy.message.get_message_class(definition.name)
+            installed_class = genpy.message.get_message_class(definition.name)
 
             def serialize(message: Any, buffer: Any) -> None:  # noqa: ANN401 - rospy is not typed
                 buffer.write(message.body)
 
-            made = self._classes[definition.name] = type(
+            message_class = self._classes[definition.name] = type(
                 "EncodedMessage",
                 (genpy.Message,),
                 {
                     "__slots__": ["body"], "_slot_types": ["uint8[]"], "_has_header": False,
-                    "_type": definition.name, "_md5sum": known._md5sum, "_full_text": definition.text,  # noqa: SLF001
+                    "_type": definition.name, "_md5sum": installed_class._md5sum,  # noqa: SLF001
+                    "_full_text": definition.text,
                     "serialize": serialize,
                 },
             )  # fmt: skip
-        return made
+        return message_class
 
     # ---- services
 
@@ -327,15 +328,17 @@ class RosProcess:
             for name in self.master.names(topic, _REQUEST_TIMEOUT_S)[0]
         }
         for uri in filter(None, uris.values()):
-            while (left := deadline - time.monotonic()) > 0.0 and not self._is_connected_to(uri, topic, left):
+            while (remaining_s := deadline - time.monotonic()) > 0.0 and not self._is_connected_to(
+                uri, topic, remaining_s
+            ):
                 pause.wait(_POLL_S)
 
     def _is_connected_to(self, uri: str, topic: str, timeout_s: float) -> bool:
         if uri != self.uri:
             buses = connections_of(uri, timeout_s)
             return not buses or (self.name, "o", topic) in buses
-        own = self.rospy.topics.get_topic_manager().get_publisher_impl(topic)
-        return own is None or self.name in {each.endpoint_id for each in own.connections}
+        impl = self.rospy.topics.get_topic_manager().get_publisher_impl(topic)
+        return impl is None or self.name in {each.endpoint_id for each in impl.connections}
 
 
 def run_with_timeout(call: Callable[[], object], timeout_s: float) -> bool:
@@ -414,14 +417,14 @@ def _set_own_address(master: str) -> None:
     for name in ("ROS_IP", "ROS_HOSTNAME"):
         if os.environ.get(name) == "":
             del os.environ[name]  # rospy would print a line for each connection
-    own = os.environ.get("ROS_IP")
-    if own is not None:
+    ros_ip = os.environ.get("ROS_IP")
+    if ros_ip is not None:
         try:
-            ipaddress.ip_address(own)
+            ipaddress.ip_address(ros_ip)
         except ValueError:
             raise NepError(
                 _("ROS_IP is '{value}'; set it to the IP address of this computer").format(
-                    value=escaped(shortened(own, 100))
+                    value=escaped(shortened(ros_ip, 100))
                 )
             ) from None
     elif is_loopback_address(master) and "ROS_HOSTNAME" not in os.environ:
@@ -430,26 +433,29 @@ def _set_own_address(master: str) -> None:
 
 def _start_process(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401 - rospy is not typed
     if rospy.core.is_initialized():  # the program has started rospy itself
-        found = RosProcess(rospy, ros_master_address(rospy.core.rosgraph.get_master_uri()))
-        _defer_shutdown(found)
-        return found
+        existing = RosProcess(rospy, ros_master_address(rospy.core.rosgraph.get_master_uri()))
+        _defer_shutdown(existing)
+        return existing
     os.environ["ROS_MASTER_URI"] = f"http://{address}"
     _set_own_address(address)
-    word = _INVALID_CHARACTERS.sub("_", name).strip("_")
-    word = word if word[:1].isalpha() else f"nep_{word}"
+    node_name = _INVALID_CHARACTERS.sub("_", name).strip("_")
+    node_name = node_name if node_name[:1].isalpha() else f"nep_{node_name}"
     configure = rospy.core.configure_logging
     # it would replace the program's log configuration
     rospy.core.configure_logging = lambda *_args, **_keywords: None
     try:
-        rospy.init_node(word[:100], anonymous=True, disable_signals=True)
+        rospy.init_node(node_name[:100], anonymous=True, disable_signals=True)
     finally:
         rospy.core.configure_logging = configure
-    made = RosProcess(rospy, address)
-    _defer_shutdown(made)
-    for uri in (made.uri, f"http://{ros_master_address(made.uri).rpartition(':')[0]}:{_tcp_port(rospy)}"):
+    process = RosProcess(rospy, address)
+    _defer_shutdown(process)
+    for uri in (
+        process.uri,
+        f"http://{ros_master_address(process.uri).rpartition(':')[0]}:{_tcp_port(rospy)}",
+    ):
         port = uri.rstrip("/").rpartition(":")[2]
         close_in_child(f"tcp://127.0.0.1:{port}", f"tcp://0.0.0.0:{port}")
-    return made
+    return process
 
 
 def _defer_shutdown(process: RosProcess) -> None:

@@ -43,9 +43,9 @@ def _drop_oldest(connection: Any, max_bytes: int | None) -> int:  # noqa: ANN401
         queue: list[bytes] = connection._queue  # noqa: SLF001 - its thread removes all of it at once
         drop_count = max(0, len(queue) - queue_size + 1)
         if max_bytes is not None and len(queue) > drop_count:
-            left = sum(map(len, queue)) - sum(map(len, queue[:drop_count]))
-            while left > max_bytes and drop_count < len(queue):
-                left -= len(queue[drop_count])
+            total_bytes = sum(map(len, queue)) - sum(map(len, queue[:drop_count]))
+            while total_bytes > max_bytes and drop_count < len(queue):
+                total_bytes -= len(queue[drop_count])
                 drop_count += 1
         del queue[:drop_count]
     return drop_count

@@ -63,7 +63,7 @@ class RosClient(ClientCalls[_Call]):
         )
 
     def start_call(
-        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> OpenCall:
         """Send a call. See `ClientTransport.start_call`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
@@ -71,7 +71,7 @@ class RosClient(ClientCalls[_Call]):
             if self.is_closed:
                 raise self._closed_error()
             check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
-            call = _Call(next(self._numbers), bytes(data), timeout_s, deadline, then)
+            call = _Call(next(self._numbers), bytes(data), timeout_s, deadline, callback)
             self._calls[call.number] = call
             self._bytes += len(call.data)
             self._queue_for_discovery_locked(call)
@@ -139,9 +139,9 @@ class RosClient(ClientCalls[_Call]):
 
     def _retry_discovery(self, call: _Call) -> None:
         # Waits first, so that a registered but unreachable server isn't retried in a tight loop.
-        left = call.deadline - time.monotonic()
-        self._closed.wait(max(0.0, min(_RETRY_S, left)))
-        if left <= 0.0:
+        remaining_s = call.deadline - time.monotonic()
+        self._closed.wait(max(0.0, min(_RETRY_S, remaining_s)))
+        if remaining_s <= 0.0:
             self._finish(call, NoServerError(self.spec.service, call.timeout_s or 0.0))
             return
         with self._lock:
@@ -164,7 +164,7 @@ class RosClient(ClientCalls[_Call]):
                 return self._closed_error()  # discarded
             call.connection = connection
         try:
-            is_carried_out, answer = connection.call(
+            is_carried_out, response = connection.call(
                 kind.encode_call(self.spec.codec, call.data, call.timeout_s)
             )
         except TimeoutError:
@@ -172,10 +172,10 @@ class RosClient(ClientCalls[_Call]):
         except OSError:
             return ServerGoneError(self.spec.service)
         if is_carried_out:
-            return kind.decode_reply(answer, self.spec.codec)
+            return kind.decode_reply(response, self.spec.codec)
         if kind is NEP_CALL:  # servers of this type report errors differently
             return ServerGoneError(self.spec.service)
-        return error_reply(CallKind.ERROR, "ServiceException", answer.decode("utf-8", "replace"))
+        return error_reply(CallKind.ERROR, "ServiceException", response.decode("utf-8", "replace"))
 
     def _type_of(self, connection: ServiceConnection) -> ServiceType:
         kind = installed_service(connection.header["type"])
@@ -186,10 +186,10 @@ class RosClient(ClientCalls[_Call]):
     def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self._lock:
-            known = self._calls.get(call.number)
-            if known is not None:
-                self._remove_locked(known)
-                self._interrupt_locked(known)
+            existing = self._calls.get(call.number)
+            if existing is not None:
+                self._remove_locked(existing)
+                self._interrupt_locked(existing)
 
     def _interrupt_locked(self, call: _Call) -> None:
         # Ends the call's thread. Call with the lock held.
@@ -213,13 +213,13 @@ class RosClient(ClientCalls[_Call]):
             if self.is_closed:
                 return
             self.is_closed = True
-            left, self._calls = list(self._calls.values()), {}
-            for call in left:
+            in_flight, self._calls = list(self._calls.values()), {}
+            for call in in_flight:
                 self._interrupt_locked(call)
             threads = tuple(self._threads)
         self._closed.set()
         self._on_close(self)
-        for call in left:
+        for call in in_flight:
             self._run_callback(call, self._closed_error())
         deadline = time.monotonic() + timeout_s
         for thread in threads:

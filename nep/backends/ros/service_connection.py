@@ -52,12 +52,12 @@ class HandshakeLimiter:
         """
         with self._changed:
             while self._counts[uri] >= _MAX_HANDSHAKES:
-                left = deadline - time.monotonic()
-                if left <= 0.0:
+                remaining_s = deadline - time.monotonic()
+                if remaining_s <= 0.0:
                     raise TimeoutError
                 if is_over():
                     raise ServiceConnectionError(_("the call was cancelled or timed out"))
-                self._changed.wait(min(_CHECK_INTERVAL_S, left))
+                self._changed.wait(min(_CHECK_INTERVAL_S, remaining_s))
             self._counts[uri] += 1
         try:
             yield
@@ -107,12 +107,14 @@ class ServiceConnection:
         self._send(b"".join(_LENGTH.pack(len(each)) + each for each in packed))
         data = self._receive_sized(_MAX_HEADER_BYTES)
         header: dict[str, str] = {}
-        at = 0
-        while at + 4 <= len(data):
-            (size,) = _LENGTH.unpack_from(data, at)
-            key, _equals, value = data[at + 4 : at + 4 + size].decode("utf-8", "replace").partition("=")
+        offset = 0
+        while offset + 4 <= len(data):
+            (size,) = _LENGTH.unpack_from(data, offset)
+            key, _equals, value = (
+                data[offset + 4 : offset + 4 + size].decode("utf-8", "replace").partition("=")
+            )
             header[key] = value
-            at += 4 + size
+            offset += 4 + size
         if "error" in header or "type" not in header:
             raise ServiceConnectionError(header.get("error", ""))
         return header
@@ -148,10 +150,10 @@ class ServiceConnection:
         if self._deadline == math.inf:
             self._socket.settimeout(None)
             return
-        left = self._remaining_s()
-        if left <= 0.0:
+        remaining_s = self._remaining_s()
+        if remaining_s <= 0.0:
             raise TimeoutError
-        self._socket.settimeout(left)
+        self._socket.settimeout(remaining_s)
 
     def interrupt(self) -> None:
         """Interrupt the thread that is using the connection. Thread-safe."""

@@ -41,12 +41,12 @@ def installed_service(name: str) -> ServiceType:
     if name == NEP_CALL.name:
         return NEP_CALL
     if name not in _types:
-        found = service_definition(name)
-        if found is None:
+        definition = service_definition(name)
+        if definition is None:
             raise not_installed_error(name, _("ROS service"))
-        request = parse(f"{name}Request", found.request)
+        request = parse(f"{name}Request", definition.request)
         _types[name] = ServiceType(
-            name, request, parse(f"{name}Response", found.response), md5sum=found.md5sum
+            name, request, parse(f"{name}Response", definition.response), md5sum=definition.md5sum
         )
     return _types[name]
 

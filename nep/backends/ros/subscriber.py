@@ -60,9 +60,9 @@ class _Source:
 def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy is not typed
     # An AnyMsg has the bytes; others are serialized again, if the program itself subscribed to the topic
     # before.
-    found = getattr(message, "_buff", None)
-    if isinstance(found, bytes):
-        return found
+    data = getattr(message, "_buff", None)
+    if isinstance(data, bytes):
+        return data
     stream = io.BytesIO()
     message.serialize(stream)
     return stream.getvalue()
@@ -150,18 +150,18 @@ class RospySubscriber(WakingSubscriber):
         ros_type = header.get("type", "")
         text, md5sum = header.get("message_definition", ""), header.get("md5sum", "*")
         try:
-            found = unpacker_for(self.spec.msg_type, ros_type, text, md5sum)
+            unpacker = unpacker_for(self.spec.msg_type, ros_type, text, md5sum)
         except NepError as error:
-            who = escaped(shortened(header.get("callerid", "").lstrip("/"), 100))
-            problem = _("messages from '{name}' can't be read: {why}").format(name=who, why=str(error))
+            node_name = escaped(shortened(header.get("callerid", "").lstrip("/"), 100))
+            problem = _("messages from '{name}' can't be read: {why}").format(name=node_name, why=str(error))
             return _Source(None, None, problem)
         is_latched = header.get("latching") == "1"
-        codec = found.codec
-        kind = MessageKind(self.spec.topic, codec.name, found.msg_type, is_latched, codec.decode)
+        codec = unpacker.codec
+        kind = MessageKind(self.spec.topic, codec.name, unpacker.msg_type, is_latched, codec.decode)
         name = header.get("callerid", "")
         is_own = name == self.process.name
         publisher = publisher_id(name, self.topic) if name and not is_own else None
-        return _Source(found, kind, publisher=publisher, is_local=is_own)
+        return _Source(unpacker, kind, publisher=publisher, is_local=is_own)
 
     def _read(self, source: _Source, body: memoryview) -> Message:
         if source.unpacker is None or source.kind is None:

@@ -81,8 +81,8 @@ class RospyPublisher:
     def subscribers(self) -> int:
         """Number of subscribers: one per connected ROS node, and each subscriber of this process."""
         connected_nodes = () if self._is_closed else self.process.connected_nodes(self._publisher)
-        own = max(1, self.process.subscribed[self.topic]) if self.process.name in connected_nodes else 0
-        return sum(each != self.process.name for each in connected_nodes) + own
+        own_count = max(1, self.process.subscribed[self.topic]) if self.process.name in connected_nodes else 0
+        return sum(each != self.process.name for each in connected_nodes) + own_count
 
     @property
     def has_subscribers(self) -> bool:
@@ -157,10 +157,10 @@ class RospyPublisher:
             self._is_closed = True
         self._transport.discard(self)
         self.process.remove_publisher(self.topic, self.spec.id)
-        left = self.process.wait_until_sent(self._publisher, deadline)
-        if left:
+        unsent_count = self.process.wait_until_sent(self._publisher, deadline)
+        if unsent_count:
             _logger.warning(
-                "'%s' was closed before %d subscriber(s) received everything", self.spec.topic, left
+                "'%s' was closed before %d subscriber(s) received everything", self.spec.topic, unsent_count
             )
         self.process.unadvertise(self.topic, self._publisher, deadline - time.monotonic())
 
@@ -287,10 +287,10 @@ class RospyTransport:
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
         """Return the graph of the ROS network. Raises `MasterUnreachable`."""
         address = _master_address(configuration)
-        known = RosMaster(address).system_state(timeout_s)
+        state = RosMaster(address).system_state(timeout_s)
         # of the same class
-        own = [each.local_node(address) for each in list(_transports) if not each._is_closed]  # noqa: SLF001
-        return graph_view(known, own)
+        local_nodes = [each.local_node(address) for each in list(_transports) if not each._is_closed]  # noqa: SLF001
+        return graph_view(state, local_nodes)
 
     def local_node(self, address: str) -> LocalNode:
         """Return this node's publishers, subscribers and services at the ROS master at `address`."""

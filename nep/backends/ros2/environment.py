@@ -46,25 +46,25 @@ def resolve_domain(master: str | None, environment: Mapping[str, str] = os.envir
         raise WrongTypeError(
             _("a ROS 2 domain must be a 'str' such as '5', not a '{kind}'").format(kind=type(master).__name__)
         )
-    said = (master or "").strip()
-    if said and not _is_valid_domain(said):
+    domain = (master or "").strip()
+    if domain and not _is_valid_domain(domain):
         raise NepError(
             _("'{said}' isn't a ROS 2 domain; use a number from 0 to {most}").format(
-                said=said[:40], most=_DOMAIN_COUNT - 1
+                said=domain[:40], most=_DOMAIN_COUNT - 1
             )
         )
-    said = said or environment.get("ROS_DOMAIN_ID", "").strip() or "0"
-    if not _is_valid_domain(said):
+    domain = domain or environment.get("ROS_DOMAIN_ID", "").strip() or "0"
+    if not _is_valid_domain(domain):
         raise NepError(
             _("ROS_DOMAIN_ID is '{said}'; set it to a number from 0 to {most}").format(
-                said=said[:40], most=_DOMAIN_COUNT - 1
+                said=domain[:40], most=_DOMAIN_COUNT - 1
             )
         )
-    return str(int(said))
+    return str(int(domain))
 
 
-def _is_valid_domain(said: str) -> bool:
-    return said.isascii() and said.isdigit() and len(said) <= 3 and int(said) < _DOMAIN_COUNT
+def _is_valid_domain(domain: str) -> bool:
+    return domain.isascii() and domain.isdigit() and len(domain) <= 3 and int(domain) < _DOMAIN_COUNT
 
 
 def distribution(environment: Mapping[str, str]) -> str:
@@ -73,24 +73,24 @@ def distribution(environment: Mapping[str, str]) -> str:
 
 
 def _configured_range(environment: Mapping[str, str]) -> str:
-    said = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper()
-    if said not in _VALID_RANGES:
+    value = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper()
+    if value not in _VALID_RANGES:
         raise NepError(
             _("ROS_AUTOMATIC_DISCOVERY_RANGE is '{said}'; set it to SUBNET, LOCALHOST or OFF").format(
-                said=said[:40]
+                said=value[:40]
             )
         )
-    return said
+    return value
 
 
 def _discovery_range(environment: Mapping[str, str]) -> Literal["nobody", "computer", "peers", "subnet"]:
     # Returns the discovery range. Raises `NepError`.
-    local, said = environment.get("ROS_LOCALHOST_ONLY", "").strip(), _configured_range(environment)
-    if said == "OFF":
+    local, configured = environment.get("ROS_LOCALHOST_ONLY", "").strip(), _configured_range(environment)
+    if configured == "OFF":
         return "nobody"
     if local == "1":
         return "computer"
-    if local == "0" or said in _SUBNET_RANGES:
+    if local == "0" or configured in _SUBNET_RANGES:
         return "subnet"
     return "peers" if _peers(environment) else "computer"
 
@@ -108,22 +108,22 @@ def cyclonedds_config(environment: Mapping[str, str]) -> str | None:
     """Return the XML configuration for Cyclone DDS, or None if $CYCLONEDDS_URI already sets one."""
     if environment.get("CYCLONEDDS_URI"):
         return None
-    reach = _discovery_range(environment)
+    discovery_range = _discovery_range(environment)
     peers = {
         "nobody": [],
         "computer": ["127.0.0.1"],
         "peers": [*_peers(environment), "127.0.0.1"],
         "subnet": _peers(environment),
-    }[reach]
+    }[discovery_range]
     interface = '<Interfaces><NetworkInterface address="127.0.0.1" multicast="true"/></Interfaces>'
-    is_cast = reach in {"computer", "subnet"}
-    listed = "".join(f'<Peer Address="{escape(each)}"/>' for each in peers)
+    is_cast = discovery_range in {"computer", "subnet"}
+    peer_elements = "".join(f'<Peer Address="{escape(each)}"/>' for each in peers)
     return (
         f'<CycloneDDS><Domain Id="any"><General>{interface if is_loopback_only(environment) else ""}'
         f"<AllowMulticast>{'default' if is_cast else 'false'}</AllowMulticast>{_PACKET_SIZES}</General>"
-        f"<Discovery>{f'<Tag>nobody-{secrets.token_hex(8)}</Tag>' if reach == 'nobody' else ''}"
+        f"<Discovery>{f'<Tag>nobody-{secrets.token_hex(8)}</Tag>' if discovery_range == 'nobody' else ''}"
         f"<ParticipantIndex>auto</ParticipantIndex>"
         f"<MaxAutoParticipantIndex>{_MAX_PARTICIPANT_INDEX}</MaxAutoParticipantIndex>"
-        f"{f'<Peers>{listed}</Peers>' if listed else ''}"
+        f"{f'<Peers>{peer_elements}</Peers>' if peer_elements else ''}"
         f"</Discovery>{_INTERNAL_SETTINGS}</Domain></CycloneDDS>"
     )

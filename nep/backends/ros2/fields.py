@@ -80,8 +80,8 @@ def convert_definition(
     Returns:
         The converted description, and the fields.
     """
-    plain = [(name, _replace_char(each)) for name, each in entries]
-    return plain, tuple(_field(name, each) for name, each in plain)
+    converted = [(name, _replace_char(each)) for name, each in entries]
+    return converted, tuple(_field(name, each) for name, each in converted)
 
 
 def _replace_char(described: Any) -> Any:  # noqa: ANN401 - nested pairs
@@ -125,23 +125,23 @@ def to_message(types: TypeRegistry, name: str, payload: object, path: str = "") 
             if path
             else RosFieldError("", _("publish a map of the fields of '{name}'").format(name=name))
         )
-    fields = {each.name: each for each in types.fields(name) if each.name != PLACEHOLDER_FIELD}
+    fields = {field.name: field for field in types.fields(name) if field.name != PLACEHOLDER_FIELD}
     for key in payload:
         if key not in fields:
             raise RosFieldError(
                 _join_path(path, escaped(str(key)[:100])),
                 _("isn't a field of '{name}'; its fields: {fields}").format(
-                    name=name, fields=", ".join(f"'{each}'" for each in fields) or _("none")
+                    name=name, fields=", ".join(f"'{field}'" for field in fields) or _("none")
                 ),
             )
     values = {}
-    for each in types.fields(name):
-        where = _join_path(path, each.name)
-        is_given = each.name in payload
-        values[each.name] = (
-            _convert_value(types, each, payload[each.name], where)
+    for field in types.fields(name):
+        field_path = _join_path(path, field.name)
+        is_given = field.name in payload
+        values[field.name] = (
+            _convert_value(types, field, payload[field.name], field_path)
             if is_given
-            else _default_value(types, each)
+            else _default_value(types, field)
         )
     return types.message_class(name)(**values)
 
@@ -264,37 +264,37 @@ def _convert_items(types: TypeRegistry, field: RosField, value: object, path: st
 def _convert_array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN401 - an array of numpy
     # Validates the whole array at once; item by item only to find the path of an invalid one.
     np = _import_numpy()
-    wanted = np.dtype(_NUMPY_DTYPES[field.kind])
+    dtype = np.dtype(_NUMPY_DTYPES[field.kind])
     if isinstance(value, bytes | bytearray | memoryview):
         if field.kind not in _OCTET_TYPES:
             raise RosFieldError(path, _("is a '{kind}'; expected a list").format(kind=_type_name(value)))
         return np.frombuffer(bytes(value), np.uint8)
     try:
-        found = np.asarray(value)
+        array = np.asarray(value)
     except (ValueError, OverflowError, TypeError):
-        found = np.empty((), object)
-    if found.ndim == 1 and (not found.size or _is_convertible(found, field, wanted)):
-        return np.ascontiguousarray(found.astype(wanted))
+        array = np.empty((), object)
+    if array.ndim == 1 and (not array.size or _is_convertible(array, field, dtype)):
+        return np.ascontiguousarray(array.astype(dtype))
     single = RosField(field.name, "uint8" if field.kind in _OCTET_TYPES else field.kind, is_message=False)
     items = [_convert_scalar(single, each, f"{path}[{number}]") for number, each in enumerate(list(value))]
-    return np.array(items, wanted)
+    return np.array(items, dtype)
 
 
-def _is_convertible(found: Any, field: RosField, wanted: Any) -> bool:  # noqa: ANN401 - an array, a type of numbers
+def _is_convertible(array: Any, field: RosField, dtype: Any) -> bool:  # noqa: ANN401 - an array, a type of numbers
     # False means that the items must be checked one by one.
-    if found.dtype == wanted:
+    if array.dtype == dtype:
         return True
     if field.kind in _FLOAT_TYPES:
-        if found.dtype.kind not in "iuf":
+        if array.dtype.kind not in "iuf":
             return False
-        if field.kind == "float64" or found.dtype.kind != "f":
+        if field.kind == "float64" or array.dtype.kind != "f":
             return True
-        finite = found[_import_numpy().isfinite(found)]
+        finite = array[_import_numpy().isfinite(array)]
         return not finite.size or bool(abs(finite).max() < _FLOAT32_OVERFLOW)
-    if field.kind == "bool" or found.dtype.kind not in "iu":
+    if field.kind == "bool" or array.dtype.kind not in "iu":
         return False
     low, high = _INTEGER_RANGES[field.kind]
-    return bool(low <= int(found.min()) and int(found.max()) <= high)
+    return bool(low <= int(array.min()) and int(array.max()) <= high)
 
 
 def _unwrap_scalar(value: object) -> object:

@@ -56,19 +56,19 @@ class _NameCache:
 
     def topic(self, endpoint: DdsEndpoint) -> str:
         service = ros_service(endpoint.topic)
-        known = self.topics.get(endpoint.topic) or ros_topic(endpoint.topic)
-        return known or (endpoint.topic if service is None else topic_of(service))
+        topic_name = self.topics.get(endpoint.topic) or ros_topic(endpoint.topic)
+        return topic_name or (endpoint.topic if service is None else topic_of(service))
 
     def msg_type(self, endpoint: DdsEndpoint) -> str:
-        known = self.types.get((endpoint.topic, endpoint.type))
-        return known or endpoint.user_data.get("neptype") or ros_type(endpoint.type)
+        type_name = self.types.get((endpoint.topic, endpoint.type))
+        return type_name or endpoint.user_data.get("neptype") or ros_type(endpoint.type)
 
     def id(self, endpoint: DdsEndpoint) -> int:
         # Returns the announced id, unless another endpoint announces the same one.
         announced_ids = endpoint_id(endpoint.gid, endpoint.user_data.get("nepid"))
-        found = endpoint_id(endpoint.gid, None) if announced_ids in self.ids else announced_ids
-        self.ids.add(found)
-        return found
+        unique_id = endpoint_id(endpoint.gid, None) if announced_ids in self.ids else announced_ids
+        self.ids.add(unique_id)
+        return unique_id
 
 
 def current_graph(participant: Participant) -> GraphView:
@@ -76,18 +76,20 @@ def current_graph(participant: Participant) -> GraphView:
     graph, names = Graph(epoch=1, now=0.0, learn_s=0.0), _NameCache()
     for local in participant.local_nodes:
         _add_local(graph, local, names)
-    found = [
+    endpoints = [
         (kind, each)
         for kind in ("writer", "reader")
         for each in participant.endpoints(kind)
         if ros_topic(each.topic) is not None or ros_service(each.topic) is not None
     ]
     parties: dict[str, dict[str, list[NodeEndpoint]]] = {}
-    own = participant.local_node_names()
-    for kind, each in found:
-        if each.gid in own and ros_service(each.topic) is None:
-            _add_endpoint(parties, names, NodeEndpoint(own[each.gid], each), kind)
-    for node, kind, endpoint in islice(_foreign_endpoints(participant, found, names), _MAX_FOREIGN_ENDPOINTS):
+    local_names = participant.local_node_names()
+    for kind, each in endpoints:
+        if each.gid in local_names and ros_service(each.topic) is None:
+            _add_endpoint(parties, names, NodeEndpoint(local_names[each.gid], each), kind)
+    for node, kind, endpoint in islice(
+        _foreign_endpoints(participant, endpoints, names), _MAX_FOREIGN_ENDPOINTS
+    ):
         _add_foreign(graph, node, kind, endpoint, names)
         if endpoint is not None and ros_service(endpoint.topic) is None:
             _add_endpoint(parties, names, NodeEndpoint(node.name, endpoint), kind)
@@ -117,17 +119,17 @@ def _add_local(graph: Graph, local: LocalNode, names: _NameCache) -> None:
         names.topics.setdefault(name, spec.topic)
         names.types.setdefault((name, dds_type(mapping.ros_type)), spec.msg_type)
         names.ids.add(spec.id)
-    called: list[ServerSpec | ClientSpec] = [each.spec for each in servers]
-    called += [each.spec for each in clients]
-    for service_spec in called:
+    service_specs: list[ServerSpec | ClientSpec] = [each.spec for each in servers]
+    service_specs += [each.spec for each in clients]
+    for service_spec in service_specs:
         names.topics.setdefault(dds_service(service_spec.service)[0], topic_of(service_spec.service))
         names.ids.add(service_spec.id)
     node = local.node
     graph.apply(Join(node), 0, 0.0, node.id)
     for record in (*(each.record for each in publishers), *(each.record for each in servers)):
         graph.apply(AddPublisher(node, record), 0, 0.0, node.id)
-    for heard in (*(each.record for each in subscribers), *(each.record for each in clients)):
-        graph.apply(AddSubscriber(node, heard), 0, 0.0, node.id)
+    for subscriber_record in (*(each.record for each in subscribers), *(each.record for each in clients)):
+        graph.apply(AddSubscriber(node, subscriber_record), 0, 0.0, node.id)
     counts = (
         (*(each.counts for each in publishers), *(each.counts for each in servers)),
         (*(each.counts for each in subscribers), *(each.counts for each in clients)),
@@ -139,25 +141,31 @@ def _foreign_endpoints(
     participant: Participant, all_found: Sequence[tuple[str, DdsEndpoint]], names: _NameCache
 ) -> Iterator[tuple[NodeRecord, str, DdsEndpoint | None]]:
     # Yields foreign writers and readers with their node, and None for nodes without any.
-    own = participant.gid
-    alive = participant.participants() - {own}
-    found = [(kind, each) for kind, each in all_found if each.participant != own]
-    for _kind, each in found:
-        if each.user_data.get("neptype"):
-            names.types.setdefault((each.topic, each.type), each.user_data["neptype"])
+    own_gid = participant.gid
+    alive = participant.participants() - {own_gid}
+    endpoints = [(kind, endpoint) for kind, endpoint in all_found if endpoint.participant != own_gid]
+    for _kind, endpoint in endpoints:
+        if endpoint.user_data.get("neptype"):
+            names.types.setdefault((endpoint.topic, endpoint.type), endpoint.user_data["neptype"])
     announced_ids = {
-        each.gid: each.user_data["nepnode"] for _kind, each in found if each.user_data.get("nepnode")
+        endpoint.gid: endpoint.user_data["nepnode"]
+        for _kind, endpoint in endpoints
+        if endpoint.user_data.get("nepnode")
     }
     owners: dict[bytes, NodeRecord] = {}
     for gid, nodes in sorted(participant.remote_nodes(alive).items()):
         for number, node in enumerate(nodes):
-            node_id = next((announced_ids[one] for one in sorted(node.gids) if one in announced_ids), "")
+            node_id = next(
+                (announced_ids[node_gid] for node_gid in sorted(node.gids) if node_gid in announced_ids), ""
+            )
             record = _node_record(node_id or _hashed_id(gid + number.to_bytes(4, "little")), node.name)
             owners.update(dict.fromkeys(node.gids, record))
             yield record, "", None
-    unknown_nodes = {each.participant: _unknown_node(each.participant) for _kind, each in found}
-    for kind, each in found:
-        yield owners.get(each.gid) or unknown_nodes[each.participant], kind, each
+    unknown_nodes = {
+        endpoint.participant: _unknown_node(endpoint.participant) for _kind, endpoint in endpoints
+    }
+    for kind, endpoint in endpoints:
+        yield owners.get(endpoint.gid) or unknown_nodes[endpoint.participant], kind, endpoint
 
 
 def _hashed_id(data: bytes) -> str:

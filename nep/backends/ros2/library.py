@@ -87,11 +87,11 @@ def restrict_to_loopback(domain: int) -> None:
     if not sys.platform.startswith("linux"):
         return
     first = _PORTS + _PORTS_OF_A_DOMAIN * domain
-    for each in Path(_FD_FOLDER).iterdir():
+    for path in Path(_FD_FOLDER).iterdir():
         try:
-            if not each.is_socket():
+            if not path.is_socket():
                 continue
-            with socket.socket(fileno=os.dup(int(each.name))) as copy:
+            with socket.socket(fileno=os.dup(int(path.name))) as copy:
                 host, port = copy.getsockname()[:2]
                 if host == "0.0.0.0" and port in range(first, first + _PORTS_OF_A_DOMAIN):  # noqa: S104
                     copy.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, b"lo\0")

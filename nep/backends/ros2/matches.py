@@ -66,13 +66,13 @@ class Matches:
         """Publish the matches of this program if they have changed since the last call."""
         for gid, entity in self._followed.items():
             if entity.take_status():
-                found = matched_gids(entity)
-                self._found[gid] = frozenset(each for each in found if not self._is_local(each))
+                matched = matched_gids(entity)
+                self._found[gid] = frozenset(each for each in matched if not self._is_local(each))
                 self._has_changes = True
         if not self._has_changes:
             return
         self._has_changes = False
-        pairs = sorted(own + other for own, found in self._found.items() for other in found)
+        pairs = sorted(own_gid + other for own_gid, matched in self._found.items() for other in matched)
         data = b"".join((self._gid, *pairs[:_MAX_PAIRS]))
         if data != self._published:
             self._writer.write(create_sample(self._sample_class, self._types.encode(_TYPE, {"data": data})))
@@ -91,45 +91,45 @@ class Matches:
         sender, pairs = data[:GID_BYTES], data[GID_BYTES:]
         if len(sender) < GID_BYTES or len(pairs) % (2 * GID_BYTES) or self._is_local(sender):
             return
-        found = (
-            (pairs[at : at + GID_BYTES], pairs[at + GID_BYTES : at + 2 * GID_BYTES])
-            for at in range(0, len(pairs), 2 * GID_BYTES)
+        gid_pairs = (
+            (pairs[offset : offset + GID_BYTES], pairs[offset + GID_BYTES : offset + 2 * GID_BYTES])
+            for offset in range(0, len(pairs), 2 * GID_BYTES)
         )
         self._confirmed.pop(sender, None)
         if len(self._confirmed) >= _MAX_PARTICIPANTS:
             self._confirmed.pop(next(iter(self._confirmed)))
         self._confirmed[sender] = frozenset(
             pair
-            for pair in found
+            for pair in gid_pairs
             if self._is_local(pair[1]) and pair[0][:PREFIX_BYTES] == sender[:PREFIX_BYTES]
         )
 
-    def is_confirmed(self, own: bytes, other: bytes, participant: bytes) -> bool:
+    def is_confirmed(self, own_gid: bytes, other: bytes, participant: bytes) -> bool:
         """Return True if another program has reported a match of its endpoint with one of ours.
 
         Args:
-            own: GUID of our endpoint.
+            own_gid: GUID of our endpoint.
             other: GUID of the other program's endpoint. Endpoints of this program count as confirmed.
             participant: GUID of the other program's participant.
         """
-        return self._is_local(other) or (other, own) in self._confirmed.get(participant, ())
+        return self._is_local(other) or (other, own_gid) in self._confirmed.get(participant, ())
 
     def unmatched_gids(
-        self, entities: Iterable[Any], known: Iterable[tuple[bytes, bytes, bool]]
+        self, entities: Iterable[Any], endpoints: Iterable[tuple[bytes, bytes, bool]]
     ) -> set[bytes]:
         """Return the GUIDs of the known endpoints that aren't matched on both sides.
 
         Args:
             entities: Writers or readers of this program.
-            known: For each endpoint its GUID, the GUID of its participant, and True if its program
+            endpoints: For each endpoint its GUID, the GUID of its participant, and True if its program
                 publishes its matches.
         """
-        found = [(each.guid.bytes, matched_gids(each)) for each in entities]
+        matches = [(each.guid.bytes, matched_gids(each)) for each in entities]
         return {
             gid
-            for gid, participant, tells in known
+            for gid, participant, tells in endpoints
             if not any(
-                gid in matched and (not tells or self.is_confirmed(own, gid, participant))
-                for own, matched in found
+                gid in matched and (not tells or self.is_confirmed(own_gid, gid, participant))
+                for own_gid, matched in matches
             )
         }

@@ -42,10 +42,10 @@ class MessageTypes:
         try:
             store = rosbags.Stores[f"ROS2_{release.upper()}"]
         except KeyError:
-            known = [each.name.removeprefix("ROS2_").lower() for each in rosbags.Stores]
+            releases = [each.name.removeprefix("ROS2_").lower() for each in rosbags.Stores]
             raise NepError(
                 _("ROS_DISTRO is '{release}', which rosbags doesn't know; {did_you_mean}").format(
-                    release=release[:40], did_you_mean=did_you_mean(release, known)
+                    release=release[:40], did_you_mean=did_you_mean(release, releases)
                 )
             ) from None
         self._rosbags = rosbags
@@ -59,8 +59,8 @@ class MessageTypes:
         # `char` is replaced by `uint8`, which type hashes are computed from.
         for name, (constants, entries) in list(self._store.fielddefs.items()):
             if name not in self._fields:
-                plain, fields = convert_definition(entries)
-                self._store.fielddefs[name] = (constants, plain)
+                converted, fields = convert_definition(entries)
+                self._store.fielddefs[name] = (constants, converted)
                 self._fields[name] = fields
 
     @property
@@ -127,8 +127,8 @@ class MessageTypes:
         Raises `NepError` if the text is invalid, uses unknown types, or differs from a known type with the
         same name.
         """
-        for wrong in self._add({type_name(name): text}).values():
-            raise wrong
+        for error in self._add({type_name(name): text}).values():
+            raise error
 
     def add_service_part(self, name: str, text: str) -> None:
         """Add the request or response type of a service, such as "std_srvs/srv/SetBool_Request".
@@ -138,17 +138,17 @@ class MessageTypes:
         package, _srv, last = name.split("/")
         alike = f"{package}/msg/{last}"  # lets rosbags resolve the package's own messages
         try:
-            found = self._rosbags.get_types_from_msg(text, alike)[alike]
+            parsed = self._rosbags.get_types_from_msg(text, alike)[alike]
         except Exception as error:  # its parser raises its own exception classes
             raise NepError(
                 _("the definition of '{name}' can't be read: {error}").format(name=name, error=error)
             ) from error
         with self._lock:
-            fields = convert_definition(found[1])[1]
-            for wrong in self._missing_type_errors({name: fields}).values():
-                raise wrong
-            known = [each for each in self._fields.get(name, fields) if each.name != PLACEHOLDER_FIELD]
-            if known != [each for each in fields if each.name != PLACEHOLDER_FIELD]:
+            fields = convert_definition(parsed[1])[1]
+            for missing_error in self._missing_type_errors({name: fields}).values():
+                raise missing_error
+            existing = [each for each in self._fields.get(name, fields) if each.name != PLACEHOLDER_FIELD]
+            if existing != [each for each in fields if each.name != PLACEHOLDER_FIELD]:
                 raise NepError(
                     _(
                         "'{name}' is already defined with other fields; choose another name, or restart "
@@ -156,7 +156,7 @@ class MessageTypes:
                     ).format(name=name)
                 )
             if name not in self._fields:
-                self._store.register({name: found})
+                self._store.register({name: parsed})
                 self._read_definitions()
 
     def add_folder(self, folder: Path) -> None:
@@ -178,26 +178,26 @@ class MessageTypes:
             texts[type_name(f"{package}/msg/{path.stem}")] = path.read_text(encoding="utf-8")
         if not texts:
             raise NepError(_("no .msg files in '{folder}'; choose another folder").format(folder=folder))
-        wrong = self._add(texts)
-        if len(wrong) == len(texts):
-            raise next(iter(wrong.values()))
-        self._left_out.update(wrong)
+        errors = self._add(texts)
+        if len(errors) == len(texts):
+            raise next(iter(errors.values()))
+        self._left_out.update(errors)
 
     def _add(self, texts: Mapping[str, str]) -> dict[str, NepError]:
         # Returns the errors of invalid types. Raises `NepError` if a known type has changed.
-        found: dict[str, Any] = {}
-        wrong: dict[str, NepError] = {}
+        parsed: dict[str, Any] = {}
+        errors: dict[str, NepError] = {}
         for name, text in texts.items():
             try:
-                found.update(self._rosbags.get_types_from_msg(text, name))
+                parsed.update(self._rosbags.get_types_from_msg(text, name))
             except Exception as error:  # noqa: BLE001 - its parser raises its own exception classes
-                wrong[name] = NepError(
+                errors[name] = NepError(
                     _("the definition of '{name}' can't be read: {error}").format(name=name, error=error)
                 )
         with self._lock:
-            fields = {name: convert_definition(entries)[1] for name, (_constants, entries) in found.items()}
+            fields = {name: convert_definition(entries)[1] for name, (_constants, entries) in parsed.items()}
             while missing := self._missing_type_errors(fields):
-                wrong.update(missing)
+                errors.update(missing)
                 fields = {name: each for name, each in fields.items() if name not in missing}
             same = {name for name in fields if name in self._fields and self._fields[name] == fields[name]}
             changed = sorted(name for name in fields if name in self._fields and name not in same)
@@ -208,13 +208,13 @@ class MessageTypes:
                         "the program"
                     ).format(name=changed[0])
                 )
-            self._store.register({name: found[name] for name in fields if name not in same})
+            self._store.register({name: parsed[name] for name in fields if name not in same})
             self._read_definitions()
-        return wrong
+        return errors
 
     def _missing_type_errors(self, fields: Mapping[str, Sequence[RosField]]) -> dict[str, NepError]:
         # Types that use unknown types.
-        wide = _(
+        wstring_message = _(
             "'{name}' has the field '{field}' of type wstring, which 'ros2' doesn't support; use a string"
         )
         unknown = _(
@@ -223,7 +223,7 @@ class MessageTypes:
         )
         return {
             name: NepError(
-                (wide if field.kind.endswith(f"/{_WIDE_STRING_TYPE}") else unknown).format(
+                (wstring_message if field.kind.endswith(f"/{_WIDE_STRING_TYPE}") else unknown).format(
                     name=name, field=field.name, kind=field.kind
                 )
             )
@@ -233,19 +233,19 @@ class MessageTypes:
         }
 
 
-def _suggestion(name: str, known: tuple[str, ...]) -> str:
+def _suggestion(name: str, candidates: tuple[str, ...]) -> str:
     ending = name.rpartition("/")[2].lower()
-    alike = [each for each in known if each.rpartition("/")[2].lower() == ending]
+    alike = [each for each in candidates if each.rpartition("/")[2].lower() == ending]
     return (
-        did_you_mean(name, tuple(alike) or known)
-        if alike or len(known) < 10
-        else _short_suggestion(name, known)
+        did_you_mean(name, tuple(alike) or candidates)
+        if alike or len(candidates) < 10
+        else _short_suggestion(name, candidates)
     )
 
 
-def _short_suggestion(name: str, known: tuple[str, ...]) -> str:
-    said = did_you_mean(name, known)
-    return said if len(said) < 200 else _("see 'nep.backends.ros2.message_types().names'")
+def _short_suggestion(name: str, candidates: tuple[str, ...]) -> str:
+    suggestion = did_you_mean(name, candidates)
+    return suggestion if len(suggestion) < 200 else _("see 'nep.backends.ros2.message_types().names'")
 
 
 _types: dict[str, MessageTypes] = {}

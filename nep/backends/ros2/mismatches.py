@@ -48,13 +48,13 @@ def mismatches(
 
 def _merge_readers(readers: Iterable[NodeEndpoint]) -> Iterator[NodeEndpoint]:
     # A subscriber of nep may have two readers; keep the one with the weaker requirements.
-    known: dict[str, NodeEndpoint] = {}
-    for each in readers:
-        key = each.endpoint.user_data.get("nepid") or each.endpoint.gid.hex()
-        other = known.get(key)
-        is_latched = each.endpoint.is_latched and (other is None or other.endpoint.is_latched)
-        known[key] = replace(each, endpoint=replace(each.endpoint, is_latched=is_latched))
-    yield from known.values()
+    merged: dict[str, NodeEndpoint] = {}
+    for reader in readers:
+        key = reader.endpoint.user_data.get("nepid") or reader.endpoint.gid.hex()
+        other = merged.get(key)
+        is_latched = reader.endpoint.is_latched and (other is None or other.endpoint.is_latched)
+        merged[key] = replace(reader, endpoint=replace(reader.endpoint, is_latched=is_latched))
+    yield from merged.values()
 
 
 def _have_different_definitions(writer: DdsEndpoint, reader: DdsEndpoint) -> bool:

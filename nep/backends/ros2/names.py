@@ -26,9 +26,9 @@ _INVALID_CHARACTERS = re.compile(r"\W", re.ASCII)
 
 def dds_topic(topic: str) -> str:
     """Return the DDS name of a topic: `rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError`."""
-    found = _PARAMETER_TOPIC.fullmatch(topic)
-    if found is not None:
-        topic = f"{found[1]}_{found[2]}"
+    match = _PARAMETER_TOPIC.fullmatch(topic)
+    if match is not None:
+        topic = f"{match[1]}_{match[2]}"
     if _TOPIC.fullmatch(topic) is None or "__" in topic:
         raise BadTopicError(
             topic,
@@ -47,8 +47,8 @@ def ros_topic(topic: str) -> str | None:
 
 def _restore_parameter_topic(name: str) -> str:
     # Removes the "_" that `dds_topic` inserts into parameter topics.
-    found = _ROS_PARAMETER_TOPIC.fullmatch(name)
-    return name if found is None else f"{found[1]}{found[2]}"
+    match = _ROS_PARAMETER_TOPIC.fullmatch(name)
+    return name if match is None else f"{match[1]}{match[2]}"
 
 
 def is_type_name(msg_type: str) -> bool:
@@ -61,14 +61,14 @@ def type_name(msg_type: str) -> str:
 
     Accepts "std_msgs/msg/String" and "std_msgs/String". Raises `NepError` for other names.
     """
-    found = _TYPE.fullmatch(msg_type)
-    if found is None:
+    match = _TYPE.fullmatch(msg_type)
+    if match is None:
         raise NepError(
             _("'{name}' isn't a ROS message type; use a name such as 'std_msgs/msg/String'").format(
                 name=quotable(msg_type)
             )
         )
-    return f"{found[1]}/msg/{found[3]}"
+    return f"{match[1]}/msg/{match[3]}"
 
 
 def dds_type(ros_type: str) -> str:
@@ -88,8 +88,8 @@ def dds_service(service: str) -> tuple[str, str]:
 
 def ros_service(topic: str) -> str | None:
     """Return the service of a request topic: `/add` for "rq/addRequest"; None for other DDS topics."""
-    found = _REQUEST_TOPIC.fullmatch(topic)
-    return None if found is None else _restore_parameter_topic(found[1])
+    match = _REQUEST_TOPIC.fullmatch(topic)
+    return None if match is None else _restore_parameter_topic(match[1])
 
 
 def service_type_of(dds_type: str) -> str | None:
@@ -97,8 +97,8 @@ def service_type_of(dds_type: str) -> str | None:
 
     Returns None for other DDS types.
     """
-    found = _DDS_REQUEST.fullmatch(dds_type)
-    return None if found is None else f"{found[1]}/srv/{found[2]}"
+    match = _DDS_REQUEST.fullmatch(dds_type)
+    return None if match is None else f"{match[1]}/srv/{match[2]}"
 
 
 def service_type_name(msg_type: str) -> str | None:
@@ -106,14 +106,14 @@ def service_type_name(msg_type: str) -> str | None:
 
     Accepts "std_srvs/srv/SetBool" and "std_srvs/SetBool"; returns None for other names.
     """
-    found = _SERVICE_TYPE.fullmatch(msg_type)
-    return None if found is None else f"{found[1]}/srv/{found[3]}"
+    match = _SERVICE_TYPE.fullmatch(msg_type)
+    return None if match is None else f"{match[1]}/srv/{match[3]}"
 
 
 def ros_type(dds_type: str) -> str:
     """Return the ROS name of a DDS type, such as `std_msgs/msg/String`; other types are unchanged."""
-    found = _DDS_TYPE.fullmatch(dds_type)
-    return dds_type if found is None else f"{found[1]}/msg/{found[2]}"
+    match = _DDS_TYPE.fullmatch(dds_type)
+    return dds_type if match is None else f"{match[1]}/msg/{match[2]}"
 
 
 def split_node_name(name: str) -> tuple[str, str]:

@@ -236,10 +236,10 @@ class Participant:
                 reader,
                 core.ReadCondition(reader, any_state | core.InstanceState.Alive),
             )
-            news = core.ReadCondition(
+            condition = core.ReadCondition(
                 reader, core.ViewState.Any | core.SampleState.NotRead | core.InstanceState.Any
             )
-            self.watch(reader, news, partial(self._mark_changed, reader, news))
+            self.watch(reader, condition, partial(self._mark_changed, reader, condition))
         self._info_writer = self.topics.create_state_writer(_INFO_TOPIC, _INFO_TYPE)
         self.matches = Matches(self.dds, self.types, self.topics, self.gid)
         for state, process in (
@@ -267,22 +267,23 @@ class Participant:
             return
         with self.changed:
             while (
-                left := self._began_at + _DISCOVERY_TIME_S - time.monotonic()
+                remaining_s := self._began_at + _DISCOVERY_TIME_S - time.monotonic()
             ) > 0.0 and not self._is_closing:
-                self.changed.wait(left)
+                self.changed.wait(remaining_s)
             deadline = time.monotonic() + HANDSHAKE_TIMEOUT_S
-            while not self._is_discovery_complete() and (left := deadline - time.monotonic()) > 0.0:
-                self.changed.wait(min(left, _POLL_S))
+            while not self._is_discovery_complete() and (remaining_s := deadline - time.monotonic()) > 0.0:
+                self.changed.wait(min(remaining_s, _POLL_S))
             self._is_settled = True
 
     def _is_discovery_complete(self) -> bool:
         # True if all ROS 2 participants have announced their nodes and the endpoints of these are discovered.
         if self._is_closing:
             return True
-        found = {each.gid for kind in ("writer", "reader") for each in self.endpoints(kind)}
+        discovered = {each.gid for kind in ("writer", "reader") for each in self.endpoints(kind)}
         telling = self.participants(with_nodes=True) - {self.gid}
         return all(
-            gid in self._others and all(node.gids <= found for node in self._others[gid]) for gid in telling
+            gid in self._others and all(node.gids <= discovered for node in self._others[gid])
+            for gid in telling
         )
 
     # ---- nodes
@@ -352,8 +353,8 @@ class Participant:
     def _gid_field(self, gid: bytes) -> dict[str, bytes]:
         return {"data": gid.ljust(self.types.gid_bytes, b"\0")}
 
-    def _mark_changed(self, reader: Any, news: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        reader.read(_MAX_SAMPLES_PER_READ, news)
+    def _mark_changed(self, reader: Any, condition: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        reader.read(_MAX_SAMPLES_PER_READ, condition)
         self._has_changes = True
 
     def _process_info(self, cdr: bytes) -> None:
@@ -369,7 +370,7 @@ class Participant:
             RosNode(
                 f"{each['node_namespace'].rstrip('/')}/{each['node_name']}",
                 frozenset(
-                    one["data"][:16] for key in ("reader_gid_seq", "writer_gid_seq") for one in each[key]
+                    entry["data"][:16] for key in ("reader_gid_seq", "writer_gid_seq") for entry in each[key]
                 ),
             )
             for each in info["node_entities_info_seq"]
@@ -377,9 +378,9 @@ class Participant:
 
     def remote_node_names(self, gids: Iterable[bytes]) -> tuple[str, ...]:
         """Return the names of other programs' nodes that own the endpoints with these GUIDs."""
-        wanted = set(gids)
+        requested = set(gids)
         with self.changed:
-            nodes = [node for others in self._others.values() for node in others if node.gids & wanted]
+            nodes = [node for others in self._others.values() for node in others if node.gids & requested]
         return tuple(sorted({each.name for each in nodes}))
 
     def local_node_names(self) -> dict[bytes, str]:
@@ -422,11 +423,11 @@ class Participant:
             alive = core.ReadCondition(
                 reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Alive
             )
-            found = reader.read(_MAX_SAMPLES_PER_READ, alive)
+            samples = reader.read(_MAX_SAMPLES_PER_READ, alive)
         announced = policy_classes(self.dds).Userdata
         return frozenset(
             each.key.bytes
-            for each in found
+            for each in samples
             if not with_nodes
             or (announced in each.qos and "enclave" in decode_user_data(each.qos[announced].data))
         )
@@ -442,25 +443,25 @@ class Participant:
             if self._is_closing:
                 return []
             reader, alive = self._alive[kind]
-            found = reader.read(_MAX_SAMPLES_PER_READ, alive)
+            samples = reader.read(_MAX_SAMPLES_PER_READ, alive)
         return [
             self.to_endpoint(each)
-            for each in found
+            for each in samples
             if each.topic_name is not None and (topic is None or each.topic_name == topic)
         ]
 
-    def to_endpoint(self, found: Any) -> DdsEndpoint:  # noqa: ANN401 - cyclonedds is not typed
+    def to_endpoint(self, sample: Any) -> DdsEndpoint:  # noqa: ANN401 - cyclonedds is not typed
         """Return the endpoint that a discovery sample of cyclonedds describes."""
         policies = policy_classes(self.dds)
-        has_data = policies.Userdata in found.qos
+        has_data = policies.Userdata in sample.qos
         return DdsEndpoint(
-            found.key.bytes,
-            found.participant_key.bytes,
-            found.topic_name,
-            found.type_name,
-            policies.Durability.Volatile not in found.qos and policies.Durability in found.qos,
-            policies.Reliability.BestEffort not in found.qos,
-            decode_user_data(found.qos[policies.Userdata].data) if has_data else {},
+            sample.key.bytes,
+            sample.participant_key.bytes,
+            sample.topic_name,
+            sample.type_name,
+            policies.Durability.Volatile not in sample.qos and policies.Durability in sample.qos,
+            policies.Reliability.BestEffort not in sample.qos,
+            decode_user_data(sample.qos[policies.Userdata].data) if has_data else {},
         )
 
     # ---- the thread
@@ -480,9 +481,9 @@ class Participant:
     def unwatch(self, reader: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         """Unregister the function that `watch` registered for a reader."""
         with self.changed:
-            found = self._reads.pop(id(reader), None)
-            if found is not None:
-                self._waitset.detach(found[1])
+            entry = self._reads.pop(id(reader), None)
+            if entry is not None:
+                self._waitset.detach(entry[1])
 
     def _run(self) -> None:
         while not self._should_stop():

@@ -28,7 +28,7 @@ _POLL_S = 0.01
 
 
 def wait_for_matches(
-    participant: Participant, known: Sequence[DdsEndpoint], entities: Callable[[], Sequence[Any]]
+    participant: Participant, endpoints: Sequence[DdsEndpoint], entities: Callable[[], Sequence[Any]]
 ) -> tuple[str, ...]:
     """Wait up to `HANDSHAKE_TIMEOUT_S` seconds until the known endpoints are matched with ours.
 
@@ -36,23 +36,23 @@ def wait_for_matches(
 
     Args:
         participant: Participant of this process.
-        known: Endpoints to wait for.
+        endpoints: Endpoints to wait for.
         entities: Returns our writers or readers.
 
     Returns:
         Names of the nodes whose endpoints are not matched.
     """
     deadline = time.monotonic() + HANDSHAKE_TIMEOUT_S
-    expected = [(each.gid, each.participant, "nepid" in each.user_data) for each in known]
+    expected = [(each.gid, each.participant, "nepid" in each.user_data) for each in endpoints]
     with participant.changed:
         while (unready := participant.matches.unmatched_gids(entities(), expected)) and (
-            left := deadline - time.monotonic()
+            remaining_s := deadline - time.monotonic()
         ) > 0.0:
-            participant.changed.wait(min(left, _POLL_S))
-        if any(each.participant != participant.gid and "nepid" not in each.user_data for each in known):
+            participant.changed.wait(min(remaining_s, _POLL_S))
+        if any(each.participant != participant.gid and "nepid" not in each.user_data for each in endpoints):
             ready_at = time.monotonic() + _READY_DELAY_S
-            while (left := ready_at - time.monotonic()) > 0.0:
-                participant.changed.wait(left)
+            while (remaining_s := ready_at - time.monotonic()) > 0.0:
+                participant.changed.wait(remaining_s)
         return participant.remote_node_names(unready)
 
 
@@ -114,7 +114,7 @@ class Ros2Publisher:
             )
             participant.assign(node_id, "writer", self._writer)
         is_reliable = spec.qos in ("", "reliable")
-        wanted = [
+        expected = [
             each
             for each in participant.endpoints("reader", name)
             if each.has_type(dds_type(ros_type), type_hash)
@@ -122,7 +122,7 @@ class Ros2Publisher:
             and (spec.is_latched or not each.is_latched)
         ]
         try:
-            self.missing = wait_for_matches(participant, wanted, lambda: [self._writer])
+            self.missing = wait_for_matches(participant, expected, lambda: [self._writer])
         except BaseException:  # also Ctrl+C: the caller has no object to close yet
             self.finish(0.0)
             raise
@@ -212,8 +212,8 @@ class Ros2Publisher:
             return
         if self.spec.qos in ("", "reliable") and timeout_s > 0.0:
             # `wait_for_acks` raises on timeout (cyclonedds 11.0.1)
-            wait = self._writer._wait_for_acks  # noqa: SLF001
-            if wait(self._writer._ref, int(min(timeout_s, 3600.0) * 1e9)):  # noqa: SLF001
+            wait_for_acks = self._writer._wait_for_acks  # noqa: SLF001
+            if wait_for_acks(self._writer._ref, int(min(timeout_s, 3600.0) * 1e9)):  # noqa: SLF001
                 _logger.warning("'%s' was closed before all subscribers received everything", self.spec.topic)
         with self._participant.changed:
             if not self._is_closed:

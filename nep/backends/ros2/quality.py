@@ -51,7 +51,7 @@ def qos_policies(
     """
     policies = policy_classes(library)
     is_reliable = quality in ("", "reliable")
-    found = [
+    result = [
         policies.Reliability.Reliable(_MAX_BLOCKING_NS) if is_reliable else policies.Reliability.BestEffort,
         policies.Durability.TransientLocal if is_latched else policies.Durability.Volatile,
         policies.History.KeepLast(max(depth, history)),
@@ -60,5 +60,5 @@ def qos_policies(
     ]
     if is_latched:
         last = policies.History.KeepLast(max(1, history))
-        found.append(policies.DurabilityService(0, last, _UNLIMITED, _UNLIMITED, _UNLIMITED))
-    return tuple(found)
+        result.append(policies.DurabilityService(0, last, _UNLIMITED, _UNLIMITED, _UNLIMITED))
+    return tuple(result)

@@ -200,10 +200,10 @@ class Ros2Subscriber(WakingSubscriber):
     def _without_duplicates(self, source: _Source, messages: list[tuple[int, Message]]) -> list[Message]:
         # Drops duplicates.
         new = []
-        for stamp_ns, each in messages:
+        for stamp_ns, message in messages:
             if stamp_ns > source.newest_ns:
                 source.newest_ns = stamp_ns
-                new.append(each)
+                new.append(message)
         return new
 
     def _release_held(self, handle: int) -> list[Message]:
@@ -215,11 +215,11 @@ class Ros2Subscriber(WakingSubscriber):
         return self._without_duplicates(source, messages)
 
     def _source(self, reader: Any, handle: int) -> _Source:  # noqa: ANN401 - see above
-        known = self._sources.get(handle)
-        if known is not None:
-            return known
-        found = reader.get_matched_publication_data(handle)
-        described = None if found is None else self._participant.to_endpoint(found)
+        existing = self._sources.get(handle)
+        if existing is not None:
+            return existing
+        sample = reader.get_matched_publication_data(handle)
+        described = None if sample is None else self._participant.to_endpoint(sample)
         is_latched = described is not None and described.is_latched
         source = _Source(
             endpoint_id(handle.to_bytes(8, "little", signed=handle < 0), None)

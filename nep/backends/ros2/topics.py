@@ -79,9 +79,11 @@ class DdsTopics:
         """Return the sample class of a ROS type."""
         return self._create_class(ros_type, {})
 
-    def _create_class(self, ros_type: str, head: dict[str, Any]) -> Any:  # noqa: ANN401 - created dynamically
+    def _create_class(self, ros_type: str, base_members: dict[str, Any]) -> Any:  # noqa: ANN401 - created dynamically
         if ros_type not in self._classes:
-            members = head | {each.name: self._member_type(each) for each in self._types.fields(ros_type)}
+            members = base_members | {
+                each.name: self._member_type(each) for each in self._types.fields(ros_type)
+            }
             created = self._dds.idl.make_idl_struct(ros_type.rpartition("/")[2], dds_type(ros_type), members)
             created.serialize = _serialize
             created.deserialize = classmethod(_deserialize)

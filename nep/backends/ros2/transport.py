@@ -92,8 +92,8 @@ class Ros2Transport:
 
     def endpoints_changed(self) -> None:
         """Handle added or removed endpoints. Called in the participant's thread with its lock held."""
-        for each in self._subscribers:
-            each.update_latched_reader()
+        for subscriber in self._subscribers:
+            subscriber.update_latched_reader()
 
     def create_publisher(self, spec: PublisherSpec) -> Ros2Publisher:
         """Create a publisher and wait until its writer is matched with the discovered readers."""

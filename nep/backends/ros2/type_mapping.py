@@ -163,11 +163,11 @@ def _unpack_bytes(cdr: bytes) -> bytes | memoryview:
     return memoryview(cdr)[16 : 16 + size]
 
 
-def _read_numbers(cdr: bytes, form: str, at: int) -> tuple[int, ...]:
+def _read_numbers(cdr: bytes, form: str, offset: int) -> tuple[int, ...]:
     # The header has the byte order. Raises `WireError`.
-    if len(cdr) < at + 4 * len(form) or cdr[0] != 0 or cdr[1] > 1:
+    if len(cdr) < offset + 4 * len(form) or cdr[0] != 0 or cdr[1] > 1:
         raise WireError(_("not a ROS message"), len(cdr))
-    return struct.unpack_from(f"{'<' if cdr[1] else '>'}{form}", cdr, at)
+    return struct.unpack_from(f"{'<' if cdr[1] else '>'}{form}", cdr, offset)
 
 
 def _read_data_field(name: str, cdr: bytes) -> bytes:
@@ -203,10 +203,10 @@ def _pack_image(encoded: Encoded) -> bytes:
         raise WireError(_raw_image_reason(), len(data)) from error
     seconds, nanoseconds = divmod(time.time_ns(), 10**9)
     # stamp, empty frame_id with padding, format, file
-    head = struct.pack("<iI", seconds, nanoseconds) + struct.pack("<I4x", 1)
+    header = struct.pack("<iI", seconds, nanoseconds) + struct.pack("<I4x", 1)
     name = kind.encode() + b"\0"
-    named = struct.pack("<I", len(name)) + name + bytes(-len(name) % 4)
-    return b"".join((_CDR_HEADER, head, named, struct.pack("<I", len(data)), data))
+    format_field = struct.pack("<I", len(name)) + name + bytes(-len(name) % 4)
+    return b"".join((_CDR_HEADER, header, format_field, struct.pack("<I", len(data)), data))
 
 
 def _unpack_image(cdr: bytes) -> bytes:

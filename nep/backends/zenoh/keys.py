@@ -43,8 +43,8 @@ def _encode_chunk(text: str) -> str:
     return quote(text, safe="", errors="replace") or "%"
 
 
-def _decode_chunk(word: str) -> str:
-    return "" if word == "%" else unquote(word)
+def _decode_chunk(chunk: str) -> str:
+    return "" if chunk == "%" else unquote(chunk)
 
 
 def data_key(topic: str) -> str:
@@ -100,21 +100,21 @@ def call_key(node_id: str) -> str:
 
 def node_key(node: NodeRecord) -> str:
     """Return the key of a node's liveliness token."""
-    words = (node.name, node.host, str(node.pid or 0), node.language, node.generation, str(node.since_ns))
-    return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node.id)}/node", *map(_encode_chunk, words)))
+    chunks = (node.name, node.host, str(node.pid or 0), node.language, node.generation, str(node.since_ns))
+    return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node.id)}/node", *map(_encode_chunk, chunks)))
 
 
 def publisher_key(node_id: str, record: PublisherRecord) -> str:
     """Return the key of a publisher's liveliness token."""
     latched = "latched" if record.latched else "plain"
-    words = (f"{record.id:016x}", record.topic, record.msg_type, record.codec, latched)
-    return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/pub", *map(_encode_chunk, words)))
+    chunks = (f"{record.id:016x}", record.topic, record.msg_type, record.codec, latched)
+    return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/pub", *map(_encode_chunk, chunks)))
 
 
 def subscriber_key(node_id: str, record: SubscriberRecord) -> str:
     """Return the key of a subscriber's liveliness token."""
-    words = (f"{record.id:016x}", record.topic, record.msg_type)
-    return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/sub", *map(_encode_chunk, words)))
+    chunks = (f"{record.id:016x}", record.topic, record.msg_type)
+    return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/sub", *map(_encode_chunk, chunks)))
 
 
 def service_key(service: str, since_ns: int, server: int) -> str:
@@ -158,30 +158,30 @@ def parse_token(key: str) -> LiveToken | None:
     """Parse the key of a liveliness token; return None for other keys."""
     if not key.startswith(_LIVE_PREFIX):
         return None
-    node_id, *words = map(_decode_chunk, key[len(_LIVE_PREFIX) :].split("/"))
+    node_id, *chunks = map(_decode_chunk, key[len(_LIVE_PREFIX) :].split("/"))
     try:
-        if words[:1] == ["node"] and len(words) == _NODE_CHUNKS:
-            _kind, name, host, pid, language, generation, since = words
+        if chunks[:1] == ["node"] and len(chunks) == _NODE_CHUNKS:
+            _kind, name, host, pid, language, generation, since = chunks
             number, since_ns = int(pid), int(since)
             if not (0 <= number < 2**63 and 0 <= since_ns < 2**63):
                 return None
             return LiveToken(
                 node_id, NodeRecord(node_id, name, host, number or None, language, generation, since_ns)
             )
-        if words[:1] == ["pub"] and len(words) == _PUBLISHER_CHUNKS:
-            _kind, id_, topic, msg_type, codec, latched = words
+        if chunks[:1] == ["pub"] and len(chunks) == _PUBLISHER_CHUNKS:
+            _kind, id_, topic, msg_type, codec, latched = chunks
             if topic.startswith(SERVICE_PREFIX):  # a forged token could otherwise register a server
                 return None
             record = PublisherRecord(
                 _parse_id(id_), topic, msg_type, codec, (data_key(topic),), latched == "latched"
             )
             return LiveToken(node_id, record)
-        if words[:1] == ["sub"] and len(words) == _SUBSCRIBER_CHUNKS:
-            _kind, id_, topic, msg_type = words
+        if chunks[:1] == ["sub"] and len(chunks) == _SUBSCRIBER_CHUNKS:
+            _kind, id_, topic, msg_type = chunks
             if topic.startswith(SERVICE_PREFIX):
                 return None
             return LiveToken(node_id, SubscriberRecord(_parse_id(id_), topic, msg_type))
-        return _parse_service(node_id, *words)
+        return _parse_service(node_id, *chunks)
     except ValueError:
         return None
 
@@ -200,9 +200,9 @@ def _parse_service(node_id: str, kind: str = "", id_: str = "", *rest: str) -> L
     return None
 
 
-def _parse_id(word: str) -> int:
+def _parse_id(chunk: str) -> int:
     # Raises `ValueError`.
-    number = int(word, 16)
+    number = int(chunk, 16)
     if not 0 < number <= _MAX_ID:
-        raise ValueError(word)
+        raise ValueError(chunk)
     return number

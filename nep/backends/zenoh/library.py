@@ -46,14 +46,14 @@ def load_zenoh(load: Callable[[str], ModuleType] = importlib.import_module) -> A
         ) from error
 
 
-def create_handler(take: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Any:  # noqa: ANN401 - zenoh is not typed
-    """Return a zenoh handler that calls `take` in zenoh's network thread, which preserves the order.
+def create_handler(callback: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Any:  # noqa: ANN401 - zenoh is not typed
+    """Return a zenoh handler that calls `callback` in zenoh's network thread, which preserves the order.
 
     Args:
-        take: Called with each sample, reply or query.
-        drop: Called when no further call of `take` follows; None if not needed.
+        callback: Called with each sample, reply or query.
+        drop: Called when no further call of `callback` follows; None if not needed.
     """
-    return importlib.import_module("zenoh.handlers").Callback(take, drop, indirect=False)
+    return importlib.import_module("zenoh.handlers").Callback(callback, drop, indirect=False)
 
 
 def open_session(config: Any) -> Any:  # noqa: ANN401 - zenoh is not typed

@@ -92,37 +92,37 @@ def validate_address(master: str | None = None) -> str:
         raise WrongTypeError(
             _("a zenoh address must be a 'str', not a '{kind}'").format(kind=type(master).__name__)
         )
-    place = master or os.environ.get(CONFIG_VARIABLE, "") or "local"
-    if _LOCAL_ADDRESS.fullmatch(place) or place.endswith(_FILE_SUFFIXES) or _parse_endpoints(place):
-        return place
+    address = master or os.environ.get(CONFIG_VARIABLE, "") or "local"
+    if _LOCAL_ADDRESS.fullmatch(address) or address.endswith(_FILE_SUFFIXES) or _parse_endpoints(address):
+        return address
     raise NepError(
         _(
             "'{place}' isn't a zenoh address; use 'local', an endpoint such as 'tcp/192.168.1.5:7447', "
             "or a zenoh configuration file such as 'zenoh.json5'"
-        ).format(place=place)
+        ).format(place=address)
     )
 
 
-def _parse_endpoints(place: str) -> tuple[str, ...]:
+def _parse_endpoints(address: str) -> tuple[str, ...]:
     # Returns () if the place isn't a list of endpoints.
-    words = tuple(word.strip() for word in place.split(","))
-    return words if all(map(_ENDPOINT.fullmatch, words)) else ()
+    endpoints = tuple(endpoint.strip() for endpoint in address.split(","))
+    return endpoints if all(map(_ENDPOINT.fullmatch, endpoints)) else ()
 
 
-def open_session_at(place: str, wait_s: float | None) -> OpenSession:
+def open_session_at(address: str, wait_s: float | None) -> OpenSession:
     """Open a session at a network address. Raises `NepError` on failure.
 
     Args:
-        place: Network address returned by `validate_address`.
+        address: Network address returned by `validate_address`.
         wait_s: Seconds to wait for a router; None waits forever.
     """
-    local = _LOCAL_ADDRESS.fullmatch(place)
+    local = _LOCAL_ADDRESS.fullmatch(address)
     if local is not None:
         return _open_local(local.group(1) or "nodes")
     check_free_descriptors(_FDS_PER_SESSION, "a session of zenoh")
-    endpoints = _parse_endpoints(place)
+    endpoints = _parse_endpoints(address)
     if not endpoints:
-        return OpenSession(_open_from_file(Path(place)))
+        return OpenSession(_open_from_file(Path(address)))
     settings: dict[str, object] = {
         "mode": "client",
         "connect": {
@@ -135,7 +135,7 @@ def open_session_at(place: str, wait_s: float | None) -> OpenSession:
         f"tcp://{each.removeprefix('tcp/')}" for each in endpoints if each.startswith("tcp/")
     )
     return OpenSession(
-        _open_session(_create_config(settings), place), endpoints=tcp_endpoints, routers=endpoints
+        _open_session(_create_config(settings), address), endpoints=tcp_endpoints, routers=endpoints
     )
 
 
@@ -152,7 +152,7 @@ def _open_local(name: str) -> OpenSession:
 
 def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
     # Another program may bind the port before zenoh does; then try another port.
-    for left in reversed(range(_PORT_ATTEMPTS)):
+    for remaining_attempts in reversed(range(_PORT_ATTEMPTS)):
         port = free_port()
         settings: dict[str, object] = {
             "mode": "peer",
@@ -168,7 +168,7 @@ def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
         try:
             return port, open_session(_create_config(settings))
         except load_zenoh().ZError as error:
-            if not left:
+            if not remaining_attempts:
                 raise NepError(
                     _("zenoh can't listen at '{host}': {error}").format(
                         host=LOOPBACK, error=_error_text(error)
@@ -215,7 +215,7 @@ def _load_config(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
     return config
 
 
-def _open_session(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh is not typed
+def _open_session(config: Any, address: str) -> Any:  # noqa: ANN401 - zenoh is not typed
     try:
         return open_session(config)
     except load_zenoh().ZError as error:
@@ -230,7 +230,7 @@ def _open_session(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh is no
                 "zenoh can't open a session at '{place}': {error}; check that a router is running there "
                 "and that it allows this connection"
             )
-        raise NepError(reason.format(place=place, error=message)) from error
+        raise NepError(reason.format(place=address, error=message)) from error
 
 
 def _error_text(error: Exception) -> str:

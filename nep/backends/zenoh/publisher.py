@@ -150,6 +150,6 @@ class ZenohPublisher:
 
     def release(self) -> None:
         """Undeclare the publisher's key expressions at the session."""
-        for each in (self._hellos, self._listener, self._out):
+        for entity in (self._hellos, self._listener, self._out):
             with suppress(load_zenoh().ZError):  # closing the session has undeclared it
-                each.undeclare()
+                entity.undeclare()

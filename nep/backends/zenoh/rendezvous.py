@@ -95,7 +95,7 @@ class Rendezvous:
 
     def entries(self) -> list[SessionEntry]:
         """Return the sessions of running processes; delete the files of processes that have ended."""
-        found = []
+        live_entries = []
         for path in self._folder.iterdir():
             entry = _parse_entry(path.name)
             if entry is None:
@@ -108,8 +108,8 @@ class Rendezvous:
                     "skipping process %d, which is suspended; nodes created now can't reach it", entry.pid
                 )
             else:
-                found.append(entry)
-        return found
+                live_entries.append(entry)
+        return live_entries
 
     def add(self, port: int) -> SessionEntry:
         """Create and return the entry of a session of this process, which listens on `port`."""
@@ -134,15 +134,15 @@ def _root_folder() -> Path:
 def _create_private_folder(folder: Path) -> Path:
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.lstat()
+        status = folder.lstat()
     except OSError as error:
         raise NepError(
             _(
                 "can't use '{folder}' to connect nodes: {error}; set XDG_RUNTIME_DIR to a folder that you own"
             ).format(folder=folder, error=error.strerror or error)
         ) from error
-    is_ours = sys.platform == "win32" or found.st_uid == os.getuid()
-    if not stat.S_ISDIR(found.st_mode) or not is_ours:
+    is_ours = sys.platform == "win32" or status.st_uid == os.getuid()
+    if not stat.S_ISDIR(status.st_mode) or not is_ours:
         raise NepError(
             _(
                 "can't use '{folder}' to connect nodes: it belongs to another user; set XDG_RUNTIME_DIR to "
@@ -153,12 +153,12 @@ def _create_private_folder(folder: Path) -> Path:
 
 
 def _parse_entry(name: str) -> SessionEntry | None:
-    words = name.split("-")
-    if len(words) != len(SessionEntry._fields) or not all(
-        each.isascii() and each.isdigit() for each in words
+    parts = name.split("-")
+    if len(parts) != len(SessionEntry._fields) or not all(
+        each.isascii() and each.isdigit() for each in parts
     ):
         return None
-    entry = SessionEntry(*map(int, words))
+    entry = SessionEntry(*map(int, parts))
     return entry if 0 < entry.port < 65536 and 0 < entry.pid < 2**31 else None
 
 

@@ -32,27 +32,27 @@ class Roster:
         self._patterns: set[str] = set()
         self._count = 0
 
-    def update(self, alive: LiveToken, *, is_there: bool) -> None:
+    def update(self, alive: LiveToken, *, is_present: bool) -> None:
         """Add or remove a node, publisher or subscriber. Idempotent.
 
         Args:
             alive: Liveliness token.
-            is_there: True to add the token, False to remove it.
+            is_present: True to add the token, False to remove it.
         """
         with self._lock:
-            if is_there and self._count >= _MAX_TOKENS:
+            if is_present and self._count >= _MAX_TOKENS:
                 return
             node_id, record = alive
             if isinstance(record, NodeRecord):
                 before = len(self._nodes)
                 self._nodes.pop(node_id, None)
-                if is_there:
+                if is_present:
                     self._nodes[node_id] = record
                 self._count += len(self._nodes) - before
             elif isinstance(record, PublisherRecord):
-                self._count += _update_table(self._publishers, (node_id, record), is_there)
+                self._count += _update_table(self._publishers, (node_id, record), is_present)
             else:
-                self._count += _update_table(self._subscribers, (node_id, record), is_there)
+                self._count += _update_table(self._subscribers, (node_id, record), is_present)
                 if is_pattern(record.topic):
                     self._patterns.discard(record.topic)
                     if record.topic in self._subscribers:
@@ -60,11 +60,11 @@ class Roster:
 
     def count_subscribers(self, topic: str) -> int:
         """Return the number of subscribers of a topic."""
-        found = len(self._subscribers.get(topic, ()))
+        count = len(self._subscribers.get(topic, ()))
         if not self._patterns:
-            return found
+            return count
         with self._lock:
-            return found + sum(len(self._subscribers[each]) for each in self._matching_patterns_locked(topic))
+            return count + sum(len(self._subscribers[each]) for each in self._matching_patterns_locked(topic))
 
     def _matching_patterns_locked(self, topic: str) -> list[str]:
         # Returns the patterns that match `topic`, except `topic` itself.
@@ -92,9 +92,9 @@ class Roster:
         """Return the subscribers of a topic."""
         with self._lock:
             entries = [
-                found
+                entry
                 for each in (topic, *self._matching_patterns_locked(topic))
-                for found in self._subscribers.get(each, {}).values()
+                for entry in self._subscribers.get(each, {}).values()
             ]
             return tuple(
                 ExpectedSubscriber(each.id, node_id, self._node_name(node_id)) for node_id, each in entries
@@ -131,14 +131,14 @@ class Roster:
 
 
 def _update_table(
-    table: dict[str, dict[int, tuple[str, _Record]]], alive: tuple[str, _Record], is_there: bool
+    table: dict[str, dict[int, tuple[str, _Record]]], alive: tuple[str, _Record], is_present: bool
 ) -> int:
     # Returns the change of the number of entries.
     record = alive[1]
     entries = table.setdefault(record.topic, {})
     before = len(entries)
     entries.pop(record.id, None)
-    if is_there:
+    if is_present:
         entries[record.id] = alive
     if not entries:
         del table[record.topic]
@@ -146,8 +146,8 @@ def _update_table(
 
 
 def _group_by_node(table: dict[str, dict[int, tuple[str, _Record]]]) -> dict[str, list[_Record]]:
-    found: dict[str, list[_Record]] = {}
+    records_by_node: dict[str, list[_Record]] = {}
     for entries in table.values():
         for node_id, record in entries.values():
-            found.setdefault(node_id, []).append(record)
-    return found
+            records_by_node.setdefault(node_id, []).append(record)
+    return records_by_node

@@ -140,10 +140,10 @@ class ZenohServer:
             if self.is_closed:
                 return
             self.is_closed = True
-            left, self._queries = tuple(self._queries), set()
+            pending, self._queries = tuple(self._queries), set()
         with suppress(load_zenoh().ZError):  # closing the session has undeclared it
             self._queryable.undeclare()
-        for query in left:
+        for query in pending:
             query.drop()
         self._on_close(self)
 
@@ -208,22 +208,22 @@ class ZenohClient(ClientCalls[_Call]):
         return len(self._servers)
 
     def start_call(
-        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> OpenCall:
         """Send a call. See `ClientTransport.start_call`."""
-        call = self._new_call(data, timeout_s, then)
+        call = self._new_call(data, timeout_s, callback)
         self._send(call, next(iter(self._servers), ""))
         self._deadlines.add(call.deadline)
         return call
 
     def start_survey(
-        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> list[OpenCall]:
         """Send a call to each server. See `SurveyTransport.start_survey`."""
         calls: list[OpenCall] = []
         try:
             for key in self._servers:
-                call = self._new_call(data, timeout_s, then)
+                call = self._new_call(data, timeout_s, callback)
                 calls.append(call)
                 self._send(call, key)
                 self._deadlines.add(call.deadline)
@@ -232,13 +232,15 @@ class ZenohClient(ClientCalls[_Call]):
             raise
         return calls
 
-    def _new_call(self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback) -> _Call:
+    def _new_call(
+        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
+    ) -> _Call:
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
             if self.is_closed:
                 raise self._closed_error()
             check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
-            call = _Call(next(self._numbers), data, timeout_s, deadline, then)
+            call = _Call(next(self._numbers), data, timeout_s, deadline, callback)
             self._calls[call.number] = call
             self._bytes += len(data)
         return call
@@ -364,9 +366,9 @@ class ZenohClient(ClientCalls[_Call]):
             if self.is_closed:
                 return
             self.is_closed = True
-            left, self._calls = list(self._calls.values()), {}
+            in_flight, self._calls = list(self._calls.values()), {}
         self._session.discard_service(self)
         self._deadlines.remove_client(self)
         self._on_close(self)
-        for call in left:
+        for call in in_flight:
             self._run_callback(call, self._closed_error())

@@ -126,14 +126,14 @@ class ZenohSession:
 
     Args:
         node: Record of the node.
-        place: Network address returned by `validate_address`.
+        address: Network address returned by `validate_address`.
         wait_s: Seconds to wait for a router; None waits forever.
 
     Raises:
         NepError: The session can't be opened.
     """
 
-    def __init__(self, node: NodeRecord, place: str, wait_s: float | None) -> None:
+    def __init__(self, node: NodeRecord, address: str, wait_s: float | None) -> None:
         self.node = node
         self.roster = Roster()
         self._lock = threading.Lock()
@@ -145,7 +145,7 @@ class ZenohSession:
         self._outputs: dict[int, Any] = {}
         self._load = CpuLoad()
         self._graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
-        self._opened = open_session_at(place, wait_s)
+        self._opened = open_session_at(address, wait_s)
         self.endpoints = self._opened.endpoints
         self._zenoh: Any = self._opened.session
         try:
@@ -167,8 +167,8 @@ class ZenohSession:
         request: Request | None,
         timeout_s: float,
         *,
-        take: Callable[[Any], None] | None = None,
-        over: Callable[[], None] | None = None,
+        on_reply: Callable[[Any], None] | None = None,
+        on_finished: Callable[[], None] | None = None,
         is_last: bool = False,
     ) -> PendingQuery:
         """Send a query to all nodes that reply at a key, without waiting for the replies.
@@ -177,19 +177,19 @@ class ZenohSession:
             key: Key expression.
             request: Request in the payload, or None.
             timeout_s: Seconds until the query is finished.
-            take: Called with each reply, in a zenoh thread.
-            over: Called when the query is finished.
+            on_reply: Called with each reply, in a zenoh thread.
+            on_finished: Called when the query is finished.
             is_last: True to send the query after all messages that were published before.
 
         Returns:
             The query, which can be waited for.
         """
         zenoh = load_zenoh()
-        query = PendingQuery(timeout_s, over)
+        query = PendingQuery(timeout_s, on_finished)
 
         def handle_reply(reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
-            if take is not None and reply.ok is not None:
-                take(reply.ok)
+            if on_reply is not None and reply.ok is not None:
+                on_reply(reply.ok)
             query.add_reply(reply)
 
         self._zenoh.get(
@@ -225,15 +225,15 @@ class ZenohSession:
 
     def _handle_query(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         # Runs in a zenoh thread.
-        asked = decode_request(b"" if query.payload is None else query.payload.to_bytes()).request
-        answer = b""
-        if isinstance(asked, requests.QueryGraph):
-            answer = pack_saturated([encode_request(each, 0) for each in self._own_requests()])
-        elif isinstance(asked, requests.RemovePublisher):
+        request = decode_request(b"" if query.payload is None else query.payload.to_bytes()).request
+        reply = b""
+        if isinstance(request, requests.QueryGraph):
+            reply = pack_saturated([encode_request(each, 0) for each in self._own_requests()])
+        elif isinstance(request, requests.RemovePublisher):
             for subscriber in self._subscribers:
-                subscriber.handle_bye(asked.id, asked.last_seq)
+                subscriber.handle_bye(request.id, request.last_seq)
         with query:
-            query.reply(call_key(self.node.id), answer)
+            query.reply(call_key(self.node.id), reply)
 
     def _own_requests(self) -> tuple[Request, ...]:
         # Returns this node's registration and statistics; empty if it has nothing registered.
@@ -285,8 +285,8 @@ class ZenohSession:
         alive = parse_token(str(sample.key_expr))
         if alive is None:
             return
-        is_there = sample.kind == load_zenoh().SampleKind.PUT
-        self.roster.update(alive, is_there=is_there)
+        is_present = sample.kind == load_zenoh().SampleKind.PUT
+        self.roster.update(alive, is_present=is_present)
         record = alive.record
         if not isinstance(record, PublisherRecord):
             return
@@ -297,7 +297,7 @@ class ZenohSession:
             return
         for subscriber in self._subscribers:
             if subscriber.matches_topic(record.topic):
-                if is_there:
+                if is_present:
                     subscriber.add_publisher(self.roster.remote_publisher(alive.node_id, record))
                     self._start_handshake(record, subscriber)
                 else:
@@ -309,8 +309,8 @@ class ZenohSession:
             hello_key(record.topic, record.id),
             None,
             _HANDSHAKE_TIMEOUT_S,
-            take=subscriber.receive_reply,
-            over=lambda: subscriber.end_handshake((record.id,)),
+            on_reply=subscriber.receive_reply,
+            on_finished=lambda: subscriber.end_handshake((record.id,)),
         )
 
     def query_graph(self, timeout_s: float) -> GraphView:
@@ -326,16 +326,21 @@ class ZenohSession:
             )
         query = self.send_query(ALL_CALLS_KEY, requests.QueryGraph(), timeout_s)
         query.wait()
-        told = [_parse_requests(key, answer) for key, answer in query.replies.items()]
+        request_lists = [_parse_requests(key, reply) for key, reply in query.replies.items()]
         with self._lock:
             now = time.monotonic()
-            spoken = {each.node.id for said in told for each in said if isinstance(each, requests.Join)}
-            members = [each for each in self.roster.members() if each[0].id not in spoken]
-            there = spoken | {each[0].id for each in members}
-            for gone in self._graph.members.keys() - there:
-                self._graph.apply(requests.Leave(gone), 0, now, "")
+            replied_ids = {
+                each.node.id
+                for node_requests in request_lists
+                for each in node_requests
+                if isinstance(each, requests.Join)
+            }
+            members = [each for each in self.roster.members() if each[0].id not in replied_ids]
+            alive_ids = replied_ids | {each[0].id for each in members}
+            for departed_id in self._graph.members.keys() - alive_ids:
+                self._graph.apply(requests.Leave(departed_id), 0, now, "")
             silent = [requests.Join(node, 0, outs, ins) for node, outs, ins in members]
-            for request in (*silent, *(each for said in told for each in said)):
+            for request in (*silent, *(each for node_requests in request_lists for each in node_requests)):
                 self._graph.apply(request, 0, now, "")
             return self._graph.view()
 
@@ -383,13 +388,13 @@ class ZenohSession:
         Waits up to `timeout_s` seconds. A publisher replies with its history and the sequence number of its
         last message.
         """
-        there = self._publishers_for(subscriber)
-        for remote in there:
+        publishers = self._publishers_for(subscriber)
+        for remote in publishers:
             subscriber.add_publisher(remote)
         spec = subscriber.spec
         key = pattern_hellos_key(spec.topic) if spec.is_pattern else hellos_key(spec.topic)
-        self.send_query(key, None, timeout_s, take=subscriber.receive_reply).wait()
-        subscriber.end_handshake(each.publisher.id for each in there)
+        self.send_query(key, None, timeout_s, on_reply=subscriber.receive_reply).wait()
+        subscriber.end_handshake(each.publisher.id for each in publishers)
 
     def _publishers_for(self, subscriber: ZenohSubscriber) -> tuple[RemotePublisher, ...]:
         topics = self.roster.published_topics if subscriber.spec.is_pattern else (subscriber.spec.topic,)
@@ -411,15 +416,15 @@ class ZenohSession:
     def discard(self, closed: ZenohPublisher | ZenohSubscriber) -> None:
         """Remove a closed publisher or subscriber and undeclare its liveliness token."""
         with self._lock:
-            self._publishers = tuple(each for each in self._publishers if each is not closed)
-            self._subscribers = tuple(each for each in self._subscribers if each is not closed)
+            self._publishers = tuple(entity for entity in self._publishers if entity is not closed)
+            self._subscribers = tuple(entity for entity in self._subscribers if entity is not closed)
             undeclared = [self._tokens.pop(closed, None)]
             if isinstance(closed, ZenohSubscriber):
                 undeclared.append(self._outputs.pop(closed.spec.id, None))
-        for each in undeclared:
-            if each is not None:
+        for entity in undeclared:
+            if entity is not None:
                 with suppress(load_zenoh().ZError):  # closing the session has undeclared it
-                    each.undeclare()
+                    entity.undeclare()
 
     # ---- servers and clients
 
@@ -445,14 +450,14 @@ class ZenohSession:
             with suppress(load_zenoh().ZError):  # closing the session has undeclared it
                 token.undeclare()
 
-    def declare_queryable(self, key: str, take: Callable[[Any], None]) -> Any:  # noqa: ANN401 - zenoh is not typed
+    def declare_queryable(self, key: str, on_query: Callable[[Any], None]) -> Any:  # noqa: ANN401 - zenoh is not typed
         """Declare a queryable and return it.
 
         Args:
             key: Key expression of the queryable.
-            take: Called with each query, in a zenoh thread.
+            on_query: Called with each query, in a zenoh thread.
         """
-        return self._zenoh.declare_queryable(key, create_handler(take))
+        return self._zenoh.declare_queryable(key, create_handler(on_query))
 
     def call(
         self,
@@ -502,10 +507,10 @@ class ZenohSession:
         close_session(self._zenoh)
 
 
-def _parse_requests(key: str, answer: bytes) -> tuple[Request, ...]:
+def _parse_requests(key: str, reply: bytes) -> tuple[Request, ...]:
     # Ignores malformed requests and those about other nodes.
     try:
-        bodies = unpack_bounded(answer, _MAX_REPLIES, _MAX_LIST_ITEMS) if answer else []
+        bodies = unpack_bounded(reply, _MAX_REPLIES, _MAX_LIST_ITEMS) if reply else []
     except ValueError:
         return ()
     if not isinstance(bodies, list) or not all(isinstance(each, bytes) for each in bodies):

@@ -71,11 +71,11 @@ class ZenohSubscriber(WakingSubscriber):
 
     def _new_topic_parser(self, topic: str) -> _TopicParser:
         spec = self.spec if topic == self.spec.topic else replace(self.spec, topic=topic)
-        own = hello_part(spec.id, topic)
+        subscriber_part = hello_part(spec.id, topic)
         parser = MessageParser(
-            spec, own, self._sources, self._remove_publisher, lambda _publisher, _seq: None
+            spec, subscriber_part, self._sources, self._remove_publisher, lambda _publisher, _seq: None
         )
-        return _TopicParser(topic_part(topic), own, parser)
+        return _TopicParser(topic_part(topic), subscriber_part, parser)
 
     def matches_topic(self, topic: str) -> bool:
         """Return True if the subscriber receives messages of this topic."""
@@ -232,8 +232,8 @@ class ZenohSubscriber(WakingSubscriber):
             source = self._sources.find(publisher)
             if source is not None:
                 source.is_silent = True
-            for each in self._sources.expired_publishers(0.0):
-                self._sources.pop(each)
+            for expired_id in self._sources.expired_publishers(0.0):
+                self._sources.pop(expired_id)
 
     def handle_bye(self, publisher: int, last_seq: int) -> None:
         """Remove a publisher that has closed, and count its missing messages up to `last_seq` as lost."""

@@ -79,9 +79,9 @@ class ZenohTransport:
             session.check(publisher.record)
             self._add(self._publishers, publisher, session)
             session.add_publisher(publisher)
-            answered = session.sync_all(HANDSHAKE_TIMEOUT_S)
+            replied_keys = session.sync_all(HANDSHAKE_TIMEOUT_S)
             expected = session.roster.subscribers_of(spec.topic)
-            missing = [each for each in expected if call_key(each.node_id) not in answered]
+            missing = [each for each in expected if call_key(each.node_id) not in replied_keys]
             publisher.missing = tuple(dict.fromkeys(each.node_name for each in missing))
             publisher.missing_ids = tuple(each.id for each in missing)
         except BaseException:  # also Ctrl+C: the caller has no object to close yet
@@ -202,8 +202,8 @@ class ZenohTransport:
             pending_flush = self._pending_flushes.pop(publisher, None)
             session = self._publishers.pop(publisher, None)
         if pending_flush is not None:
-            wanted = frozenset(call_key(each.node_id) for each in pending_flush.expected)
-            silent = pending_flush.query.wait(wanted, deadline)
+            expected_keys = frozenset(call_key(each.node_id) for each in pending_flush.expected)
+            silent = pending_flush.query.wait(expected_keys, deadline)
             listed_ids = {
                 each.id for each in pending_flush.session.roster.subscribers_of(publisher.spec.topic)
             }

@@ -106,11 +106,11 @@ def select_endpoint(remote: RemotePublisher, master: str) -> RemotePublisher:
     publisher = remote.publisher
     if not publisher.endpoints:
         return remote
-    chosen = reachable_endpoint(publisher.endpoints, master)
+    endpoint = reachable_endpoint(publisher.endpoints, master)
     if publisher.local and has_unix_sockets() and is_loopback(master):
-        name = unix_socket_name(chosen)
-        chosen = name if name and _is_reachable(name) else chosen
-    return replace(remote, publisher=replace(publisher, endpoints=(chosen,) if chosen else ()))
+        name = unix_socket_name(endpoint)
+        endpoint = name if name and _is_reachable(name) else endpoint
+    return replace(remote, publisher=replace(publisher, endpoints=(endpoint,) if endpoint else ()))
 
 
 class Bindings:
@@ -146,7 +146,7 @@ class Bindings:
         Each host gets its own port. Hosts that can't be bound are skipped. Raises `AddressInUseError` or
         `TooManyFilesError` if no host is bound.
         """
-        for host in [known for known in self._bound if known not in hosts]:
+        for host in [bound_host for bound_host in self._bound if bound_host not in hosts]:
             self._unbind_host(host)
         problem: AddressInUseError | TooManyFilesError | None = None
         for host in hosts:

@@ -73,11 +73,11 @@ def _is_connection_to(frame: zmq.Frame, endpoint: str) -> bool:
         return False
     finally:
         connection.detach()
-    scheme, _colon, place = endpoint.partition("://")
+    scheme, _colon, address = endpoint.partition("://")
     if scheme == "ipc":
         name = peer if isinstance(peer, bytes) else str(peer).encode()
-        return name == place.replace("@", "\0", 1).encode()
-    host, _colon, port = place.rpartition(":")
+        return name == address.replace("@", "\0", 1).encode()
+    host, _colon, port = address.rpartition(":")
     if not isinstance(peer, tuple) or str(peer[1]) != port:
         return False
     return not _IPV4_ADDRESS.fullmatch(host) or peer[0] == host

@@ -345,35 +345,35 @@ class SharedContext:
             self.io.close()
             raise
 
-    def socket(self, kind: int, what: str) -> Socket:
+    def socket(self, kind: int, owner: str) -> Socket:
         """Create a socket with a linger of 0.
 
         Args:
             kind: Socket type of zmq.
-            what: Owner of the socket, for error messages.
+            owner: Owner of the socket, for error messages.
 
         Raises:
             TooManyFilesError: The process is out of file descriptors.
         """
-        self._wait_for_room(what)
+        self._wait_for_room(owner)
         try:
             created = self._context.socket(kind)
         except zmq.ZMQError as error:
             if is_descriptor_shortage(error.errno):
-                raise TooManyFilesError(what, open_descriptor_count(), descriptor_limit()) from error
+                raise TooManyFilesError(owner, open_descriptor_count(), descriptor_limit()) from error
             if self._context.closed:
                 raise ClosedError("the node") from error
             raise
         created.setsockopt(zmq.LINGER, 0)
         return created
 
-    def _wait_for_room(self, what: str) -> None:
+    def _wait_for_room(self, owner: str) -> None:
         # libzmq closes sockets asynchronously, so recently closed ones may still hold descriptors.
         for _ in range(_ROOM_CHECKS):
             if has_free_descriptors(_FDS_PER_SOCKET + RESERVED_DESCRIPTORS):
                 return
             self._pause.wait(_ROOM_CHECK_S)
-        check_free_descriptors(_FDS_PER_SOCKET, what)
+        check_free_descriptors(_FDS_PER_SOCKET, owner)
 
     def acquire_waker(self) -> Waker:
         """Return a waker for a waiting thread, from the pool if possible. Raises `TooManyFilesError`."""

@@ -285,12 +285,12 @@ class PublisherTracker:
         These are unregistered publishers whose bye is overdue at `now`, and the oldest silent publishers
         beyond `MAX_UNLISTED_PUBLISHERS`.
         """
-        all_ = self.by_id.items()
-        silent = [each for each, source in all_ if source.is_silent and source.bye_deadline is None]
-        over = [
-            each for each, source in all_ if source.bye_deadline is not None and now >= source.bye_deadline
+        sources = self.by_id.items()
+        silent = [each for each, source in sources if source.is_silent and source.bye_deadline is None]
+        overdue = [
+            each for each, source in sources if source.bye_deadline is not None and now >= source.bye_deadline
         ]
-        return silent[: max(0, len(silent) - MAX_UNLISTED_PUBLISHERS)] + over
+        return silent[: max(0, len(silent) - MAX_UNLISTED_PUBLISHERS)] + overdue
 
     def unresponsive_publishers(self, now: float) -> list[int]:
         """Return the ids of publishers from which nothing was received before the reconnection time."""
@@ -314,8 +314,8 @@ class PublisherTracker:
 
 def _is_on_this_computer(remote: RemotePublisher) -> bool:
     # Older versions don't send the id of the computer; then the endpoints are compared.
-    own = computer_id()
-    if own and remote.computer:
-        return own == remote.computer
+    own_computer = computer_id()
+    if own_computer and remote.computer:
+        return own_computer == remote.computer
     endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
     return endpoint.startswith("ipc://") or is_loopback(endpoint.partition("://")[2])

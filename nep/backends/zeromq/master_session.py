@@ -238,10 +238,10 @@ class MasterSession:
         if not self._name.wait(wait_s) and wait_s is not None:
             raise MasterUnreachable(self.address, wait_s, is_known=False)
 
-    def _set_address(self, known: str) -> None:
+    def _set_address(self, address: str) -> None:
         if not self._is_near:
-            self._own_host = local_address_towards(known) or self._own_host
-        self._calls.connect(known)
+            self._own_host = local_address_towards(address) or self._own_host
+        self._calls.connect(address)
 
     def add_publisher(
         self, record: PublisherRecord, publisher: SessionPublisher, wait_s: float | None
@@ -305,17 +305,17 @@ class MasterSession:
             last_seq: Sequence number of its last message.
         """
         with self._lock:
-            known = self._publishers.pop(publisher, None)
+            removed = self._publishers.pop(publisher, None)
             self._confirmed.discard(publisher)
-        if known is not None:
+        if removed is not None:
             self._calls.notify(RemovePublisher(self._node.id, publisher, last_seq))
 
     def remove_subscriber(self, subscriber: int) -> None:
         """Unregister a subscriber by its id, without waiting."""
         with self._lock:
-            known = self._subscribers.pop(subscriber, None)
+            removed = self._subscribers.pop(subscriber, None)
             self._confirmed.discard(subscriber)
-        if known is not None:
+        if removed is not None:
             self._calls.notify(RemoveSubscriber(self._node.id, subscriber))
 
     def report_missing(self, publisher: int, subscribers: Iterable[int]) -> None:
@@ -352,9 +352,9 @@ class MasterSession:
         """Wait for the reply to the request of `start_leave`, until `timeout_s` seconds after it was sent."""
         if self._leaving is None:
             return
-        left = timeout_s + self._left_at - time.monotonic()
+        remaining_s = timeout_s + self._left_at - time.monotonic()
         try:
-            self._calls.wait(self._leaving, max(0.0, left))
+            self._calls.wait(self._leaving, max(0.0, remaining_s))
         except (MasterUnreachable, RequestRefusedError, ClosedError):
             _logger.debug("no reply from the master at '%s' while leaving", self.address)
 
@@ -368,12 +368,12 @@ class MasterSession:
 
     def serve(self, now: float) -> PollState:
         """Process replies; renew when a renewal is due, and immediately after a reconnection."""
-        answers = self._calls.read()
-        self._read_at = self._clock.now() if answers else self._read_at
-        for answer in answers:
-            self._handle_reply(answer.content, now)
-            if answer.callback is not None and not isinstance(answer.content, Push):
-                answer.callback(answer.content)
+        messages = self._calls.read()
+        self._read_at = self._clock.now() if messages else self._read_at
+        for message in messages:
+            self._handle_reply(message.content, now)
+            if message.callback is not None and not isinstance(message.content, Push):
+                message.callback(message.content)
         if self._is_closed:
             return PollState()
         is_connected = self._calls.is_connected
@@ -436,19 +436,19 @@ class MasterSession:
     def _select_endpoints(self, remotes: Iterable[RemotePublisher]) -> tuple[RemotePublisher, ...]:
         return tuple(select_endpoint(remote, self._name.known or self.address) for remote in remotes)
 
-    def _handle_reply(self, answer: Reply | Push, now: float) -> None:
-        if isinstance(answer, AddedReply | FoundReply | RenewedReply) and answer.hosts != self._served_hosts:
-            self._served_hosts = answer.hosts
+    def _handle_reply(self, reply: Reply | Push, now: float) -> None:
+        if isinstance(reply, AddedReply | FoundReply | RenewedReply) and reply.hosts != self._served_hosts:
+            self._served_hosts = reply.hosts
             self._renewal_timer.due_at = now
-        if isinstance(answer, PublisherAdded):
-            self._handle_publisher_added(answer)
-        elif isinstance(answer, PublisherRemoved):
-            self._handle_publisher_removed(answer)
-        elif isinstance(answer, RenewedReply):
-            self._handle_renewed(answer, now)
-        elif isinstance(answer, AddedReply | FoundReply) and self._epoch == 0:
-            self._epoch = answer.epoch
-        if self._epoch not in {0, answer.epoch}:
+        if isinstance(reply, PublisherAdded):
+            self._handle_publisher_added(reply)
+        elif isinstance(reply, PublisherRemoved):
+            self._handle_publisher_removed(reply)
+        elif isinstance(reply, RenewedReply):
+            self._handle_renewed(reply, now)
+        elif isinstance(reply, AddedReply | FoundReply) and self._epoch == 0:
+            self._epoch = reply.epoch
+        if self._epoch not in {0, reply.epoch}:
             self._join(now)
 
     def _handle_publisher_added(self, added: PublisherAdded) -> None:
@@ -459,13 +459,13 @@ class MasterSession:
                 subscriber.expect_all_messages(added.publisher.publisher.id)
             subscriber.connect(remotes)
 
-    def _handle_publisher_removed(self, gone: PublisherRemoved) -> None:
-        if gone.is_closed:
-            for _record, each in self._all_subscribers():
-                if isinstance(each, PatternSubscriber):
-                    each.record_early_close(gone.id)
-        for subscriber in self._subscribers_of(gone.topic, may_create=False):
-            subscriber.publisher_removed(gone.id, gone.last_seq, is_closed=gone.is_closed)
+    def _handle_publisher_removed(self, removed: PublisherRemoved) -> None:
+        if removed.is_closed:
+            for _record, pattern_subscriber in self._all_subscribers():
+                if isinstance(pattern_subscriber, PatternSubscriber):
+                    pattern_subscriber.record_early_close(removed.id)
+        for subscriber in self._subscribers_of(removed.topic, may_create=False):
+            subscriber.publisher_removed(removed.id, removed.last_seq, is_closed=removed.is_closed)
 
     def _renew(self) -> None:
         if self._epoch == 0:
@@ -489,49 +489,49 @@ class MasterSession:
                 self._load.ratio(),
                 offset or (),
             )
-            self._calls.notify(request, then=partial(self._add_clock_sample, self._clock.now()))
+            self._calls.notify(request, callback=partial(self._add_clock_sample, self._clock.now()))
 
-    def _add_clock_sample(self, sent: Moment, answer: Reply) -> None:
+    def _add_clock_sample(self, sent: Moment, reply: Reply) -> None:
         # Compares this computer's clock with the master's by the times of a renewal and its reply.
-        if not isinstance(answer, RenewedReply) or answer.epoch != self._epoch or not answer.times:
+        if not isinstance(reply, RenewedReply) or reply.epoch != self._epoch or not reply.times:
             return
         was_known = self._clock.offset() is not None
-        if len(answer.times) != 2:
+        if len(reply.times) != 2:
             self._calls.rejections.add(_("a reply to a renewal must have two times"))
-        elif self._clock.add(sent, *answer.times, self._read_at) and not was_known:
+        elif self._clock.add(sent, *reply.times, self._read_at) and not was_known:
             self._renewal_timer.due_at = self._read_at.steady_ns / 1e9  # other nodes wait for it
 
-    def _handle_renewed(self, answer: RenewedReply, now: float) -> None:
-        if answer.again:
+    def _handle_renewed(self, reply: RenewedReply, now: float) -> None:
+        if reply.again:
             self._join(now)
             return
-        self._revision = answer.revision
-        self._renewal_timer.set_interval(answer.next_s, now)
-        for topic in answer.topics:
+        self._revision = reply.revision
+        self._renewal_timer.set_interval(reply.next_s, now)
+        for topic in reply.topics:
             for subscriber in self._subscribers_of(topic.topic):
                 subscriber.reconcile(self._select_endpoints(topic.publishers))
-        self._update_clocks(self._parse_clock_differences(answer))
-        for _record, each in self._all_subscribers():
-            each.handle_renewal(now, answer.last_seqs.items())
+        self._update_clocks(self._parse_clock_differences(reply))
+        for _record, session_subscriber in self._all_subscribers():
+            session_subscriber.handle_renewal(now, reply.last_seqs.items())
 
-    def _parse_clock_differences(self, answer: RenewedReply) -> Mapping[str, ClockDifference]:
+    def _parse_clock_differences(self, reply: RenewedReply) -> Mapping[str, ClockDifference]:
         known_at_ns = time.monotonic_ns()
-        found = {
+        differences = {
             node_id: ClockDifference(*clock_times, known_at_ns)
-            for node_id, clock_times in answer.clocks.items()
+            for node_id, clock_times in reply.clocks.items()
             if len(clock_times) == 2 and is_plausible_clock(clock_times[0] // 2, clock_times[1] // 2)
         }
-        if len(found) < len(answer.clocks):
+        if len(differences) < len(reply.clocks):
             self._calls.rejections.add(_("a reported clock difference is impossible"))
-        return found
+        return differences
 
     def _update_clocks(self, clocks: Mapping[str, ClockDifference]) -> None:
         if clocks or self._clocks:
             self._clocks = clocks
-            for _record, each in self._all_subscribers():
+            for _record, subscriber in self._all_subscribers():
                 # replies of servers have no time stamps
-                if isinstance(each, NativeSubscriber | PatternSubscriber):
-                    each.set_clock_differences(clocks)
+                if isinstance(subscriber, NativeSubscriber | PatternSubscriber):
+                    subscriber.set_clock_differences(clocks)
 
     def _join(self, now: float) -> None:
         # Registers everything again, at most once per `_JOIN_RETRY_S`.
@@ -548,7 +548,7 @@ class MasterSession:
             subscribers = tuple(record for record, _ in self._subscribers.values())
             request = Join(self._node, self._epoch, publishers, subscribers)
             items = {record.id for record in publishers} | {record.id for record in subscribers}
-            self._calls.notify(request, then=lambda reply: self._handle_joined(reply, items))
+            self._calls.notify(request, callback=lambda reply: self._handle_joined(reply, items))
 
     def _handle_joined(self, reply: Reply, items: set[int]) -> None:
         if not isinstance(reply, FoundReply):
@@ -575,7 +575,7 @@ class MasterSession:
 
     def _subscribers_of(self, topic: str, *, may_create: bool = True) -> list[SessionSubscriber]:
         # Pattern subscribers create a member for a new topic only with `may_create`.
-        found: list[SessionSubscriber] = []
+        subscribers: list[SessionSubscriber] = []
         for record, subscriber in self._all_subscribers():
             if isinstance(subscriber, PatternSubscriber):
                 member = (
@@ -583,10 +583,10 @@ class MasterSession:
                     if _matches_pattern(record, topic)
                     else None
                 )
-                found += () if member is None else (member,)
+                subscribers += () if member is None else (member,)
             elif record.topic == topic:
-                found.append(subscriber)
-        return found
+                subscribers.append(subscriber)
+        return subscribers
 
     def _all_subscribers(self) -> list[tuple[SubscriberRecord, SessionSubscriber | PatternSubscriber]]:
         with self._lock:

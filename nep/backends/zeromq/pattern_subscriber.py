@@ -188,9 +188,9 @@ class PatternSubscriber(WakingSubscriber):
             member.connect_listed(())
         for remote in remotes:
             if remote.publisher.id not in closed:
-                found = self.member(remote.publisher.topic)
-                if found is not None:
-                    found.connect((remote,))
+                topic_member = self.member(remote.publisher.topic)
+                if topic_member is not None:
+                    topic_member.connect((remote,))
 
     def record_early_close(self, publisher: int) -> None:
         """Record the id of a closed publisher, which the reply to the registration may still list."""

@@ -151,10 +151,10 @@ class PendingBatch:
 
         At least one message must be pending.
         """
-        taken = self.pending[:MAX_BATCH_MESSAGES]
-        del self.pending[: len(taken)]  # more may have been appended meanwhile
-        self.until_ns = taken[-1][1] + BATCH_WINDOW_NS if self.is_allowed else 0
-        return taken
+        batch = self.pending[:MAX_BATCH_MESSAGES]
+        del self.pending[: len(batch)]  # more may have been appended meanwhile
+        self.until_ns = batch[-1][1] + BATCH_WINDOW_NS if self.is_allowed else 0
+        return batch
 
     def next_check_s(self, now_ns: int) -> float:
         """Return the time in seconds until the I/O thread must check again.

@@ -109,16 +109,16 @@ class HandshakePublisher:
     def expect(self, expected: Iterable[ExpectedSubscriber]) -> None:
         """Add registered subscribers whose hellos are expected."""
         with self._changed:
-            for each in expected:
-                self._expected.add(each.id)
-                self._names[each.id] = each.node_name
+            for subscriber in expected:
+                self._expected.add(subscriber.id)
+                self._names[subscriber.id] = subscriber.node_name
 
     def wait_for(self, expected: Iterable[ExpectedSubscriber], timeout_s: float) -> tuple[int, ...]:
         """Wait up to `timeout_s` seconds for the hellos of these subscribers; return the missing ids."""
-        wanted = {each.id for each in expected}
+        expected_ids = {each.id for each in expected}
         with self._changed:
-            wait_until(self._changed, lambda: wanted <= self._seen.keys(), timeout_s)
-            return tuple(wanted - self._seen.keys())
+            wait_until(self._changed, lambda: expected_ids <= self._seen.keys(), timeout_s)
+            return tuple(expected_ids - self._seen.keys())
 
 
 class NativePublisher(HandshakePublisher):
@@ -258,9 +258,9 @@ class NativePublisher(HandshakePublisher):
         else:
             self._send_now(data, extension_fields)
 
-    def fast_publish_function(self, asked: PublishHooks) -> Callable[..., None]:
+    def fast_publish_function(self, hooks: PublishHooks) -> Callable[..., None]:
         """Return the fast publish function. See `nep.backends.base.SupportsFastPublish`."""
-        return self._batch.publish_function(asked, self, self._lock)
+        return self._batch.publish_function(hooks, self, self._lock)
 
     def send_now(self, data: bytes) -> None:
         """Send pending messages, then the message with payload `data`."""
@@ -288,8 +288,8 @@ class NativePublisher(HandshakePublisher):
             if total >= self._full_path_at or extension or self._flags:
                 self._send_all_locked(data, extension, size)
             elif size < _MAX_ONE_PART_BYTES and not self._legacy_filters and type(data) is bytes:
-                head = pack_header(self._form, size, seq, stamp_ns, self._id)
-                self._send(b"".join((self._topic, head, data)))
+                header = pack_header(self._form, size, seq, stamp_ns, self._id)
+                self._send(b"".join((self._topic, header, data)))
                 self._batch.open_window(stamp_ns)
             else:
                 self._send_in_parts_locked(data, size, seq, stamp_ns)
@@ -333,9 +333,9 @@ class NativePublisher(HandshakePublisher):
                 and total < self._full_path_at
                 and not (extension or self._flags)
             ):
-                head = pack_header(self._form | SHARED << 16, len(number), seq, stamp_ns, self._id)
+                header = pack_header(self._form | SHARED << 16, len(number), seq, stamp_ns, self._id)
                 # subscribers with shared memory accept one part
-                self._send(b"".join((self._topic, head, number)))
+                self._send(b"".join((self._topic, header, number)))
             else:
                 self._send_all_locked(b"" if data is None else data, extension, size, number)
             self._poll_subscriptions_locked(stamp_ns)
@@ -387,9 +387,9 @@ class NativePublisher(HandshakePublisher):
 
     def _send_batches_locked(self, batch: PendingBatch) -> None:
         while batch.pending:
-            taken = batch.pop_batch()
-            self._last_stamp_ns = stamp_ns = taken[-1][1]
-            count, payloads, stamps_ns = len(taken), *zip(*taken, strict=True)
+            messages = batch.pop_batch()
+            self._last_stamp_ns = stamp_ns = messages[-1][1]
+            count, payloads, stamps_ns = len(messages), *zip(*messages, strict=True)
             size = sum(map(len, payloads))
             if count > 1 and batch.is_allowed and self._bytes + size < self._full_path_at:
                 part = encode_batch(self._topic, self._form, self._count + 1, self._id, stamps_ns, payloads)
@@ -397,11 +397,11 @@ class NativePublisher(HandshakePublisher):
                 self._bytes += size
                 self._send(part)
             else:
-                self._send_separately_locked(taken)
+                self._send_separately_locked(messages)
             self._poll_subscriptions_locked(stamp_ns)
 
-    def _send_separately_locked(self, taken: Iterable[tuple[bytes, int]]) -> None:
-        for data, stamp_ns in taken:
+    def _send_separately_locked(self, messages: Iterable[tuple[bytes, int]]) -> None:
+        for data, stamp_ns in messages:
             self._last_stamp_ns = stamp_ns
             self._count += 1
             self._bytes += len(data)
@@ -441,8 +441,8 @@ class NativePublisher(HandshakePublisher):
             else:
                 self._send_parts_locked(self._topic, shared)
             return
-        for each, own in self._subscriptions.hellos.items():
-            self._send_parts_locked(own, shared if each in readers else tail)
+        for subscriber, hello_bytes in self._subscriptions.hellos.items():
+            self._send_parts_locked(hello_bytes, shared if subscriber in readers else tail)
 
     def _shared_readers(self) -> set[int]:
         shared = self._subscriptions.shared
@@ -460,7 +460,7 @@ class NativePublisher(HandshakePublisher):
                 window.add_sent(self._count - 1, since)
         self._windowed_bytes = self._bytes
         has_acks = self._subscriptions.all_acknowledge
-        has_room = {each: window.has_room(size) for each, window in windows.items()}
+        has_room = {subscriber: window.has_room(size) for subscriber, window in windows.items()}
         if all(has_room.values()) and (has_acks or self._backlog.has_room(size)):
             if has_acks:
                 self._send_to_all_locked(tail, shared)
@@ -470,20 +470,20 @@ class NativePublisher(HandshakePublisher):
             receivers = windows
         else:
             self._full_path_at = 0  # check each message until all have room again
-            receivers = {each: window for each, window in windows.items() if has_room[each]}
-            for each, window in windows.items():
-                if each in receivers:
-                    is_shared = shared is not None and each in self._shared_readers()
-                    chosen = shared if is_shared and shared is not None else tail
-                    self._send_parts_locked(self._subscriptions.hellos[each], chosen)
+            receivers = {subscriber: window for subscriber, window in windows.items() if has_room[subscriber]}
+            for subscriber, window in windows.items():
+                if subscriber in receivers:
+                    is_shared = shared is not None and subscriber in self._shared_readers()
+                    parts = shared if is_shared and shared is not None else tail
+                    self._send_parts_locked(self._subscriptions.hellos[subscriber], parts)
                 else:
                     window.record_drop()
         for window in receivers.values():
             window.add_sent(self._count, size)
         now = time.monotonic()
-        for each, window in windows.items():
-            if window.should_request_ack(now, has_room=has_room[each]):
-                self._send_parts_locked(self._subscriptions.hellos[each], (self._encode_notice(0),))
+        for subscriber, window in windows.items():
+            if window.should_request_ack(now, has_room=has_room[subscriber]):
+                self._send_parts_locked(self._subscriptions.hellos[subscriber], (self._encode_notice(0),))
 
     def _send_tracked_locked(self, tail: tuple[Part, ...], size: int) -> None:
         # `size` is the number of bytes since the last tracked message, including this one.
@@ -523,7 +523,7 @@ class NativePublisher(HandshakePublisher):
         # Reads until the socket is empty.
         while not self._socket.closed and int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
             event = self._socket.recv(zmq.DONTWAIT, copy=False)
-            own = self._subscriptions.handle_event(
+            hello_bytes = self._subscriptions.handle_event(
                 event.bytes, self._count, partial(RemoteConnection.from_frame, event)
             )
             # Before the echo: a subscriber that received it must already be counted.
@@ -532,27 +532,27 @@ class NativePublisher(HandshakePublisher):
             self._expected.difference_update(self._seen)
             self.has_subscribers = self._subscriptions.has_subscribers
             self._batch.set_allowed(reads_batches=self._subscriptions.all_accept_batches)
-            if own is not None:
-                self._complete_handshake_locked(own)
+            if hello_bytes is not None:
+                self._complete_handshake_locked(hello_bytes)
             self._changed.notify_all()
             if self._full_path_at == 0:
                 self._notify_drops_locked()
 
     def _notify_drops_locked(self) -> None:
-        for each, window in self._subscriptions.windows.items():
+        for subscriber, window in self._subscriptions.windows.items():
             if window.should_notify():
-                self._send_parts_locked(self._subscriptions.hellos[each], (self._encode_notice(0),))
+                self._send_parts_locked(self._subscriptions.hellos[subscriber], (self._encode_notice(0),))
 
-    def _complete_handshake_locked(self, own: bytes) -> None:
+    def _complete_handshake_locked(self, hello_bytes: bytes) -> None:
         # The history, then the echo: from here on the subscriber counts losses.
         for message in self._history:
-            self._send_parts_locked(own, message)
+            self._send_parts_locked(hello_bytes, message)
         if self._history:
-            hello = parse_hello(own)
+            hello = parse_hello(hello_bytes)
             window = self._subscriptions.windows.get(hello.subscriber) if hello is not None else None
             if window is not None:
                 window.add_sent(self._count, self._history.size_bytes)
-        self._send_parts_locked(own, (self._encode_notice(0),))
+        self._send_parts_locked(hello_bytes, (self._encode_notice(0),))
 
     def _encode_notice(self, flags: int) -> bytes:
         return pack_header(encode_form(self._codec, flags), 0, self._count, time.time_ns(), self._id)
@@ -576,11 +576,13 @@ class NativePublisher(HandshakePublisher):
         `deadline` is a time of `time.monotonic`.
         """
         with self._changed:
-            while self._seen and (left := deadline - time.monotonic()) > 0.0:
-                if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_RETRY_S)):
+            while self._seen and (remaining_s := deadline - time.monotonic()) > 0.0:
+                if not wait_until(self._changed, lambda: not self._seen, min(remaining_s, _BYE_RETRY_S)):
                     self._send_bye_locked()  # a full queue drops the bye like any other message
             if self._seen:
-                undelivered = [max(self._count - seen, len(self._history)) for seen in self._seen.values()]
+                undelivered = [
+                    max(self._count - seen_count, len(self._history)) for seen_count in self._seen.values()
+                ]
                 if any(undelivered):  # otherwise only the bye is missing
                     _logger.warning(
                         "'%s' was closed before %d subscriber(s) received everything: "
@@ -602,6 +604,6 @@ class NativePublisher(HandshakePublisher):
 
     def _send_bye_locked(self) -> None:
         if not self._socket.closed:
-            for own in self._subscriptions.hellos.values():
-                self._send_parts_locked(own, (self._encode_notice(BYE),))
+            for hello_bytes in self._subscriptions.hellos.values():
+                self._send_parts_locked(hello_bytes, (self._encode_notice(BYE),))
             self._read_subscriptions_locked()

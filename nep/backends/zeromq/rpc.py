@@ -131,7 +131,7 @@ class RpcClient:
 
     def send_request(self, request: Request) -> PendingRequest:
         """Send a request without waiting; return the object to pass to `wait`."""
-        return self._send(request, is_waited=True, then=None)
+        return self._send(request, is_waited=True, callback=None)
 
     def wait(self, call: PendingRequest, timeout_s: float | None) -> Reply:
         """Wait for the reply to a request sent with `send_request`. Raises the same errors as `request`."""
@@ -169,34 +169,34 @@ class RpcClient:
             raise RequestRefusedError(_("the master's message isn't a reply"))
         return reply
 
-    def notify(self, request: Request, then: ReplyCallback | None = None) -> None:
+    def notify(self, request: Request, callback: ReplyCallback | None = None) -> None:
         """Send a request without waiting; the request is dropped if no master is connected.
 
         Args:
             request: Request to the master.
-            then: Called with the reply in the I/O thread; None to ignore the reply.
+            callback: Called with the reply in the I/O thread; None to ignore the reply.
         """
-        self._send(request, is_waited=False, then=then)
+        self._send(request, is_waited=False, callback=callback)
 
     def read(self) -> list[ReceivedMessage]:
         """Return up to `_MAX_MESSAGES_PER_READ` received messages and send pending requests.
 
         Call only in the I/O thread.
         """
-        answers: list[ReceivedMessage] = []
+        messages: list[ReceivedMessage] = []
         events = 0
         with self._changed:
-            while not (has_more := len(answers) >= _MAX_MESSAGES_PER_READ):
+            while not (has_more := len(messages) >= _MAX_MESSAGES_PER_READ):
                 events = self._events()
                 if events & zmq.POLLIN:
-                    answer = self._read_one_locked()
-                    if answer is not None:
-                        answers.append(answer)
+                    message = self._read_one_locked()
+                    if message is not None:
+                        messages.append(message)
                 elif not self._flush_locked():  # zmq_send may consume input
                     break
             self.has_more = has_more
             self.is_connected = bool(events & zmq.POLLOUT)
-        return answers
+        return messages
 
     def stop(self) -> None:
         """Fail all waiting requests with `ClosedError` and stop sending."""
@@ -210,10 +210,10 @@ class RpcClient:
             self._is_closed = True
             self._socket.close(0)
 
-    def _send(self, request: Request, *, is_waited: bool, then: ReplyCallback | None) -> PendingRequest:
+    def _send(self, request: Request, *, is_waited: bool, callback: ReplyCallback | None) -> PendingRequest:
         with self._changed:
             number = next(self._numbers)
-            call = PendingRequest(encode_request(request, number), is_waited, then)
+            call = PendingRequest(encode_request(request, number), is_waited, callback)
             if self._is_closed:
                 return call
             self._calls[number] = call
@@ -259,16 +259,16 @@ class RpcClient:
                 self._changed.notify_all()
             return None
         try:
-            number, answer = decode_reply(body)
+            number, reply = decode_reply(body)
         except WireError as error:
             self._reject(error)
             return None
         call = self._calls.pop(number, None)
-        if call is None or isinstance(answer, Push):
-            return ReceivedMessage(answer, None)
-        call.reply = answer
+        if call is None or isinstance(reply, Push):
+            return ReceivedMessage(reply, None)
+        call.reply = reply
         self._changed.notify_all()
-        return ReceivedMessage(answer, call.callback)
+        return ReceivedMessage(reply, call.callback)
 
     def _reject(self, error: WireError) -> None:
         if self.rejections.add(error.reason):

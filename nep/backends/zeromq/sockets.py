@@ -179,11 +179,11 @@ def enable_keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False)
         endpoint: Endpoint to connect to or to bind; the port may be "*".
         is_watched: True if the owner itself closes connections that don't respond.
     """
-    far = is_remote(endpoint)
-    owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if far else -1)
-    owner.setsockopt(zmq.TCP_MAXRT, SILENCE_TIMEOUT_MS if far and not is_watched else 0)
-    owner.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_TIMEOUT_MS if far else 0)
-    if far:
+    has_remote_peer = is_remote(endpoint)
+    owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if has_remote_peer else -1)
+    owner.setsockopt(zmq.TCP_MAXRT, SILENCE_TIMEOUT_MS if has_remote_peer and not is_watched else 0)
+    owner.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_TIMEOUT_MS if has_remote_peer else 0)
+    if has_remote_peer:
         owner.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)
         owner.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
         owner.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
@@ -196,10 +196,10 @@ def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout
     """
     deadline = time.monotonic() + timeout_s
     while not is_met():
-        left = deadline - time.monotonic()
-        if left <= 0.0:
+        remaining_s = deadline - time.monotonic()
+        if remaining_s <= 0.0:
             return False
-        changed.wait(min(left, _WAIT_SLICE_S))
+        changed.wait(min(remaining_s, _WAIT_SLICE_S))
     return True
 
 
@@ -258,10 +258,10 @@ class RemoteConnection:
                 if connection.getpeername() != self.peer:
                     return False
                 tcp_info = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO.size)
-            resent, asked, last_answer_ms = _TCP_INFO.unpack(tcp_info)
+            resent, probes, last_answer_ms = _TCP_INFO.unpack(tcp_info)
         except (OSError, struct.error):
             return False
-        return bool(max(resent, asked) >= _MIN_RETRIES and last_answer_ms >= SILENCE_TIMEOUT_MS)
+        return bool(max(resent, probes) >= _MIN_RETRIES and last_answer_ms >= SILENCE_TIMEOUT_MS)
 
     def close(self) -> None:
         """Close the connection if it is still open; libzmq then releases its queue."""
@@ -281,9 +281,9 @@ def _peer_of(fd: int) -> tuple[str, int] | None:
 
 def _duplicate_socket(fd: int) -> socket.socket:
     # Duplicates the descriptor, because libzmq may close the original at any moment.
-    own = os.dup(fd)
+    duplicate = os.dup(fd)
     try:
-        return socket.socket(fileno=own)
+        return socket.socket(fileno=duplicate)
     except OSError:  # not a socket
-        os.close(own)
+        os.close(duplicate)
         raise

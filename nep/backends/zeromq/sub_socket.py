@@ -101,7 +101,7 @@ class MessageParser:
         hello: Hello filter of the subscriber.
         sources: Publishers; updated by the parser.
         leave: Ends the connection to the publisher with this id.
-        tell: Sends an acknowledgement; called with the publisher id and the newest sequence number.
+        acknowledge: Sends an acknowledgement; called with the publisher id and the newest sequence number.
         shared: Readers of shared memory, or None.
     """
 
@@ -111,7 +111,7 @@ class MessageParser:
         hello: bytes,
         sources: PublisherTracker,
         leave: Callable[[int], None],
-        tell: Callable[[int, int], None],
+        acknowledge: Callable[[int, int], None],
         shared: SharedSources | None = None,
     ) -> None:
         self._name = spec.topic
@@ -120,7 +120,7 @@ class MessageParser:
         self._hello = hello
         self._sources = sources
         self._leave = leave
-        self._acknowledge = tell
+        self._acknowledge = acknowledge
         self._shared = shared
 
     def parse(self, first: bytes, rest: Sequence[_Part]) -> Message | None:
@@ -146,15 +146,15 @@ class MessageParser:
 
     def parse_batch(self, first: bytes) -> list[Message]:
         """Return the messages of a batch, given as one part. Raises `WireError`."""
-        topic, head, body = split_single_part(first)
+        topic, header_part, body = split_single_part(first)
         if topic != self._topic:
             raise _topic_error()
-        header, _payload, _extension = parse_remaining_parts((head, body), is_one_part=True)
+        header, _payload, _extension = parse_remaining_parts((header_part, body), is_one_part=True)
         check_batch(header, body)
-        one = header._replace(flags=0)
+        single_header = header._replace(flags=0)
         read = (
             self._parse_message(
-                one._replace(seq=header.seq + each.number, stamp_ns=each.stamp_ns),
+                single_header._replace(seq=header.seq + each.number, stamp_ns=each.stamp_ns),
                 body[each.begin : each.end],
                 NO_EXTENSION,
                 is_alone=False,
@@ -212,13 +212,13 @@ class MessageParser:
             clock=source.clock,
         )
         # `kind` depends on both forms: a message with another codec takes the careful path again
-        plain = 0 if header.flags & EXTENSION else encode_form(header.codec, header.flags & ~SHARED)
+        plain_form = 0 if header.flags & EXTENSION else encode_form(header.codec, header.flags & ~SHARED)
         if header.flags & SHARED:
-            source.shared_form = plain and plain | SHARED_FORM
-            source.form = source.form if source.form == plain else 0
+            source.shared_form = plain_form and plain_form | SHARED_FORM
+            source.form = source.form if source.form == plain_form else 0
         else:
-            source.form = plain
-            source.shared_form = source.shared_form if source.shared_form == plain | SHARED_FORM else 0
+            source.form = plain_form
+            source.shared_form = source.shared_form if source.shared_form == plain_form | SHARED_FORM else 0
         if shared is not None:
             return received_message(
                 source.kind, shared, header.stamp_ns, header.seq, header.publisher, extension
@@ -308,8 +308,8 @@ class SubSocket:
         # Removes silent publishers once their last messages are read; at once if their endpoint is reused.
         for old in self.sources.replaced_publishers(remote):
             self.sources.mark_closing(old, 0, time.monotonic())
-        known = self.sources.find(remote.publisher.id)
-        if not endpoint or (known is not None and known.endpoint == endpoint):
+        existing = self.sources.find(remote.publisher.id)
+        if not endpoint or (existing is not None and existing.endpoint == endpoint):
             return
         for old, source in self.sources.items():
             if source.endpoint == endpoint:
@@ -339,13 +339,13 @@ class SubSocket:
         source = self.sources.get(publisher)
         self._connect(source, source.endpoint)
 
-    def _report_problem(self, source: TrackedPublisher, endpoint: str, why: str) -> None:
+    def _report_problem(self, source: TrackedPublisher, endpoint: str, reason: str) -> None:
         # An invalid endpoint is reported, not raised: it must not affect other publishers.
         name = source.remote.node_name if source.remote is not None else ""
-        shown = ascii(endpoint[:100])[1:-1]
+        shown_endpoint = ascii(endpoint[:100])[1:-1]
         source.failed_endpoint = endpoint
         source.problem = _("can't connect to the endpoint '{shown}' of '{name}': {why}").format(
-            shown=shown, name=name, why=why
+            shown=shown_endpoint, name=name, why=reason
         )
         if self.rejections.add(source.problem):
             _logger.warning("subscription to '%s': %s", self._name, source.problem)
@@ -353,8 +353,10 @@ class SubSocket:
     @property
     def problem(self) -> str:
         """Reason why messages of a listed publisher can't be received; "" if there is none."""
-        listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_silent)
-        return next((each.problem for each in listed), "")
+        problem_sources = (
+            each for each in self.sources.by_id.values() if each.problem and not each.is_silent
+        )
+        return next((each.problem for each in problem_sources), "")
 
     def disconnect(self, publisher: int) -> None:
         """Disconnect from a publisher and remove it."""
@@ -388,7 +390,7 @@ class SubSocket:
 
     def read_into(
         self,
-        into: MessageBuffer,
+        buffer: MessageBuffer,
         max_messages: int,
         max_bytes: int,
         *,
@@ -401,13 +403,13 @@ class SubSocket:
         messages of one part is inlined here.
 
         Args:
-            into: Container to which messages are appended.
+            buffer: Container to which messages are appended.
             max_messages: Maximum number of messages.
             max_bytes: Maximum number of bytes.
             may_wait: True to wait up to `SHORT_WAIT_S` for the first message.
             first: First part of the next message, if it was already read.
         """
-        recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, into.append
+        recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, buffer.append
         cut, body = self._topic_length, self._body
         count, uncounted, flags = 0, 0, 0 if may_wait else _DONTWAIT
         try:
@@ -436,7 +438,7 @@ class SubSocket:
                         first = None
                         continue
                     if form & BATCH_FORM_FLAG:
-                        got, new = self._read_batch(first, into)
+                        got, new = self._read_batch(first, buffer)
                         # a rejected batch returns 0, so the caller waits as for an empty socket
                         count, uncounted, max_bytes, first = (
                             count + got,
@@ -459,7 +461,7 @@ class SubSocket:
         self.sources.received += count - uncounted
         return count
 
-    def _read_batch(self, first: bytes, into: MessageBuffer) -> tuple[int, int]:
+    def _read_batch(self, first: bytes, buffer: MessageBuffer) -> tuple[int, int]:
         # Returns the number of messages, and how many of them aren't counted yet.
         body = self._body
         form, size, seq, _stamp_ns, publisher = unpack_header_at(first, self._topic_length)
@@ -467,24 +469,24 @@ class SubSocket:
         count = int.from_bytes(first[body : body + 4], "little")
         is_next = source and source.last == seq - 1 and source.form | BATCH_FORM_FLAG == form
         if not (source and is_next and 0 < count <= MAX_BATCH_MESSAGES and len(first) == body + size):
-            return self._read_any_batch(first, into)
+            return self._read_any_batch(first, buffer)
         table = table_struct(count)
-        at = body + table.size
-        if at > len(first):
-            return self._read_any_batch(first, into)
+        offset = body + table.size
+        if offset > len(first):
+            return self._read_any_batch(first, buffer)
         numbers = table.unpack_from(first, body)
         sizes = numbers[1 : count + 1]
-        if at + sum(sizes) != len(first):
-            return self._read_any_batch(first, into)
-        if self.wants_payloads and not self.payloads and not into:
-            raws = [first[at : (at := at + size)] for size in sizes]
-            if self._read_payloads(source, seq, publisher, numbers[count + 1 :], raws, into):
+        if offset + sum(sizes) != len(first):
+            return self._read_any_batch(first, buffer)
+        if self.wants_payloads and not self.payloads and not buffer:
+            raws = [first[offset : (offset := offset + size)] for size in sizes]
+            if self._read_payloads(source, seq, publisher, numbers[count + 1 :], raws, buffer):
                 return count, count
-            at = body + table.size
-        kind, append = source.kind, into.append
+            offset = body + table.size
+        kind, append = source.kind, buffer.append
         for size, stamp_ns in zip(sizes, numbers[count + 1 :], strict=True):
             message = new_message(Message)
-            message.kind, message.raw = kind, first[at : (at := at + size)]
+            message.kind, message.raw = kind, first[offset : (offset := offset + size)]
             message.stamp_ns = stamp_ns
             message.seq = seq
             message.publisher, message.extension = publisher, NO_EXTENSION
@@ -501,7 +503,7 @@ class SubSocket:
         publisher: int,
         stamps_ns: tuple[int, ...],
         raws: Sequence[bytes],
-        into: MessageBuffer,
+        buffer: MessageBuffer,
     ) -> bool:
         # Decodes all but the first message of a batch. Returns False if one can't be decoded.
         kind = source.kind
@@ -510,13 +512,13 @@ class SubSocket:
             self.payloads.extend([decode(raw, NO_EXTENSION) for raw in raws[1:]])
         except DecodeError:
             return False
-        into.append(received_message(kind, raws[0], stamps_ns[0], seq, publisher))
+        buffer.append(received_message(kind, raws[0], stamps_ns[0], seq, publisher))
         source.last = seq + len(raws) - 1
         self._run = kind, publisher, seq, stamps_ns, raws
         return True
 
-    def restore(self, into: deque[Message]) -> None:
-        """Convert the remaining payloads back to messages and insert them at the front of `into`."""
+    def restore(self, buffer: deque[Message]) -> None:
+        """Convert the remaining payloads back to messages and insert them at the front of `buffer`."""
         if self._run is None:
             return
         kind, publisher, first, stamps_ns, raws = self._run
@@ -529,7 +531,7 @@ class SubSocket:
             number -= 1
             message = received_message(kind, raws[number], stamps_ns[number], first + number, publisher)
             message.decoded = payload
-            into.appendleft(message)
+            buffer.appendleft(message)
 
     def _read_shared(self, first: bytes) -> Message | None:
         # Fast path for shared memory. Returns None to continue on the careful path.
@@ -549,7 +551,7 @@ class SubSocket:
         source.last = seq
         return received_message(source.kind, data, stamp_ns, seq, publisher)
 
-    def _read_any_batch(self, first: bytes, into: MessageBuffer) -> tuple[int, int]:
+    def _read_any_batch(self, first: bytes, buffer: MessageBuffer) -> tuple[int, int]:
         if self._has_more():
             self._parse_parts(first)
             return 0, 0
@@ -558,7 +560,7 @@ class SubSocket:
         except WireError as error:
             self.rejections.add(error.reason)
             return 0, 0
-        into.extend(messages)
+        buffer.extend(messages)
         return len(messages), 0
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
@@ -590,11 +592,11 @@ class SubSocket:
                 message.publisher, message.extension = publisher, NO_EXTENSION
                 message.decoded = UNDECODED
                 return message
-        one: deque[Message] = deque()
-        if not self.read_into(one, 1, 1, first=first):
+        buffer: deque[Message] = deque()
+        if not self.read_into(buffer, 1, 1, first=first):
             return None
-        message = one.popleft()
-        rest.extend(one)
+        message = buffer.popleft()
+        rest.extend(buffer)
         return message
 
     def _read_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
@@ -604,9 +606,9 @@ class SubSocket:
             return self._parse_parts(first)
         recv, data = self._recv, None
         try:
-            head = recv(_DONTWAIT)
-            if len(head) == HEADER_BYTES:
-                form, size, seq, stamp_ns, publisher = unpack_header(head)
+            header = recv(_DONTWAIT)
+            if len(header) == HEADER_BYTES:
+                form, size, seq, stamp_ns, publisher = unpack_header(header)
                 source = self.sources.by_id.get(publisher)
                 if (
                     source
@@ -623,7 +625,7 @@ class SubSocket:
         except zmq.Again:
             self.rejections.add(_(_INCOMPLETE_MESSAGE_TEXT))
             return None, None
-        return self._parse_parts(first, head, data)
+        return self._parse_parts(first, header, data)
 
     def _parse_parts(
         self, first: bytes, *got: bytes | zmq.Frame | None

@@ -81,12 +81,12 @@ class Readable(Protocol):
         """True if a message can be read. Reading this property also processes connects and disconnects."""
 
     def read_into(
-        self, into: MessageBuffer, max_messages: int, max_bytes: int, *, may_wait: bool = False
+        self, buffer: MessageBuffer, max_messages: int, max_bytes: int, *, may_wait: bool = False
     ) -> int:
         """Read messages until the socket is empty or a limit is reached; return their number.
 
         Args:
-            into: Container to which messages are appended.
+            buffer: Container to which messages are appended.
             max_messages: Maximum number of messages.
             max_bytes: Maximum number of bytes.
             may_wait: True to wait up to `SHORT_WAIT_S` for the first message.
@@ -115,15 +115,15 @@ class UnbatchedReader:
         raise NotImplementedError
 
     def read_into(
-        self, into: MessageBuffer, max_messages: int, max_bytes: int, *, may_wait: bool = False
+        self, buffer: MessageBuffer, max_messages: int, max_bytes: int, *, may_wait: bool = False
     ) -> int:
         """Read messages one by one. See `Readable.read_into`."""
         count = 0
         while count < max_messages and max_bytes > 0:
-            message = self.read(into, may_wait=may_wait and not count)
+            message = self.read(buffer, may_wait=may_wait and not count)
             if message is None:
                 break
-            into.append(message)
+            buffer.append(message)
             count += 1
             max_bytes -= message.size_bytes
         return count
@@ -222,14 +222,14 @@ class SocketSubscriber(Generic[R]):
             # Under the same lock: the socket is empty, so its descriptor signals the next message.
             waker, self._waker = self._waker or Waker(), None
             self._waiters.append(waker)
-        began = time.monotonic()
+        started_s = time.monotonic()
         try:
             zmq.zmq_poll([(self.fd, _POLLIN), (waker.fd, _POLLIN)], int(timeout_s * 1000) + 1)
         finally:
-            message = self._finish_wait(waker, began)
+            message = self._finish_wait(waker, started_s)
         return message
 
-    def _finish_wait(self, waker: Waker, began: float) -> Message | None:
+    def _finish_wait(self, waker: Waker, started_s: float) -> Message | None:
         with self._lock:
             self._waiters.remove(waker)
             if waker in self._woken:
@@ -244,7 +244,7 @@ class SocketSubscriber(Generic[R]):
                 return None
             message = self._next_locked()
             # after a longer wait the short one would only delay each message
-            self._is_hot = message is not None and time.monotonic() - began < SHORT_WAIT_S
+            self._is_hot = message is not None and time.monotonic() - started_s < SHORT_WAIT_S
             return message
 
     # ---- statistics
@@ -318,13 +318,13 @@ class SocketSubscriber(Generic[R]):
             while True:
                 with self._lock:
                     count = 0 if self.is_closed else self._fill_locked(_HANDSHAKE_BATCH)
-                    left = deadline - time.monotonic()
-                    if is_met() or left <= 0.0 or self.is_closed:
+                    remaining_s = deadline - time.monotonic()
+                    if is_met() or remaining_s <= 0.0 or self.is_closed:
                         return is_met()
                 if count == _HANDSHAKE_BATCH:
                     continue  # the awaited notice is behind the messages of a busy publisher
                 polled = [(self.fd, _POLLIN), (waker.fd, _POLLIN)]
-                zmq.zmq_poll(polled, int(min(left, 0.1) * 1000) + 1)
+                zmq.zmq_poll(polled, int(min(remaining_s, 0.1) * 1000) + 1)
                 waker.clear()
         finally:
             self.leave_wait(waker)
@@ -452,12 +452,12 @@ class SocketSubscriber(Generic[R]):
     def _drop_excess_locked(self, message: Message | None) -> Message | None:
         # Returns the oldest of `message` and those behind it for which there is room; counts the others as
         # dropped.
-        over = 0
+        dropped = 0
         while message is not None and len(self.ready) >= self.spec.max_messages:
             message = self.ready.popleft()
-            over += 1
-        if over:
-            self._readable.count_dropped(over)
+            dropped += 1
+        if dropped:
+            self._readable.count_dropped(dropped)
         return message
 
     def _fill_locked(self, max_messages: int = _BATCH_MESSAGES) -> int:
@@ -514,11 +514,11 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             timeout_s: Maximum time in seconds.
             waker: Waker that ends a wait early, so that the condition is checked again.
         """
-        wanted = frozenset(publishers)
+        expected = frozenset(publishers)
         sources = self._readable.sources
         return self.read_until(
             lambda: all(
-                source.has_echoed or source.problem for each, source in sources.items() if each in wanted
+                source.has_echoed or source.problem for each, source in sources.items() if each in expected
             ),
             timeout_s,
             waker,
@@ -575,12 +575,12 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """Replace the list of publishers: connect to new ones, and mark unlisted ones as silent."""
-        known = tuple(remotes)
-        self.connect(known)
-        listed = {remote.publisher.id for remote in known}
+        publishers = tuple(remotes)
+        self.connect(publishers)
+        listed_ids = {remote.publisher.id for remote in publishers}
         with self._requested_lock():
-            for each, source in self._readable.sources.items():
-                if each not in listed and source.remote is not None:
+            for publisher_id, source in self._readable.sources.items():
+                if publisher_id not in listed_ids and source.remote is not None:
                     source.is_silent = True
 
     def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:

@@ -90,10 +90,10 @@ class Subscriptions:
         if hello.topic != self._name:
             return None  # a subscriber of another publisher that had this port before
         if is_wanted:
-            own = self._add_subscriber(hello, subscription, count)
-            if own is not None:
+            topic_frame = self._add_subscriber(hello, subscription, count)
+            if topic_frame is not None:
                 self._update_connection(hello.subscriber, connection_of())
-            return own
+            return topic_frame
         self._remove_subscriber(hello.subscriber)
         return None
 
@@ -104,8 +104,8 @@ class Subscriptions:
             if is_wanted and read.publisher == self._id and read.subscriber in self.windows:
                 self.windows[read.subscriber].acknowledge(read.seq, read.bound_bytes)
         elif shares is not None:
-            own = is_wanted and shares.publisher == self._id and shares.subscriber in self.windows
-            if own and self.shared is not None:
+            is_valid = is_wanted and shares.publisher == self._id and shares.subscriber in self.windows
+            if is_valid and self.shared is not None:
                 self.shared.confirm(shares)
         return read is not None or shares is not None
 
@@ -114,9 +114,9 @@ class Subscriptions:
             self._reject(f"a hello beyond the limit of {MAX_SUBSCRIBERS} subscribers")
             return None
         if hello.reads_one_part:  # its plain filter was counted before
-            left = self.legacy_filters.pop(self._topic, 0) - 1
-            if left > 0:
-                self.legacy_filters[self._topic] = left
+            remaining = self.legacy_filters.pop(self._topic, 0) - 1
+            if remaining > 0:
+                self.legacy_filters[self._topic] = remaining
         self.seen[hello.subscriber] = count
         self.hellos[hello.subscriber] = subscription
         self.windows.pop(hello.subscriber, None)

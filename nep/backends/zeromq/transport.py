@@ -378,56 +378,56 @@ class ZeromqTransport:
         calls: Sequence[CallQueue] = (),
     ) -> None:
         """Wait up to `timeout_s` seconds for a message in `subscribers`, a call in `calls`, or `wake`."""
-        waits = self._thread_wait()
+        thread_wait = self._thread_wait()
         entered: list[_Subscriber] = []
         entered_calls: list[CallQueue] = []
         fds: list[int] = []
-        waits.is_busy = True
+        thread_wait.is_busy = True
         try:
             if self._is_terminated:
                 return
             for queue in calls:
-                if not queue.enter_wait(waits.waker.wake):
+                if not queue.enter_wait(thread_wait.waker.wake):
                     return
                 entered_calls.append(queue)
             for subscriber in subscribers:
                 if isinstance(subscriber, SocketSubscriber | PatternSubscriber):
-                    if not subscriber.enter_wait(waits.waker):
+                    if not subscriber.enter_wait(thread_wait.waker):
                         return
                     entered.append(subscriber)
                     fds.append(subscriber.fd)
-            waits.wait(fds, timeout_s)
+            thread_wait.wait(fds, timeout_s)
         finally:
             for subscriber in entered:
-                subscriber.leave_wait(waits.waker)
+                subscriber.leave_wait(thread_wait.waker)
             for queue in entered_calls:
-                queue.leave_wait(waits.waker.wake)
-            waits.is_busy = False
+                queue.leave_wait(thread_wait.waker.wake)
+            thread_wait.is_busy = False
             if self._is_terminated:  # `close` left a busy waker open
-                waits.waker.close()
+                thread_wait.waker.close()
 
     def _wake_waits_locked(self) -> None:
         # Call after setting `_is_terminated`.
-        for waits in self._waiting:
-            waits.waker.wake()
-            if not waits.is_busy:
-                waits.waker.close()
+        for thread_wait in self._waiting:
+            thread_wait.waker.wake()
+            if not thread_wait.is_busy:
+                thread_wait.waker.close()
 
     def _thread_wait(self) -> ThreadWait:
-        waits: ThreadWait | None = getattr(self._threads, "waits", None)
-        if waits is None:
-            waits = self._threads.waits = ThreadWait()
+        thread_wait: ThreadWait | None = getattr(self._threads, "waits", None)
+        if thread_wait is None:
+            thread_wait = self._threads.waits = ThreadWait()
             with self._lock:
-                self._waiting.add(waits)
-        return waits
+                self._waiting.add(thread_wait)
+        return thread_wait
 
     def wake(self) -> None:
         """End all waits in progress."""
         with self._lock:
             for waker in self._busy_wakers:
                 waker.wake()
-            for waits in self._waiting:
-                waits.waker.wake()
+            for thread_wait in self._waiting:
+                thread_wait.waker.wake()
 
     @contextmanager
     def _waker(self) -> Iterator[Waker]:
@@ -515,9 +515,9 @@ class ZeromqTransport:
         self._services.forked()
         for session in self._sessions.values():
             close_in_child(session.endpoint)
-        for each in (*self._publishers.values(), *self._subscribers.values()):
-            if isinstance(each, NativePublisher | NativeSubscriber | PatternSubscriber):
-                close_in_child(*each.endpoints)
+        for endpoint_owner in (*self._publishers.values(), *self._subscribers.values()):
+            if isinstance(endpoint_owner, NativePublisher | NativeSubscriber | PatternSubscriber):
+                close_in_child(*endpoint_owner.endpoints)
 
     def _session(self, address: str) -> MasterSession:
         with self._lock:

@@ -41,19 +41,19 @@ class ParameterForm:
         try:
             if not issubclass(self._kind, dict) and isinstance(value, self._kind):
                 value = self._shape.write(value)
-            plain = self._shape.write(self._shape.read(value))
+            plain_value = self._shape.write(self._shape.read(value))
         except shapes.ShapeMismatch as mismatch:
             raise ValueError(mismatch.message) from mismatch
         except RecursionError:
             raise ValueError(_("the value has too many levels")) from None
-        where = find_nan(plain)
-        if where is not None:
-            raise ValueError(_("{where} must be a finite number").format(where=where or _("the value")))
-        return plain
+        nan_path = find_nan(plain_value)
+        if nan_path is not None:
+            raise ValueError(_("{where} must be a finite number").format(where=nan_path or _("the value")))
+        return plain_value
 
-    def instance(self, plain: object) -> object:
+    def instance(self, plain_value: object) -> object:
         """Create an instance from a validated plain value."""
-        return self._shape.read(plain)
+        return self._shape.read(plain_value)
 
 
 def create_form(declared: type) -> ParameterForm | None:

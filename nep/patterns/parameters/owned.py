@@ -33,12 +33,12 @@ class ParameterHost(Protocol):
     name: str
     id: str
 
-    def open_parameters(self, place: str, answer: Callable[[object], object]) -> StateTopic:
-        """Open the latched topic `place`, and the service `place` if the back end supports services.
+    def open_parameters(self, name: str, callback: Callable[[object], object]) -> StateTopic:
+        """Open the latched topic `name`, and the service `name` if the back end supports services.
 
         Args:
-            place: Name of the topic and the service.
-            answer: Callback of the service.
+            name: Name of the topic and the service.
+            callback: Callback of the service.
         """
 
 
@@ -197,10 +197,10 @@ class Parameters:
             self._publish()
 
     def _unknown_error(self, name: str) -> ParameterError:
-        known = tuple(self._known)
-        shown = escaped(bounded_str(name, 60))
-        hint = did_you_mean(shown, known) if known else _("the node has no parameters")
-        return ParameterError(shown, "", _("no such parameter; {said}").format(said=hint))
+        known_names = tuple(self._known)
+        shown_name = escaped(bounded_str(name, 60))
+        hint = did_you_mean(shown_name, known_names) if known_names else _("the node has no parameters")
+        return ParameterError(shown_name, "", _("no such parameter; {said}").format(said=hint))
 
     # ---- for others
 

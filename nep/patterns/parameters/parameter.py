@@ -68,16 +68,16 @@ class NodeParameter:
         return replace(self, value=self._validate(value))
 
     def _validate(self, value: object) -> object:
-        found = self._convert(value if self.form is None else self._form_to_plain(self.form, value))
-        if isinstance(found, int | float) and not isinstance(found, bool):
-            if self.minimum is not None and found < self.minimum:
+        converted = self._convert(value if self.form is None else self._form_to_plain(self.form, value))
+        if isinstance(converted, int | float) and not isinstance(converted, bool):
+            if self.minimum is not None and converted < self.minimum:
                 raise self._error(value, _("the minimum is {least}").format(least=self.minimum))
-            if self.maximum is not None and found > self.maximum:
+            if self.maximum is not None and converted > self.maximum:
                 raise self._error(value, _("the maximum is {most}").format(most=self.maximum))
-        if self.choices and found not in self.choices:
+        if self.choices and converted not in self.choices:
             names = format_list([short_repr(each) for each in self.choices], "or")
             raise self._error(value, _("use {choices}").format(choices=names))
-        return found
+        return converted
 
     def _form_to_plain(self, form: ParameterForm, value: object) -> object:
         try:
@@ -151,27 +151,27 @@ def new_parameter(
     Raises `ParameterError` or `ValueError` for invalid arguments.
     """
     form = _create_form(name, type(default) if kind is None else kind, default)
-    word = kind if isinstance(kind, str) else (type(default) if kind is None else kind).__name__
+    kind_name = kind if isinstance(kind, str) else (type(default) if kind is None else kind).__name__
     if form is not None:
-        word, choices = form.plain_kind, choices or form.choices
-    if word not in KINDS:
+        kind_name, choices = form.plain_kind, choices or form.choices
+    if kind_name not in KINDS:
         raise ParameterError(
             check_topic(name),
             short_repr(default),
-            _("the type must be {kinds}").format(kinds=format_list([f"'{each}'" for each in KINDS], "or")),
+            _("the type must be {kinds}").format(kinds=format_list([f"'{limit}'" for limit in KINDS], "or")),
         )
-    for each in (minimum, maximum):
-        if each is not None and (word not in {"int", "float"} or not _is_finite(each)):
+    for limit in (minimum, maximum):
+        if limit is not None and (kind_name not in {"int", "float"} or not _is_finite(limit)):
             raise ParameterError(
                 check_topic(name),
                 short_repr(default),
                 _("only numbers can have limits, and the limits must be finite"),
             )
-    bare = NodeParameter(check_topic(name), None, word, None, _clean_description(description), form=form)
+    base = NodeParameter(check_topic(name), None, kind_name, None, _clean_description(description), form=form)
     if len(choices) > _MAX_CHOICES:
         raise ParameterError(name, short_repr(default), _("too many choices"))
-    allowed = tuple(bare.with_value(each).value for each in choices)
-    parameter = replace(bare, minimum=minimum, maximum=maximum, choices=allowed, is_read_only=is_read_only)
+    allowed = tuple(base.with_value(limit).value for limit in choices)
+    parameter = replace(base, minimum=minimum, maximum=maximum, choices=allowed, is_read_only=is_read_only)
     value = parameter.with_value(default).value
     return replace(parameter, value=value, default=value)
 

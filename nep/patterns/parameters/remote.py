@@ -43,11 +43,11 @@ class RemoteParameters:
         Raises:
             NepError: The name is unknown, or the call failed as `Client.call` describes.
         """
-        found = {bounded_str(each.get("name")): each for each in self.list()}
-        if name not in found:
-            hint = did_you_mean(name, tuple(found)) if found else _("the node has no parameters")
+        entries = {bounded_str(each.get("name")): each for each in self.list()}
+        if name not in entries:
+            hint = did_you_mean(name, tuple(entries)) if entries else _("the node has no parameters")
             raise NepError(_("unknown parameter '{name}'; {said}").format(name=escaped(name), said=hint))
-        return found[name].get("value")
+        return entries[name].get("value")
 
     def set(self, name: str, value: object) -> None:
         """Set a parameter.
@@ -67,8 +67,10 @@ class RemoteParameters:
         reply = result if isinstance(result, Mapping) else {}
         if "refused" in reply:
             raise RequestRefusedError(str(reply["refused"]))
-        found = reply.get("parameters")
-        return tuple(each for each in found if isinstance(each, Mapping)) if isinstance(found, list) else ()
+        entries = reply.get("parameters")
+        return (
+            tuple(each for each in entries if isinstance(each, Mapping)) if isinstance(entries, list) else ()
+        )
 
     def close(self) -> None:
         """Close the client."""
@@ -89,17 +91,17 @@ def node_with_parameters(graph: GraphView, name: str) -> str:
     able = {
         each.id: each.name for each in graph.nodes.values() if parameters_topic(each.id) in graph.services
     }
-    found = [id_ for id_, known in able.items() if name in {id_, known}]
-    if len(found) == 1:
-        return found[0]
-    if found:
+    matching_ids = [id_ for id_, known_names in able.items() if name in {id_, known_names}]
+    if len(matching_ids) == 1:
+        return matching_ids[0]
+    if matching_ids:
         raise NepError(
             _("{count} nodes are named '{name}'; use an id: {ids}").format(
-                count=len(found), name=escaped(name), ids=", ".join(sorted(found))
+                count=len(matching_ids), name=escaped(name), ids=", ".join(sorted(matching_ids))
             )
         )
     if any(name in {each.id, each.name} for each in graph.nodes.values()):
         raise NepError(_("the node '{name}' has declared no parameters").format(name=escaped(name)))
-    known = tuple(sorted(set(able.values())))
-    hint = did_you_mean(name, known) if known else _("no node has parameters")
+    known_names = tuple(sorted(set(able.values())))
+    hint = did_you_mean(name, known_names) if known_names else _("no node has parameters")
     raise NepError(_("no node is named '{name}'; {said}").format(name=escaped(name), said=hint))

@@ -137,12 +137,12 @@ class Client:
         with self._lock:
             if self._future_thread is None:
                 self._future_thread = _FutureThread(f"nep-client-{self.service}")
-            ends = self._future_thread
+            future_thread = self._future_thread
         future: Future[object] = Future()
         call = self._start_call(
             request,
             self._resolve_timeout(timeout_s),
-            lambda outcome: ends.add(lambda: self._complete_future(future, outcome)),
+            lambda outcome: future_thread.add(lambda: self._complete_future(future, outcome)),
         )
         future.add_done_callback(lambda ended: self._transport.cancel(call) if ended.cancelled() else None)
         return future
@@ -201,11 +201,11 @@ class Client:
     # ---- outcome
 
     def _start_call(
-        self, request: object, timeout_s: float | None, then: Callable[[Outcome], None]
+        self, request: object, timeout_s: float | None, callback: Callable[[Outcome], None]
     ) -> OpenCall:
         if self._transport.is_closed:
             raise self._closed_error()
-        return self._transport.start_call(self._codec.encode(request).data, timeout_s, then)
+        return self._transport.start_call(self._codec.encode(request).data, timeout_s, callback)
 
     def _resolve_timeout(self, timeout_s: TimeLimit) -> float | None:
         return self.timeout_s if timeout_s == "default" else check_optional_time_limit("timeout_s", timeout_s)
@@ -259,9 +259,9 @@ class Client:
     def join(self) -> None:
         """Wait until all calls of `call_async` have completed, and stop their thread."""
         with self._lock:
-            ends, self._future_thread = self._future_thread, None
-        if ends is not None:
-            ends.close()
+            future_thread, self._future_thread = self._future_thread, None
+        if future_thread is not None:
+            future_thread.close()
 
     def forked(self) -> None:
         """Mark the client as closed in a forked child process. See `nep.system.forks`."""

@@ -142,11 +142,11 @@ class Server:
             call.reply(error_reply(CallKind.REJECTED, "", str(error)))
             return
         try:
-            answer = self._callback(request) if self._callback is not None else None
-            if isinstance(answer, Future):
-                answer.add_done_callback(partial(self._reply_when_done, call))
+            result = self._callback(request) if self._callback is not None else None
+            if isinstance(result, Future):
+                result.add_done_callback(partial(self._reply_when_done, call))
                 return
-            reply = self._encode_reply(answer, call.codec)
+            reply = self._encode_reply(result, call.codec)
         except Exception as error:  # noqa: BLE001 - sent to the client
             reply = self._log_failure(error)
         except BaseException as error:  # KeyboardInterrupt: reply, then let it propagate out of `spin`
@@ -154,9 +154,9 @@ class Server:
             raise
         call.reply(reply)
 
-    def _reply_when_done(self, call: IncomingCall, done: Future[object]) -> None:
+    def _reply_when_done(self, call: IncomingCall, future: Future[object]) -> None:
         try:
-            reply = self._encode_reply(done.result(), call.codec)
+            reply = self._encode_reply(future.result(), call.codec)
         except BaseException as error:  # noqa: BLE001 - includes CancelledError
             reply = self._log_failure(error)
         call.reply(reply)
@@ -177,13 +177,13 @@ class Server:
             raise DecodeError(str(call.codec), len(call.data), reason)
         return self._types.request.read(codec.decode(call.data, {}), len(call.data))
 
-    def _encode_reply(self, answer: object, number: int) -> Reply:
+    def _encode_reply(self, result: object, number: int) -> Reply:
         codec = codec_by_number(number)
         if codec is None:
             reason = _("this version doesn't know the codec of the reply; update nep")
-            raise EncodeError(str(number), type(answer).__name__, reason)
+            raise EncodeError(str(number), type(result).__name__, reason)
         answer_type = self._types.reply
-        value = {} if answer is None and answer_type.is_any else answer
+        value = {} if result is None and answer_type.is_any else result
         return Reply(CallKind.REPLY, answer_type.codec(codec).encode(value).data, number)
 
     # ---- without a callback: API of the original NEP
@@ -210,10 +210,10 @@ class Server:
             raise NepError(_("the previous request has no reply yet; call 'send_info' first"))
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self._transport.calls.is_closed:
-            left = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - time.monotonic())
-            call = self._transport.calls.pop(max(0.0, left))
+            remaining_s = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - time.monotonic())
+            call = self._transport.calls.pop(max(0.0, remaining_s))
             if call is None:
-                if left <= 0.0:
+                if remaining_s <= 0.0:
                     return None
                 continue
             try:

@@ -136,9 +136,9 @@ class Surveyor:
                     raise outcome
                 pending -= 1
                 with contextlib.suppress(NepError):
-                    answer = self._decode_reply(outcome)
+                    reply = self._decode_reply(outcome)
                     remaining -= 1
-                    yield answer
+                    yield reply
         finally:
             self._transport.cancel_all(calls)
 
@@ -177,8 +177,8 @@ class Surveyor:
         """Return (True, next answer), or (False, {}) after the time limit or the last answer."""
         if self._sent is None:
             raise NepError(_("no request was sent; call 'send_json' first"))
-        for answer in self._sent:
-            return True, answer
+        for reply in self._sent:
+            return True, reply
         return False, {}
 
     # ---- closing

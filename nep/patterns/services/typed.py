@@ -45,20 +45,20 @@ class PayloadType:
         """Return a codec for instances of the class, based on a codec of plain values."""
         return base if self._declared is None else typed.typed_codec(self._declared, base)
 
-    def read(self, plain: object, size_bytes: int) -> object:
+    def read(self, payload: object, size_bytes: int) -> object:
         """Convert a decoded payload to an instance of the class.
 
         Args:
-            plain: Decoded payload.
+            payload: Decoded payload.
             size_bytes: Size of the encoded payload, for the error message.
 
         Raises:
             DecodeError: The payload doesn't match the class; the message contains the field path.
         """
         if self._declared is None:
-            return plain
+            return payload
         try:
-            return self._declared.shape.read(plain)
+            return self._declared.shape.read(payload)
         except shapes.ShapeMismatch as mismatch:
             reason = mismatch.message
         except RecursionError:
@@ -77,22 +77,23 @@ class CallTypes:
 UNTYPED = CallTypes(PayloadType(None), PayloadType(None))
 
 
-def call_types(**given: object) -> CallTypes:
+def call_types(**declared_types: object) -> CallTypes:
     """Validate the declared types of requests and replies.
 
     Args:
-        given: Two classes or None by argument name: first the type of requests, then that of replies.
+        declared_types: Two classes or None by argument name: first the type of requests, then that of
+            replies.
 
     Raises:
         ValueError: A value is not a class, or the fields of a class can't be encoded.
     """
     declared: list[PayloadType] = []
-    for name, each in given.items():
-        if each is not None and not isinstance(each, type):
+    for name, declared_type in declared_types.items():
+        if declared_type is not None and not isinstance(declared_type, type):
             raise WrongTypeError(
                 _("{name} must be a dataclass or a TypedDict, not {given}").format(
-                    name=name, given=escaped(shortened(repr(each), _MAX_SHOWN_LENGTH))
+                    name=name, given=escaped(shortened(repr(declared_type), _MAX_SHOWN_LENGTH))
                 )
             )
-        declared.append(PayloadType(each))
-    return CallTypes(*declared) if any(not each.is_any for each in declared) else UNTYPED
+        declared.append(PayloadType(declared_type))
+    return CallTypes(*declared) if any(not declared_type.is_any for declared_type in declared) else UNTYPED

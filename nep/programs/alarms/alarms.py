@@ -137,8 +137,8 @@ class Alarms:
     def _handle_event(self, event: AlarmEvent) -> None:
         rule = event.rule
         if event.kind == "on":
-            words = event_text(rule.condition, event.value)
-            record = AlarmRecord(rule.id, words, event.at_s, is_on=True, was_snoozed=event.is_snoozed)
+            cause = event_text(rule.condition, event.value)
+            record = AlarmRecord(rule.id, cause, event.at_s, is_on=True, was_snoozed=event.is_snoozed)
             self.history.add(record)
         if event.kind == "off":
             record_now = self.history.current(rule.id)
@@ -160,27 +160,27 @@ class Alarms:
         if carrier is None:
             self._results.put((event, action, MAX_TRIES, False, _("this action isn't available here")))
             return
-        done = partial(self._on_action_done, event, action, tries)
+        on_done = partial(self._on_action_done, event, action, tries)
         try:
-            carrier(event, action, done)
+            carrier(event, action, on_done)
         except Exception as error:  # noqa: BLE001  a failing action must not block the next
-            done(False, str(error) or type(error).__name__)
+            on_done(False, str(error) or type(error).__name__)
 
     def _on_action_done(
-        self, event: AlarmEvent, action: AlarmAction, tries: int, is_ok: bool, words: str
+        self, event: AlarmEvent, action: AlarmAction, tries: int, is_ok: bool, text: str
     ) -> None:
-        self._results.put((event, action, tries, is_ok, words))
+        self._results.put((event, action, tries, is_ok, text))
 
     def _process_results(self) -> None:
         for _number in range(self._results.qsize()):
-            event, action, tries, is_ok, words = self._results.get()
+            event, action, tries, is_ok, text = self._results.get()
             self._running_count -= 1
-            self._deeds.append((event.rule, words, self._clock_s()))
+            self._deeds.append((event.rule, text, self._clock_s()))
             record = self.history.last(event.rule.id)
             if record is None:
                 continue
-            if words:
-                record.add(ActionResult(action.kind, words))
+            if text:
+                record.add(ActionResult(action.kind, text))
                 self.history.revision += 1
             if not is_ok and action.kind == "call" and record.is_on and tries < MAX_TRIES:
                 retry = _Retry(event, action, tries + 1, self._clock() + RETRY_DELAY_S)

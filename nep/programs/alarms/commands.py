@@ -30,42 +30,43 @@ class AlarmCommands:
     """Executor of the alarm actions "call" and "send". Thread-safe.
 
     Args:
-        refusal: Returns the reason why a node may not publish (node, topic, message type); "" if it may.
+        denial_reason: Returns the reason why a node may not publish (node, topic, message type); "" if it
+            may.
     """
 
-    def __init__(self, refusal: Callable[[Node, str, str], str] = _allow_all) -> None:
-        self._refusal = refusal
+    def __init__(self, denial_reason: Callable[[Node, str, str], str] = _allow_all) -> None:
+        self._refusal = denial_reason
         self._lock = threading.Lock()
         self._clients: dict[str, Client] = {}
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._node: Node | None = None
 
-    def start_action(self, node: Node, action: AlarmAction, done: DoneCallback) -> None:
-        """Start an action with a node; `done` receives the result.
+    def start_action(self, node: Node, action: AlarmAction, on_done: DoneCallback) -> None:
+        """Start an action with a node; `on_done` receives the result.
 
         The call waits for the handshake of a new publisher, but not for the reply of a service. Errors are
-        passed to `done`, not raised.
+        passed to `on_done`, not raised.
         """
         try:
             with self._lock:
                 self._use_node(node)
                 if action.kind == "call":
-                    self._call(node, action, done)
+                    self._call(node, action, on_done)
                     return
                 publisher = self._publisher(node, action)
-                refusal = self._refusal(
+                reason = self._refusal(
                     node, action.name, action.msg_type
                 )  # checked last: creating the publisher takes time
-                if refusal:
-                    done(False, _("not sent: {reason}").format(reason=refusal))
+                if reason:
+                    on_done(False, _("not sent: {reason}").format(reason=reason))
                     return
                 publisher.publish(action.payload)
                 has_subscribers = publisher.subscribers > 0
         except NepError as error:
-            done(False, str(error))
+            on_done(False, str(error))
             return
         template = _("sent to {topic}") if has_subscribers else _("{topic} has no subscribers")
-        done(has_subscribers, template.format(topic=action.name))
+        on_done(has_subscribers, template.format(topic=action.name))
 
     def close(self) -> None:
         """Discard the cached clients and publishers, which are closed with their node."""
@@ -79,13 +80,13 @@ class AlarmCommands:
             self._clients.clear()
             self._publishers.clear()
 
-    def _call(self, node: Node, action: AlarmAction, done: DoneCallback) -> None:
+    def _call(self, node: Node, action: AlarmAction, on_done: DoneCallback) -> None:
         client = self._clients.get(action.name)
         if client is None:
             if len(self._clients) >= _MAX_CACHED:
                 self._clients.pop(next(iter(self._clients))).close()
             client = self._clients[action.name] = node.new_client(action.name, timeout_s=CALL_TIMEOUT_S)
-        client.call_async(action.payload).add_done_callback(_reply_handler(action.name, done))
+        client.call_async(action.payload).add_done_callback(_reply_handler(action.name, on_done))
 
     def _publisher(self, node: Node, action: AlarmAction) -> Publisher:
         key = (action.name, action.msg_type)
@@ -97,17 +98,17 @@ class AlarmCommands:
         return publisher
 
 
-def _reply_handler(service: str, done: DoneCallback) -> Callable[[Future[object]], None]:
+def _reply_handler(service: str, on_done: DoneCallback) -> Callable[[Future[object]], None]:
     def on_reply(ended: Future[object]) -> None:
         error = None if ended.cancelled() else ended.exception()
         if isinstance(error, NoServerError):
-            done(False, _("{service} has no server").format(service=service))
+            on_done(False, _("{service} has no server").format(service=service))
         elif isinstance(error, WaitTimeoutError):
             template = _("{service} didn't reply within {seconds} s")
-            done(False, template.format(service=service, seconds=number(CALL_TIMEOUT_S)))
+            on_done(False, template.format(service=service, seconds=number(CALL_TIMEOUT_S)))
         elif error is not None or ended.cancelled():
-            done(False, _("{service}: {reason}").format(service=service, reason=str(error or "")))
+            on_done(False, _("{service}: {reason}").format(service=service, reason=str(error or "")))
         else:
-            done(True, _("{service} replied").format(service=service))
+            on_done(True, _("{service} replied").format(service=service))
 
     return on_reply

@@ -93,10 +93,10 @@ class _SubscribedTopic:
 
     def rate_hz(self, window_s: float, now: float) -> float | None:
         begin = None
-        for at, count in self.samples:
-            if now - at < window_s:
+        for sampled_at, count in self.samples:
+            if now - sampled_at < window_s:
                 break
-            begin = (at, count)
+            begin = (sampled_at, count)
         return None if begin is None else (self.count - begin[1]) / (now - begin[0])
 
 
@@ -149,17 +149,17 @@ class AlarmEvaluator:
             for rule in rules:
                 if not rule.is_enabled or problem_of(rule) is not None:
                     continue
-                known = before.get(rule.id)
-                if known is not None and _is_same_condition(known.rule, rule):
-                    known.rule = rule
-                    self._tracks[rule.id] = known
+                existing = before.get(rule.id)
+                if existing is not None and _is_same_condition(existing.rule, rule):
+                    existing.rule = rule
+                    self._tracks[rule.id] = existing
                     del before[rule.id]
                 else:
                     self._tracks[rule.id] = AlarmStateMachine(rule)
             for id, track in before.items():
-                turn = track.turn_off(now)
-                if turn is not None:
-                    self._emit(track, turn)
+                transition = track.turn_off(now)
+                if transition is not None:
+                    self._emit(track, transition)
                 self._snoozed_on.discard(id)
             self._rules = tuple(rules)
             self._update_topics()
@@ -200,9 +200,9 @@ class AlarmEvaluator:
                 subscription.present_since = now
             for track in subscription.readers:
                 for payload in payloads:
-                    turn = track.read(payload, now)
-                    if turn is not None:
-                        self._emit(track, turn)
+                    transition = track.read(payload, now)
+                    if transition is not None:
+                        self._emit(track, transition)
                         is_news = True
         if is_news:
             self.came.set()
@@ -243,23 +243,23 @@ class AlarmEvaluator:
         is_settled: bool,
     ) -> None:
         kind, name = track.rule.condition.kind, track.rule.condition.name
-        turn: Transition | None = None
+        transition: Transition | None = None
         if kind == "leaves":
-            is_there = name in self._nodes
-            if is_there or (track.was_observed and now - self._epoch_at >= MASTER_GRACE_S):
-                turn = track.observe(not is_there, None, now)
+            is_present = name in self._nodes
+            if is_present or (track.was_observed and now - self._epoch_at >= MASTER_GRACE_S):
+                transition = track.observe(not is_present, None, now)
         elif kind == "comes":
             track.was_observed = track.was_observed or name in self._nodes
             if is_settled and name in nodes:
-                turn = track.trigger(now)
+                transition = track.trigger(now)
         elif kind == "appears":
-            found = sorted(topic for topic in topics if matches(name, topic))
+            matching = sorted(topic for topic in topics if matches(name, topic))
             track.was_observed = True
-            if is_settled and found:
-                track.last_value = found[0][:MAX_CHARACTERS]
-                turn = track.trigger(now)
-        if turn is not None:
-            self._emit(track, turn)
+            if is_settled and matching:
+                track.last_value = matching[0][:MAX_CHARACTERS]
+                transition = track.trigger(now)
+        if transition is not None:
+            self._emit(track, transition)
 
     def tick(self) -> list[AlarmEvent]:
         """Evaluate time-based conditions and return the events since the last call.
@@ -275,9 +275,9 @@ class AlarmEvaluator:
                     if subscription.present_since is not None:
                         subscription.samples.append((now, subscription.count))
             for track in self._tracks.values():
-                turn = self._evaluate_time(track, now)
-                if turn is not None:
-                    self._emit(track, turn)
+                transition = self._evaluate_time(track, now)
+                if transition is not None:
+                    self._emit(track, transition)
             for id in [id for id in self._snoozed_on if not self._tracks[id].rule.is_snoozed(now_s)]:
                 self._snoozed_on.discard(id)
                 track = self._tracks[id]
@@ -306,21 +306,21 @@ class AlarmEvaluator:
             return None  # without a master it is unknown which nodes exist
         return track.advance(now)
 
-    def _emit(self, track: AlarmStateMachine, turn: Transition) -> None:
+    def _emit(self, track: AlarmStateMachine, transition: Transition) -> None:
         rule, now_s = track.rule, self._clock_s()
         is_snoozed = rule.is_snoozed(now_s)
-        if turn.is_on and is_snoozed:
+        if transition.is_on and is_snoozed:
             self._snoozed_on.add(rule.id)
-        elif not turn.is_on:
+        elif not transition.is_on:
             self._snoozed_on.discard(rule.id)
         self._events.append(
             AlarmEvent(
-                "on" if turn.is_on else "off",
+                "on" if transition.is_on else "off",
                 rule,
                 now_s,
-                turn.value,
-                turn.duration_s,
-                turn.occurrences,
+                transition.value,
+                transition.duration_s,
+                transition.occurrences,
                 is_snoozed,
             )
         )
@@ -355,8 +355,8 @@ class AlarmEvaluator:
         return {rule.id: self.state(rule) for rule in self._rules}
 
 
-def _is_same_condition(one: AlarmRule, other: AlarmRule) -> bool:
-    return one.condition == other.condition and one.calm_s == other.calm_s
+def _is_same_condition(rule: AlarmRule, other: AlarmRule) -> bool:
+    return rule.condition == other.condition and rule.calm_s == other.calm_s
 
 
 def _window_s(limit_hz: float) -> float:

@@ -54,8 +54,8 @@ class AlarmRecord:
 
     def add(self, deed: ActionResult) -> None:
         """Add a completed action, replacing an earlier one of the same kind."""
-        kept = [each for each in self.action_results if each.kind != deed.kind]
-        self.action_results = [*kept, deed][-_MAX_ACTION_RESULTS:]
+        remaining = [each for each in self.action_results if each.kind != deed.kind]
+        self.action_results = [*remaining, deed][-_MAX_ACTION_RESULTS:]
 
 
 class AlarmHistory:
@@ -99,41 +99,45 @@ class AlarmHistory:
 
 def record_to_plain(record: AlarmRecord) -> dict[str, object]:
     """Convert a record to a JSON-serializable dict."""
-    plain: dict[str, object] = {"alarm": record.rule_id, "words": record.cause, "at_s": round(record.at_s, 3)}
+    result: dict[str, object] = {
+        "alarm": record.rule_id,
+        "words": record.cause,
+        "at_s": round(record.at_s, 3),
+    }
     if record.duration_s is not None:
-        plain["lasted_s"] = round(record.duration_s, 3)
+        result["lasted_s"] = round(record.duration_s, 3)
     if record.count != 1:
-        plain["count"] = record.count
+        result["count"] = record.count
     if record.was_snoozed:
-        plain["snoozed"] = True
+        result["snoozed"] = True
     if record.action_results:
-        plain["did"] = [[deed.kind, deed.text] for deed in record.action_results]
-    return plain
+        result["did"] = [[deed.kind, deed.text] for deed in record.action_results]
+    return result
 
 
-def record_from_plain(plain: object) -> AlarmRecord | None:
+def record_from_plain(value: object) -> AlarmRecord | None:
     """Convert a decoded JSON value to a record, or return None if the value is invalid.
 
     `AlarmRecord.is_on` is False, because the end of the period was not observed.
     """
-    if not isinstance(plain, Mapping):
+    if not isinstance(value, Mapping):
         return None
-    rule_id, words, at_s = plain.get("alarm"), plain.get("words"), plain.get("at_s")
-    if not isinstance(rule_id, str) or not isinstance(words, str) or not _is_valid_time(at_s):
+    rule_id, cause, at_s = value.get("alarm"), value.get("words"), value.get("at_s")
+    if not isinstance(rule_id, str) or not isinstance(cause, str) or not _is_valid_time(at_s):
         return None
-    lasted_s, count, did = plain.get("lasted_s"), plain.get("count", 1), plain.get("did")
+    lasted_s, count, results = value.get("lasted_s"), value.get("count", 1), value.get("did")
     deeds = [
         ActionResult(str(each[0]), shortened(str(each[1]), _MAX_CHARACTERS))
-        for each in (did if isinstance(did, list) else [])[:_MAX_ACTION_RESULTS]
+        for each in (results if isinstance(results, list) else [])[:_MAX_ACTION_RESULTS]
         if isinstance(each, list) and len(each) == 2
     ]
     return AlarmRecord(
         rule_id,
-        shortened(words, _MAX_CHARACTERS),
+        shortened(cause, _MAX_CHARACTERS),
         float(at_s),  # type: ignore[arg-type]
         float(lasted_s) if _is_valid_time(lasted_s) else None,  # type: ignore[arg-type]
         count=count if isinstance(count, int) and not isinstance(count, bool) and count > 0 else 1,
-        was_snoozed=plain.get("snoozed") is True,
+        was_snoozed=value.get("snoozed") is True,
         action_results=deeds,
     )
 

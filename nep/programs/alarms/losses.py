@@ -43,8 +43,8 @@ class TopicLosses:
         self._before = counts
         self._known = self._known or bool(counts)
         if self._samples and now - self._samples[-1][0] < _SAMPLE_PERIOD_S:
-            at, lost_before, received_before = self._samples[-1]
-            self._samples[-1] = (at, lost_before + lost, received_before + received)
+            sampled_at, lost_before, received_before = self._samples[-1]
+            self._samples[-1] = (sampled_at, lost_before + lost, received_before + received)
         else:
             self._samples.append((now, lost, received))
 
@@ -53,8 +53,8 @@ class TopicLosses:
         if not self._known:
             return None
         lost = received = 0
-        for at, lost_then, received_then in reversed(self._samples):
-            if now - at > window_s:
+        for sampled_at, lost_then, received_then in reversed(self._samples):
+            if now - sampled_at > window_s:
                 break
             lost += lost_then
             received += received_then

@@ -167,17 +167,17 @@ def _rule_to_plain(rule: AlarmRule) -> dict[str, object]:
         when["for_s"] = condition.for_s
     if condition.margin:
         when["margin"] = condition.margin
-    plain: dict[str, object] = {"id": rule.id}
+    result: dict[str, object] = {"id": rule.id}
     if not rule.is_enabled:
-        plain["on"] = False
-    plain |= {
+        result["on"] = False
+    result |= {
         "when": when,
         "do": [_action_to_plain(action) for action in rule.actions],
         "calm_s": rule.calm_s,
     }
     if rule.snoozed_until_s:
-        plain["snoozed_until_s"] = rule.snoozed_until_s
-    return plain
+        result["snoozed_until_s"] = rule.snoozed_until_s
+    return result
 
 
 def _action_to_plain(action: AlarmAction) -> object:
@@ -212,24 +212,24 @@ class _Reader:
     def file(self, value: object) -> AlarmFile:
         try:
             alarms = self._root(value)
-        except _InvalidAlarmError as wrong:
-            raise NepError(str(wrong)) from None
+        except _InvalidAlarmError as error:
+            raise NepError(str(error)) from None
         rules: list[AlarmRule] = []
         problems: list[str] = []
         ids: set[str] = set()
-        for index, each in enumerate(alarms):
+        for index, entry in enumerate(alarms):
             try:
-                rule = self._rule(each, index)
+                rule = self._rule(entry, index)
                 if rule.id in ids:
                     self._fail(
                         "id",
                         _("another alarm already has this id; use a different id for each alarm, or omit it"),
                         index,
                     )
-            except _InvalidAlarmError as wrong:
+            except _InvalidAlarmError as error:
                 if not self._lenient:
-                    raise NepError(str(wrong)) from None
-                problems.append(str(wrong))
+                    raise NepError(str(error)) from None
+                problems.append(str(error))
             else:
                 ids.add(rule.id)
                 rules.append(rule)
@@ -257,8 +257,8 @@ class _Reader:
 
     def _history(self, value: object) -> AlarmHistory:
         records = value.get("history") if isinstance(value, dict) else None
-        found = [record_from_plain(each) for each in records] if isinstance(records, list) else []
-        return AlarmHistory([record for record in found if record is not None])
+        parsed = [record_from_plain(each) for each in records] if isinstance(records, list) else []
+        return AlarmHistory([record for record in parsed if record is not None])
 
     def _rule(self, entry: object, index: int) -> AlarmRule:
         if not isinstance(entry, dict):
@@ -267,8 +267,8 @@ class _Reader:
         when = entry.get("when")
         if not isinstance(when, dict):
             self._fail("when", _('the condition is missing; write "when": {"topic": ..., "is": ...}'), index)
-        do = entry.get("do", [])
-        if not isinstance(do, list):
+        actions = entry.get("do", [])
+        if not isinstance(actions, list):
             self._fail("do", _("must be a list of actions"), index)
         is_on = entry.get("on", True)
         if not isinstance(is_on, bool):
@@ -279,7 +279,7 @@ class _Reader:
         rule = AlarmRule(
             rule_id,
             self._condition(when, index),
-            tuple(self._action(each, index) for each in do),
+            tuple(self._action(each, index) for each in actions),
             is_on,
             self._number(entry, "calm_s", DEFAULT_CALM_S, index),
             min(self._number(entry, "snoozed_until_s", 0.0, index), _MAX_TIME_S),
@@ -296,8 +296,10 @@ class _Reader:
             if kind is None:
                 self._fail("when", _('the condition is missing; write "is": "silent"'), index)
             template = _("unknown condition '{kind}'; {did_you_mean}")
-            shown = quotable(str(kind))
-            self._fail("is", template.format(kind=shown, did_you_mean=did_you_mean(shown, KINDS)), index)
+            shown_kind = quotable(str(kind))
+            self._fail(
+                "is", template.format(kind=shown_kind, did_you_mean=did_you_mean(shown_kind, KINDS)), index
+            )
         subject = "node" if kind in NODE_KINDS else "topic"
         other = "topic" if kind in NODE_KINDS else "node"
         if other in when:
@@ -322,10 +324,17 @@ class _Reader:
     def _action(self, entry: object, index: int) -> AlarmAction:
         if isinstance(entry, str):
             if entry not in _SIMPLE_ACTIONS:
-                known = [*_SIMPLE_ACTIONS, *(kind for kind in ACTION_KINDS if kind not in _SIMPLE_ACTIONS)]
+                known_kinds = [
+                    *_SIMPLE_ACTIONS,
+                    *(kind for kind in ACTION_KINDS if kind not in _SIMPLE_ACTIONS),
+                ]
                 template = _("unknown action '{kind}'; {did_you_mean}")
-                shown = quotable(entry)
-                self._fail("do", template.format(kind=shown, did_you_mean=did_you_mean(shown, known)), index)
+                shown_kind = quotable(entry)
+                self._fail(
+                    "do",
+                    template.format(kind=shown_kind, did_you_mean=did_you_mean(shown_kind, known_kinds)),
+                    index,
+                )
             return AlarmAction(entry)
         kind = next((key for key in _ACTION_KEYS if isinstance(entry, dict) and key in entry), None)
         if not isinstance(entry, dict) or kind is None:
@@ -355,22 +364,26 @@ class _Reader:
             self._fail(key, _("must be a number"), index)
         return float(value)
 
-    def _check_keys(self, table: Mapping[str, object], known: Sequence[str], index: int | None) -> None:
+    def _check_keys(self, table: Mapping[str, object], known_keys: Sequence[str], index: int | None) -> None:
         for key in table:
-            if key not in known:
+            if key not in known_keys:
                 template = _("unknown key '{key}'; {did_you_mean}")
-                shown = quotable(key)
-                self._fail(key, template.format(key=shown, did_you_mean=did_you_mean(shown, known)), index)
+                shown_key = quotable(key)
+                self._fail(
+                    key,
+                    template.format(key=shown_key, did_you_mean=did_you_mean(shown_key, known_keys)),
+                    index,
+                )
 
-    def _fail(self, key: str, sentence: str, index: int | None = None) -> NoReturn:
+    def _fail(self, key: str, message: str, index: int | None = None) -> NoReturn:
         line = self._line(key, index)
         if key:
             template = _("line {line} of '{path}', '{key}': {sentence}")
             raise _InvalidAlarmError(
-                template.format(line=line, path=self._path, key=quotable(key), sentence=sentence)
+                template.format(line=line, path=self._path, key=quotable(key), sentence=message)
             )
         raise _InvalidAlarmError(
-            _("line {line} of '{path}': {sentence}").format(line=line, path=self._path, sentence=sentence)
+            _("line {line} of '{path}': {sentence}").format(line=line, path=self._path, sentence=message)
         )
 
     def _line(self, key: str, index: int | None) -> int:
@@ -379,33 +392,33 @@ class _Reader:
         begin, end = 0, len(self._text)
         if index is not None and index < len(self._spans):
             begin, end = self._spans[index]
-        found = re.compile(re.escape(json.dumps(key, ensure_ascii=False))).search(self._text, begin, end)
-        at = found.start() if key and found is not None else begin
-        return self._text.count("\n", 0, at) + 1
+        match = re.compile(re.escape(json.dumps(key, ensure_ascii=False))).search(self._text, begin, end)
+        position = match.start() if key and match is not None else begin
+        return self._text.count("\n", 0, position) + 1
 
 
 def _alarm_spans(text: str) -> list[tuple[int, int]]:
-    places: list[tuple[int, int]] = []
+    spans: list[tuple[int, int]] = []
     decode: Callable[[str, int], tuple[object, int]] = json.JSONDecoder().raw_decode
-    at = _skip_space(text, 1 if text[:1] == "{" else text.find("{") + 1)
-    while at < len(text) and text[at] == '"':
-        key, at = decode(text, at)
-        at = _skip_space(text, _skip_space(text, at) + 1)
-        if key != "alarms" or text[at : at + 1] != "[":
-            _value, at = decode(text, at)
-            at = _skip_space(text, _skip_space(text, at) + 1)
+    position = _skip_space(text, 1 if text[:1] == "{" else text.find("{") + 1)
+    while position < len(text) and text[position] == '"':
+        key, position = decode(text, position)
+        position = _skip_space(text, _skip_space(text, position) + 1)
+        if key != "alarms" or text[position : position + 1] != "[":
+            _value, position = decode(text, position)
+            position = _skip_space(text, _skip_space(text, position) + 1)
             continue
-        at = _skip_space(text, at + 1)
-        while at < len(text) and text[at] != "]":
-            _value, end = decode(text, at)
-            places.append((at, end))
+        position = _skip_space(text, position + 1)
+        while position < len(text) and text[position] != "]":
+            _value, end = decode(text, position)
+            spans.append((position, end))
             end = _skip_space(text, end)
-            at = _skip_space(text, end + 1) if text[end : end + 1] == "," else end
-        return places
-    return places
+            position = _skip_space(text, end + 1) if text[end : end + 1] == "," else end
+        return spans
+    return spans
 
 
-def _skip_space(text: str, at: int) -> int:
-    while at < len(text) and text[at] in " \t\r\n":
-        at += 1
-    return at
+def _skip_space(text: str, position: int) -> int:
+    while position < len(text) and text[position] in " \t\r\n":
+        position += 1
+    return position

@@ -113,10 +113,10 @@ def subject_text(condition: AlarmCondition) -> str:
 
 def condition_text(condition: AlarmCondition) -> str:
     """Format a condition, such as "/robot/camera is silent for 2 s"."""
-    words = _CONDITION_TEXTS[condition.kind]
+    template = _CONDITION_TEXTS[condition.kind]
     if condition.for_s > 0:
-        words = _LASTING_CONDITION_TEXTS.get(condition.kind, words)
-    return _(words).format(
+        template = _LASTING_CONDITION_TEXTS.get(condition.kind, template)
+    return _(template).format(
         subject=subject_text(condition),
         limit=limit_text(condition, condition.limit),
         time=duration_text(condition.for_s),
@@ -139,25 +139,25 @@ def rule_text(rule: AlarmRule) -> str:
     )
 
 
-def event_text(condition: AlarmCondition, seen: Scalar) -> str:
+def event_text(condition: AlarmCondition, value: Scalar) -> str:
     """Format an event for the history, such as "range of /distance is 0.36, below 0.4", without full stop."""
     return _(_EVENT_TEXTS[condition.kind]).format(
         subject=subject_text(condition),
         limit=limit_text(condition, condition.limit),
-        seen=quotable(seen)
-        if condition.kind == "appears" and isinstance(seen, str)
-        else limit_text(condition, seen),
+        seen=quotable(value)
+        if condition.kind == "appears" and isinstance(value, str)
+        else limit_text(condition, value),
     )
 
 
-def current_value_text(condition: AlarmCondition, seen: Scalar) -> str:
+def current_value_text(condition: AlarmCondition, value: Scalar) -> str:
     """Format the current value, such as "0.82 now" or "silent for 4 s"; return "" if there is none."""
     if condition.kind == "silent":
-        if not isinstance(seen, int | float) or seen < 1:
+        if not isinstance(value, int | float) or value < 1:
             return ""
-        return _("silent for {time}").format(time=duration_text(round(seen)))
-    if seen is None and condition.kind not in {"equals", "is_not"}:
+        return _("silent for {time}").format(time=duration_text(round(value)))
+    if value is None and condition.kind not in {"equals", "is_not"}:
         return ""
     if condition.kind in {"leaves", "comes", "appears"}:
         return ""
-    return _("{value} now").format(value=limit_text(condition, seen))
+    return _("{value} now").format(value=limit_text(condition, value))

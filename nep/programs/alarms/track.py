@@ -110,8 +110,8 @@ class AlarmStateMachine:
         self.problem = "no_number" if number is None else ""
         if number is None:
             return None
-        seen = to_scalar(value) if math.isfinite(number) else number
-        return self.compare(number, now, is_below=kind == "below", seen=seen)
+        observed = to_scalar(value) if math.isfinite(number) else number
+        return self.compare(number, now, is_below=kind == "below", observed=observed)
 
     def _is_clearly_false(self, value: object) -> bool:
         if self._bound is None or self.on_since is not None or self._true_since is not None:
@@ -120,39 +120,41 @@ class AlarmStateMachine:
             return False
         return value >= self._bound if self._is_below else value <= self._bound
 
-    def compare(self, number: float, now: float, *, is_below: bool, seen: Scalar = None) -> Transition | None:
+    def compare(
+        self, number: float, now: float, *, is_below: bool, observed: Scalar = None
+    ) -> Transition | None:
         """Compare a number with the limit, with hysteresis; return the transition, or None.
 
         Args:
             number: Number to compare.
             now: Monotonic time in seconds.
             is_below: True if the alarm is on while the number is below the limit, False for above.
-            seen: Original value, if `number` was converted from it.
+            observed: Original value, if `number` was converted from it.
         """
         limit, margin = self.rule.condition.number, self.rule.condition.margin
         if self.is_on:
             is_so = number < limit + margin if is_below else number > limit - margin
         else:
             is_so = number < limit if is_below else number > limit
-        return self.observe(is_so, number if seen is None else seen, now)
+        return self.observe(is_so, number if observed is None else observed, now)
 
     def trigger(self, now: float) -> Transition | None:
         """Process a momentary event: it turns the alarm on for `MIN_EVENT_DURATION_S`."""
-        turn = self.observe(True, self.last_value, now)
+        transition = self.observe(True, self.last_value, now)
         self.observe(False, self.last_value, now)
-        return turn
+        return transition
 
-    def observe(self, is_so: bool, seen: Scalar, now: float) -> Transition | None:
+    def observe(self, is_so: bool, observed: Scalar, now: float) -> Transition | None:
         """Process the current truth of the condition; return the transition, or None.
 
         Args:
             is_so: True if the condition is met.
-            seen: Value that was compared.
+            observed: Value that was compared.
             now: Monotonic time in seconds.
         """
-        turn = self.advance(now)
+        transition = self.advance(now)
         self.was_observed = True
-        self.last_value = seen
+        self.last_value = observed
         if is_so:
             if self.is_on and self._false_since is not None:
                 self.count += 1  # false for less than calm_s
@@ -163,7 +165,7 @@ class AlarmStateMachine:
             self._true_since = None
             if self.is_on and self._false_since is None:
                 self._false_since = now
-        return turn or self.advance(now)
+        return transition or self.advance(now)
 
     def advance(self, now: float) -> Transition | None:
         """Process the passing of time; return the transition, or None.
@@ -179,18 +181,18 @@ class AlarmStateMachine:
             return Transition(True, self.last_value, 0.0, 1)
         if false_since is None or now - false_since < self._calm_s:
             return None
-        turn = Transition(False, self.last_value, max(0.0, false_since - self.on_since), self.count)
+        transition = Transition(False, self.last_value, max(0.0, false_since - self.on_since), self.count)
         self.on_since = self._false_since = None
-        return turn
+        return transition
 
     def turn_off(self, now: float) -> Transition | None:
         """Turn the alarm off because its rule is no longer evaluated; return None if the alarm was off."""
         if self.on_since is None:
             return None
         end = now if self._false_since is None else self._false_since
-        turn = Transition(False, self.last_value, max(0.0, end - self.on_since), self.count)
+        transition = Transition(False, self.last_value, max(0.0, end - self.on_since), self.count)
         self.on_since = self._true_since = self._false_since = None
-        return turn
+        return transition
 
 
 def to_scalar(value: object) -> Scalar:
@@ -218,7 +220,7 @@ def _number(value: object) -> float | None:
     return to_float(value)
 
 
-def _are_equal(one: object, other: object) -> bool:
-    if isinstance(one, bool) is not isinstance(other, bool):
+def _are_equal(value: object, other: object) -> bool:
+    if isinstance(value, bool) is not isinstance(other, bool):
         return False
-    return one == other or (one != one and other != other)  # noqa: PLR0124
+    return value == other or (value != value and other != other)  # noqa: PLR0124

@@ -198,11 +198,11 @@ class Blackboard:
         node = self._node
         if node is None:
             raise NepError(_("this blackboard has no node; create it with 'nep.Blackboard(node)'"))
-        lives = _lifetime(lives_s)
+        lifetime_s = _lifetime(lives_s)
         watch = BlackboardWatch(
             topic,
             MessageMapping(key, fields, each),
-            lambda message, found: self._store_message(message, found, lives),
+            lambda message, found: self._store_message(message, found, lifetime_s),
             is_pattern=is_pattern(check_topic(topic)),
         )
         with self._updated:
@@ -235,11 +235,12 @@ class Blackboard:
             BadKeyError: The key is invalid.
             BadValueError: The value is nested too deeply or too large.
         """
-        names, lives = parse_key(key), _lifetime(lives_s)
+        names, lifetime_s = parse_key(key), _lifetime(lives_s)
         with self._updated:
             now = self._clock()
             entries = [
-                self._entry(each, leaf, now, lives) for each, leaf in leaves(_copy_value(names, value), names)
+                self._entry(each, leaf, now, lifetime_s)
+                for each, leaf in leaves(_copy_value(names, value), names)
             ]
         self._store(entries)
 
@@ -253,26 +254,26 @@ class Blackboard:
         self._schedule_delivery()
         return len(removed)
 
-    def _store_message(self, message: Message, found: Sequence[PerceivedValue], lives: float) -> None:
+    def _store_message(self, message: Message, values: Sequence[PerceivedValue], lifetime_s: float) -> None:
         if message.publisher in self._ignored:
             return
         since, age_by = age_start(message, self._clock(), self._wall_clock_ns())
         problem: NepError | None = None
         entries: list[StoredEntry] = []
-        for each in found:
+        for value in values:
             try:
-                key = parse_key(each.key)
+                key = parse_key(value.key)
                 entries.append(
                     StoredEntry(
                         key,
-                        _copy_value(key, each.value),
+                        _copy_value(key, value.value),
                         since,
                         age_by,
-                        since + lives,
+                        since + lifetime_s,
                         message.stamp_ns,
                         message.publisher,
                         message.topic,
-                        each.robot,
+                        value.robot,
                     )
                 )
             except NepError as error:
@@ -281,8 +282,8 @@ class Blackboard:
         if problem is not None:
             raise problem
 
-    def _entry(self, key: Key, value: object, now: float, lives: float) -> StoredEntry:
-        return StoredEntry(parse_key(key), value, now, expires_at=now + lives)
+    def _entry(self, key: Key, value: object, now: float, lifetime_s: float) -> StoredEntry:
+        return StoredEntry(parse_key(key), value, now, expires_at=now + lifetime_s)
 
     def _store(self, entries: Sequence[StoredEntry]) -> None:
         problem: BadValueError | None = None
@@ -314,20 +315,20 @@ class Blackboard:
             default: Value to return if the key has no value, or only values older than `max_age_s`.
             max_age_s: Maximum age in seconds; None for no limit.
         """
-        found = self._value_of(parse_key(key), check_optional_time_limit("max_age_s", max_age_s))
-        return default if found is _MISSING else found
+        value = self._value_of(parse_key(key), check_optional_time_limit("max_age_s", max_age_s))
+        return default if value is _MISSING else value
 
     def __getitem__(self, key: str | tuple[str, ...]) -> object:
         names = parse_key(key)
-        found = self._value_of(names, None)
-        if found is _MISSING:
+        value = self._value_of(names, None)
+        if value is _MISSING:
             with self._updated:
-                known = [
+                known_keys = [
                     key_text(each.key)
                     for each in islice(self._entries.entries_matching(("**",)), _MAX_SUGGESTIONS)
                 ]
-            raise NoValueError(key_text(names), known)
-        return found
+            raise NoValueError(key_text(names), known_keys)
+        return value
 
     def __setitem__(self, key: str | tuple[str, ...], value: object) -> None:
         self.put(key, value)
@@ -355,8 +356,8 @@ class Blackboard:
         names = parse_key(key)
         with self._updated:
             now = self._expire_locked()
-            found = self._entries.get(names)
-        return None if found is None else _public_entry(found, now)
+            stored = self._entries.get(names)
+        return None if stored is None else _public_entry(stored, now)
 
     def keys(self, pattern: str = "**") -> list[str]:
         """Return the sorted keys that match a pattern.
@@ -366,28 +367,28 @@ class Blackboard:
         names = parse_key(pattern)
         with self._updated:
             self._expire_locked()
-            found = list(self._entries.entries_matching(names))
-        return sorted(key_text(each.key) for each in found)
+            entries = list(self._entries.entries_matching(names))
+        return sorted(key_text(each.key) for each in entries)
 
     def snapshot(self, pattern: str = "**") -> dict[str, BlackboardEntry]:
         """Return all entries that match a pattern, by key, all taken at the same moment."""
         names = parse_key(pattern)
         with self._updated:
             now = self._expire_locked()
-            found = list(self._entries.entries_matching(names))
+            entries = list(self._entries.entries_matching(names))
         return {
             each.key: each
-            for each in sorted((_public_entry(each, now) for each in found), key=lambda e: e.key)
+            for each in sorted((_public_entry(each, now) for each in entries), key=lambda e: e.key)
         }
 
     def _value_of(self, key: Key, max_age_s: float | None) -> object:
         limit_s = math.inf if max_age_s is None else max_age_s
         with self._updated:
             now = self._expire_locked()
-            found = [each for each in self._entries.entries_below(key) if each.age_s(now) <= limit_s]
-        if not found:
+            entries = [each for each in self._entries.entries_below(key) if each.age_s(now) <= limit_s]
+        if not entries:
             return _MISSING
-        return _compose(found, key)
+        return _compose(entries, key)
 
     @property
     def bytes(self) -> int:
@@ -430,16 +431,16 @@ class Blackboard:
         deadline = math.inf if limit_s is None else time.monotonic() + limit_s
         while True:
             version = self._version
-            found = self._value_of(names, None)
-            if found is not _MISSING and (condition is None or condition(found)):
-                return found
+            value = self._value_of(names, None)
+            if value is not _MISSING and (condition is None or condition(value)):
+                return value
             self._check_open()
-            left = min(_WAIT_SLICE_S, deadline - time.monotonic())
-            if left <= 0.0:
+            remaining_s = min(_WAIT_SLICE_S, deadline - time.monotonic())
+            if remaining_s <= 0.0:
                 raise WaitTimeoutError(key_text(names), limit_s or 0.0)
             with self._updated:
                 if self._version == version:
-                    self._updated.wait(left)
+                    self._updated.wait(remaining_s)
 
     def on_change(self, pattern: str, callback: OnChange) -> Callable[[], None]:
         """Call `callback` with each `BlackboardChange` of matching keys, in the thread that spins the node.
@@ -483,10 +484,10 @@ class Blackboard:
                         break
                     observer, change = self._pending.popleft()
                     self._pending_bytes -= change.entry.bytes
-                    is_there = any(each is observer for each in self._observers)
+                    is_registered = any(each is observer for each in self._observers)
                     now = self._clock()
                 calls += 1
-                if is_there:
+                if is_registered:
                     observer.callback(BlackboardChange(_public_entry(change.entry, now), change.cause))
         finally:
             self._schedule_delivery()
@@ -582,8 +583,8 @@ class Blackboard:
 
 
 def _lifetime(lives_s: object) -> float:
-    found = check_optional_time_limit("lives_s", lives_s)
-    return math.inf if found is None else check_period("lives_s", found)
+    checked_s = check_optional_time_limit("lives_s", lives_s)
+    return math.inf if checked_s is None else check_period("lives_s", checked_s)
 
 
 def _copy_value(key: Key, value: object) -> object:
@@ -606,16 +607,16 @@ def _public_entry(entry: StoredEntry, now: float) -> BlackboardEntry:
     )
 
 
-def _compose(found: Sequence[StoredEntry], key: Key) -> object:
-    if found[0].key == key:
-        return deep_copy(found[0].value)
-    whole: dict[str, object] = {}
-    for entry in found:
+def _compose(entries: Sequence[StoredEntry], key: Key) -> object:
+    if entries[0].key == key:
+        return deep_copy(entries[0].value)
+    result: dict[str, object] = {}
+    for entry in entries:
         *names, last = entry.key[len(key) :]
-        at = whole
+        branch = result
         for name in names:
-            after = at.setdefault(name, {})
+            after = branch.setdefault(name, {})
             if isinstance(after, dict):  # always true: no value is stored above another
-                at = after
-        at[last] = deep_copy(entry.value)
-    return whole
+                branch = after
+        branch[last] = deep_copy(entry.value)
+    return result

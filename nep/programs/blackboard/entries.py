@@ -120,27 +120,27 @@ class Entries:
 
     def entries_below(self, key: Key) -> Iterator[StoredEntry]:
         """Yield the entry of a key, or the entries of all keys below it."""
-        found = self._find(key)
-        if isinstance(found, StoredEntry):
-            yield found
-        elif found is not None:
-            yield from _entries_in(found)
+        subtree = self._find(key)
+        if isinstance(subtree, StoredEntry):
+            yield subtree
+        elif subtree is not None:
+            yield from _entries_in(subtree)
 
     def entries_matching(self, pattern: Key) -> Iterator[StoredEntry]:
         """Yield the entries whose keys match a pattern, in tree order."""
         beginning = literal_prefix(pattern)
-        found = self.entries_below(beginning)
+        entries = self.entries_below(beginning)
         if pattern == (*beginning, "**"):
-            return found
-        return (each for each in found if key_matches(pattern, each.key))
+            return entries
+        return (each for each in entries if key_matches(pattern, each.key))
 
     def _find(self, key: Key) -> StoredEntry | _Tree | None:
-        found: StoredEntry | _Tree | None = self._tree
+        subtree: StoredEntry | _Tree | None = self._tree
         for name in key:
-            if not isinstance(found, _Tree):
+            if not isinstance(subtree, _Tree):
                 return None
-            found = found.get(name)
-        return found
+            subtree = subtree.get(name)
+        return subtree
 
     # ---- changing
 
@@ -160,9 +160,9 @@ class Entries:
             return []
         changes: list[EntryChange] = []
         if before is None:
-            for each in self._conflicting_entries(entry.key):
-                self._pop(each.key)
-                changes.append(EntryChange(each, "replaced"))
+            for conflict in self._conflicting_entries(entry.key):
+                self._pop(conflict.key)
+                changes.append(EntryChange(conflict, "replaced"))
             changes.append(EntryChange(entry, "new"))
         else:
             self.bytes -= before.bytes
@@ -200,24 +200,24 @@ class Entries:
         return changes
 
     def _conflicting_entries(self, key: Key) -> list[StoredEntry]:
-        found: StoredEntry | _Tree = self._tree
+        subtree: StoredEntry | _Tree = self._tree
         for name in key:
-            if isinstance(found, StoredEntry):
-                return [found]
-            after = found.get(name)
+            if isinstance(subtree, StoredEntry):
+                return [subtree]
+            after = subtree.get(name)
             if after is None:
                 return []
-            found = after
-        return [found] if isinstance(found, StoredEntry) else list(_entries_in(found))
+            subtree = after
+        return [subtree] if isinstance(subtree, StoredEntry) else list(_entries_in(subtree))
 
     def _insert(self, entry: StoredEntry) -> None:
-        at = self._tree
+        branch = self._tree
         for name in entry.key[:-1]:
-            after = at.setdefault(name, _Tree())
+            after = branch.setdefault(name, _Tree())
             if isinstance(after, StoredEntry):  # unreachable: conflicting entries were removed
                 raise TypeError(entry.key)
-            at = after
-        at[entry.key[-1]] = entry
+            branch = after
+        branch[entry.key[-1]] = entry
         self._by_age[entry.key] = entry
         self._by_age.move_to_end(entry.key)
         self.bytes += entry.bytes
@@ -249,9 +249,9 @@ class Entries:
             if isinstance(after, StoredEntry):  # unreachable: it would have been replaced
                 raise TypeError(key)
             path.append(after)
-        for at, name in zip(reversed(path), reversed(key), strict=True):
-            del at[name]
-            if at:
+        for branch, name in zip(reversed(path), reversed(key), strict=True):
+            del branch[name]
+            if branch:
                 break
         return entry
 
@@ -266,8 +266,8 @@ def _is_newer(before: StoredEntry, entry: StoredEntry, now: float) -> bool:
 
 
 def _entries_in(tree: _Tree) -> Iterator[StoredEntry]:
-    for each in tree.values():
-        if isinstance(each, StoredEntry):
-            yield each
+    for child in tree.values():
+        if isinstance(child, StoredEntry):
+            yield child
         else:
-            yield from _entries_in(each)
+            yield from _entries_in(child)

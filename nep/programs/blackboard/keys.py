@@ -54,15 +54,15 @@ def _too_long_error(key: str) -> BadKeyError:
 
 
 def _split_names(text: str) -> Key:
-    found, at = [], 0
+    names, position = [], 0
     while True:
-        match = _NAME.match(text, at)
+        match = _NAME.match(text, position)
         if match is None:  # unreachable: the pattern matches the empty text
             raise BadKeyError(text, _("use a string such as 'human.1.position'"))
-        found.append(_ESCAPE_SEQUENCE.sub(r"\1", match[1]))
+        names.append(_ESCAPE_SEQUENCE.sub(r"\1", match[1]))
         if not text[match.end(1) :]:
-            return tuple(found)
-        at = match.end()
+            return tuple(names)
+        position = match.end()
 
 
 def key_text(names: Key) -> str:

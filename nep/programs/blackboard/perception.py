@@ -41,14 +41,14 @@ def parse_perception(payload: object) -> Perception | None:
             return None
     if not isinstance(payload, Mapping):
         return None
-    primitive, given, robot = (payload.get(name) for name in ("primitive", "input", "robot"))
+    primitive, inputs, robot = (payload.get(name) for name in ("primitive", "input", "robot"))
     if not isinstance(primitive, str) or not primitive:
         return None
-    if isinstance(given, str) and given and payload.get("node") == "perception":
-        given = {given: 1}
-    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
+    if isinstance(inputs, str) and inputs and payload.get("node") == "perception":
+        inputs = {inputs: 1}
+    if not isinstance(inputs, Mapping) or not all(isinstance(name, str) for name in inputs):
         return None
-    values = {name.strip(_QUOTES): _parse_number(value) for name, value in given.items()}
+    values = {name.strip(_QUOTES): _parse_number(value) for name, value in inputs.items()}
     return Perception(primitive, values, robot if isinstance(robot, str) else "")
 
 
@@ -56,9 +56,9 @@ def _parse_number(value: object) -> object:
     if not isinstance(value, str):
         return value
     try:
-        found = float(value.strip(_QUOTES))
+        parsed = float(value.strip(_QUOTES))
     except ValueError:
         return value
-    if not math.isfinite(found):
+    if not math.isfinite(parsed):
         return value
-    return int(found) if found.is_integer() and "." not in value else found
+    return int(parsed) if parsed.is_integer() and "." not in value else parsed

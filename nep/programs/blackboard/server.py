@@ -37,14 +37,14 @@ MAX_ENTRIES = 10_000
 _MAX_REPLY_BYTES = 32 * 2**20
 
 
-def service_name(name: str, what: str) -> str:
+def service_name(name: str, operation: str) -> str:
     """Return the name of a service of a blackboard.
 
     Args:
         name: Name of the blackboard.
-        what: "get", "set" or "keys".
+        operation: "get", "set" or "keys".
     """
-    return f"{name}/{what}"
+    return f"{name}/{operation}"
 
 
 class BlackboardServer:
@@ -65,8 +65,8 @@ class BlackboardServer:
         self._changes = node.new_pub(f"/{name.lstrip('/')}/changes", "json")
         board.ignore(self._changes.id)
         self._servers = [
-            node.new_server(service_name(name, what), answer)
-            for what, answer in (("get", self._get), ("set", self._set), ("keys", self._keys))
+            node.new_server(service_name(name, operation), handler)
+            for operation, handler in (("get", self._get), ("set", self._set), ("keys", self._keys))
         ]
         self._end = board.on_change("**", self._publish_change)
 
@@ -89,11 +89,15 @@ class BlackboardServer:
         return {"found": True, "value": _to_sendable(value), "age_s": _finite_or_none(self._board.age_s(key))}
 
     def _entries(self, pattern: str, max_age_s: float) -> object:
-        young = [each for each in self._board.snapshot(pattern).values() if each.age_s <= max_age_s]
+        young = [
+            board_entry
+            for board_entry in self._board.snapshot(pattern).values()
+            if board_entry.age_s <= max_age_s
+        ]
         entries: list[object] = []
         room = _MAX_REPLY_BYTES
-        for each in young[:MAX_ENTRIES]:
-            entry = _entry_to_map(each)
+        for board_entry in young[:MAX_ENTRIES]:
+            entry = _entry_to_map(board_entry)
             room -= len(orjson.dumps(entry, option=orjson.OPT_NON_STR_KEYS | numpy_option()))
             if room < 0 and entries:
                 break
@@ -106,17 +110,17 @@ class BlackboardServer:
         if "key" in fields and "value" in fields:
             values: Mapping[object, object] = {_text(fields, "key"): fields["value"]}
         else:
-            given = fields.get("values")
-            if not isinstance(given, Mapping) or not given:
+            value_map = fields.get("values")
+            if not isinstance(value_map, Mapping) or not value_map:
                 raise NepError(_("the values are missing; specify 'key' and 'value', or a map 'values'"))
-            values = given
+            values = value_map
         for key, value in values.items():
             self._board.put(key if isinstance(key, str) else bounded_str(key), value, lives_s=lives_s)
         return {"set": len(values)}
 
     def _keys(self, request: object) -> object:
-        found = self._board.keys(_text(_checked_request(request), "pattern", "**"))
-        return {"keys": found[:MAX_ENTRIES], "more": max(0, len(found) - MAX_ENTRIES)}
+        keys = self._board.keys(_text(_checked_request(request), "pattern", "**"))
+        return {"keys": keys[:MAX_ENTRIES], "more": max(0, len(keys) - MAX_ENTRIES)}
 
     def close(self) -> None:
         """Stop publishing and serving; the blackboard stays open. Idempotent."""

@@ -59,21 +59,21 @@ def size_of(value: object) -> int:
             waiting += each
             waiting += each.values()
         else:
-            found = getattr(each, "nbytes", None)  # nbytes: an array may be a view, which is small by itself
-            size += found if isinstance(found, int) else sys.getsizeof(each, _ITEM_BYTES)
+            nbytes = getattr(each, "nbytes", None)  # nbytes: an array may be a view, which is small by itself
+            size += nbytes if isinstance(nbytes, int) else sys.getsizeof(each, _ITEM_BYTES)
     return size
 
 
-def is_same(one: object, other: object) -> bool:
+def is_same(value: object, other: object) -> bool:
     """Return True if two values are equal and of the same type; NaN equals NaN."""
-    if one is other:
+    if value is other:
         return True
-    if type(one) is not type(other):
+    if type(value) is not type(other):
         return False
-    if isinstance(one, float) and isinstance(other, float) and math.isnan(one) and math.isnan(other):
+    if isinstance(value, float) and isinstance(other, float) and math.isnan(value) and math.isnan(other):
         return True
     try:
-        return bool(one == other)
+        return bool(value == other)
     except Exception:  # noqa: BLE001 - arrays compare element-wise, and values may be of any class
         return False
 
@@ -91,8 +91,8 @@ def leaves(value: object, key: Key = ()) -> Iterator[tuple[Key, object]]:
     if not isinstance(value, Mapping) or not value or len(key) >= MAX_LEVELS or not _has_valid_names(value):
         yield key, value
         return
-    for name, each in value.items():
-        yield from leaves(each, (*key, str(name)))
+    for name, child in value.items():
+        yield from leaves(child, (*key, str(name)))
 
 
 def _has_valid_names(value: Mapping[object, object]) -> bool:

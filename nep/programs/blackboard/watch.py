@@ -58,7 +58,9 @@ class MessageMapping:
         if isinstance(fields, str):
             raise WrongTypeError(_("'fields' must be a list of names, not a string"))
         pairs = fields.items() if isinstance(fields, Mapping) else [(name, name) for name in fields or ()]
-        self._fields = None if fields is None else [(parse_key(one), parse_key(two)) for one, two in pairs]
+        self._fields = (
+            None if fields is None else [(parse_key(source), parse_key(two)) for source, two in pairs]
+        )
 
     def items(self, payload: object) -> Sequence[object]:
         """Return the items of a payload that are stored separately; most payloads are a single item.
@@ -66,12 +68,12 @@ class MessageMapping:
         Raises `NepError` if the payload has no list in the field `each`.
         """
         if self._each:
-            found = _field_value(payload, self._each)
-            if not isinstance(found, list | tuple):
+            entries = _field_value(payload, self._each)
+            if not isinstance(entries, list | tuple):
                 raise NepError(
                     _("the message has no list in the field '{field}'").format(field=key_text(self._each))
                 )
-            return found
+            return entries
         return payload if self._has_holes and isinstance(payload, list | tuple) else (payload,)
 
     def perceived_values(self, topic: str, item: object) -> Iterator[PerceivedValue]:
@@ -84,17 +86,17 @@ class MessageMapping:
         Raises:
             NepError: The item lacks a field that is part of the key.
         """
-        seen = None if self._fields is not None else parse_perception(item)
-        if seen is not None:
+        perception = None if self._fields is not None else parse_perception(item)
+        if perception is not None:
             beginning = () if self._key is None else self._key_for(item)
-            for key, value in leaves(seen.values, (*beginning, *parse_key(seen.primitive))):
-                yield PerceivedValue(key, value, seen.robot)
+            for key, value in leaves(perception.values, (*beginning, *parse_key(perception.primitive))):
+                yield PerceivedValue(key, value, perception.robot)
             return
         beginning = topic_to_key(topic) if self._key is None else self._key_for(item)
         robot = item.get("robot") if isinstance(item, Mapping) else None
         robot_name = robot if isinstance(robot, str) else ""
-        for at, value in self._selected_fields(item):
-            for key, leaf in leaves(value, (*beginning, *at)):
+        for field_key, value in self._selected_fields(item):
+            for key, leaf in leaves(value, (*beginning, *field_key)):
                 yield PerceivedValue(key, leaf, robot_name)
 
     def _selected_fields(self, item: object) -> Iterator[tuple[Key, object]]:
@@ -148,7 +150,7 @@ class BlackboardWatch:
         self,
         topic: str,
         reading: MessageMapping,
-        keep: Callable[[Message, Sequence[PerceivedValue]], None],
+        store: Callable[[Message, Sequence[PerceivedValue]], None],
         *,
         is_pattern: bool,
     ) -> None:
@@ -160,7 +162,7 @@ class BlackboardWatch:
         self.problem = ""
         """Reason why the last message was rejected; "" if it was stored."""
         self._reading = reading
-        self._store = keep
+        self._store = store
         self._is_pattern = is_pattern
         self._subscriber: Subscriber | None = None
         self._is_closed = False

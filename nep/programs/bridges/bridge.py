@@ -159,17 +159,17 @@ class Bridge:
 
     def _add_route(self, topic: BridgeTopic, origin: SideName, a: str, b: str) -> None:
         with self._lock:
-            way = (origin, a, b)
-            if way in self._known:
+            route_key = (origin, a, b)
+            if route_key in self._known:
                 return
-            self._known.add(way)
-            ends = {"a": self._route_end(topic, "a", a), "b": self._route_end(topic, "b", b)}
+            self._known.add(route_key)
+            route_ends = {"a": self._route_end(topic, "a", a), "b": self._route_end(topic, "b", b)}
             end: SideName = "b" if origin == "a" else "a"
             route = Route(
-                ends[origin],
-                ends[end],
+                route_ends[origin],
+                route_ends[end],
                 bridge=self.id,
-                own=self._own,
+                own_publishers=self._own,
                 wake=self.sides[end].wake,
                 pacer=self._pacer,
                 max_rate_hz=topic.max_rate_hz,
@@ -199,10 +199,10 @@ class Bridge:
         """
         self._check_other_bridges()
         self._close_idle_routes(side, view, time.monotonic())
-        named = {each.end(side.name).name for each in self.configuration.topics if not each.is_pattern}
+        exact_topics = {each.end(side.name).name for each in self.configuration.topics if not each.is_pattern}
         for name in view.topics:
             if (
-                name in named
+                name in exact_topics
                 or name.startswith(_INTERNAL_PREFIX)
                 or not published_type(view, name, self.own_nodes)
             ):
@@ -258,16 +258,16 @@ class Bridge:
         for route in self._routes:
             origin, end = route.origin, route.end
             back: RouteKey = (end.side, end.topic, origin.topic)
-            stronger = [each for each in others if each.id < self.id and back in each.routes]
+            stronger = [other for other in others if other.id < self.id and back in other.routes]
             route.rival = stronger[0].name if stronger and not keeps_trails else ""
             same: RouteKey = (origin.side, origin.topic, end.topic)
-            for each in others:
-                if {same, back} & each.routes and each.id not in self._warned:
-                    self._warned.add(each.id)
+            for other in others:
+                if {same, back} & other.routes and other.id not in self._warned:
+                    self._warned.add(other.id)
                     _logger.warning(
                         "the bridge '%s' also forwards '%s' and '%s': messages arrive twice or loop; "
                         "stop one of the two",
-                        each.name,
+                        other.name,
                         origin.topic,
                         end.topic,
                     )

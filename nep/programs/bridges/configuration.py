@@ -62,8 +62,8 @@ class TopicEnd:
     @property
     def wildcard(self) -> str:
         """Wildcard of the pattern: `*` (within slashes), `**` (any characters), or "" for a topic."""
-        found = _WILDCARD.search(self.name)
-        return found.group() if found is not None else ""
+        match = _WILDCARD.search(self.name)
+        return match.group() if match is not None else ""
 
     def matched_part(self, topic: str) -> str:
         """Return the part of a topic that the wildcard matches, or "" if the pattern doesn't match."""
@@ -156,16 +156,16 @@ def side_configuration(backend: str, master: str = "", network: str = "") -> Sid
         master: Address of the master (default: the back end's default).
         network: Id of the network (default: derived from the address).
     """
-    found = find_backend(backend)
+    resolved_backend = find_backend(backend)
     try:
-        place = found.master(master or None)
+        address = resolved_backend.master(master or None)
     except ValueError as error:  # also invalid numbers
         raise NepError(
             _("'{master}' isn't a valid master address for '{backend}'; see docs/backends.md").format(
-                master=master, backend=found.name
+                master=master, backend=resolved_backend.name
             )
         ) from error
-    return SideConfiguration(found, place, network or _network_id(found, place))
+    return SideConfiguration(resolved_backend, address, network or _network_id(resolved_backend, address))
 
 
 def _network_id(backend: Backend, master: str) -> str:
@@ -182,14 +182,14 @@ def check_topic_names(a: str, b: str) -> None:
     """
     wildcards = []
     for name in (check_topic(a), check_topic(b)):
-        found = _WILDCARD.findall(name)
-        if len(found) > 1:
+        name_wildcards = _WILDCARD.findall(name)
+        if len(name_wildcards) > 1:
             raise NepError(
                 _("'{name}' has {count} wildcards; use a single '*', or '**' to match slashes, too").format(
-                    name=name, count=len(found)
+                    name=name, count=len(name_wildcards)
                 )
             )
-        wildcards.append("".join(found))
+        wildcards.append("".join(name_wildcards))
     if wildcards[0] != wildcards[1]:
         raise NepError(
             _(
@@ -242,18 +242,18 @@ def check_different_networks(a: SideConfiguration, b: SideConfiguration) -> None
         )
 
 
-def _parse_side_and_topic(word: str) -> tuple[SideConfiguration, str]:
-    backend, at, rest = word.partition("@")
-    if at and ":" not in backend:
+def _parse_side_and_topic(text: str) -> tuple[SideConfiguration, str]:
+    backend, separator, rest = text.partition("@")
+    if separator and ":" not in backend:
         master, colon, topic = rest.rpartition(":")
     else:
         master = ""
-        backend, colon, topic = word.partition(":")
+        backend, colon, topic = text.partition(":")
     if not colon or not backend:
         raise NepError(
             _(
                 "'{word}' isn't in the form BACKEND:TOPIC; write it as 'zeromq:/topic' or "
                 "'zeromq@HOST:7780:/topic'"
-            ).format(word=quotable(word))
+            ).format(word=quotable(text))
         )
     return side_configuration(backend, master), topic

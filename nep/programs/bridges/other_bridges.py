@@ -60,11 +60,11 @@ class OtherBridges:
     """Tracker of other bridges. Thread-safe.
 
     Args:
-        own: Id of this bridge, whose own status is ignored.
+        own_id: Id of this bridge, whose own status is ignored.
     """
 
-    def __init__(self, own: str) -> None:
-        self._own = own
+    def __init__(self, own_id: str) -> None:
+        self._own = own_id
         self._lock = threading.Lock()
         self._statuses: dict[SideName, OrderedDict[str, _Status]] = {side: OrderedDict() for side in SIDES}
 
@@ -90,15 +90,15 @@ class OtherBridges:
         """Return the bridges whose status was received recently on both sides."""
         with self._lock:
             on_a, on_b = ({**self._statuses[side]} for side in SIDES)
-        found = []
+        bridges = []
         for id_, a in on_a.items():
             b = on_b.get(id_)
             if b is None or a.side == b.side or now - min(a.at, b.at) > _EXPIRY_S:
                 continue
             sides: dict[str, SideName] = {a.side: "a", b.side: "b"}
-            ways = frozenset((sides[origin], topic, to) for origin, topic, to in a.routes)
-            found.append(OtherBridge(id_, a.name, ways))
-        return found
+            routes = frozenset((sides[origin], topic, to) for origin, topic, to in a.routes)
+            bridges.append(OtherBridge(id_, a.name, routes))
+        return bridges
 
 
 def _parse_routes(routes: object) -> Iterator[tuple[str, str, str]]:

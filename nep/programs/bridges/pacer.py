@@ -78,8 +78,8 @@ class Pacer:
     def _run(self) -> None:
         while True:
             with self._changed:
-                while not self._is_closed and (left := self._remaining_s()) != 0.0:
-                    self._changed.wait(left)
+                while not self._is_closed and (remaining_s := self._remaining_s()) != 0.0:
+                    self._changed.wait(remaining_s)
                 if self._is_closed:
                     return
                 call = heapq.heappop(self._due)[2]

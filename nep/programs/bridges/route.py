@@ -100,10 +100,10 @@ class RouteCounts:
 class _BufferedSink:
     """Sink of a subscriber that buffers messages until `open` is called, and then forwards them."""
 
-    def __init__(self, take: Callable[[Sequence[Message]], None], *, is_open: bool) -> None:
+    def __init__(self, on_messages: Callable[[Sequence[Message]], None], *, is_open: bool) -> None:
         self.is_open = is_open
         self.is_muted = False
-        self._on_messages = take
+        self._on_messages = on_messages
         self._buffered: list[Message] = []
         self._lock = threading.Lock()
 
@@ -136,7 +136,7 @@ class Route:
         origin: Topic from which messages are received.
         end: Topic on which messages are published.
         bridge: Id of the bridge.
-        own: Ids of all publishers of the bridge.
+        own_publishers: Ids of all publishers of the bridge.
         wake: Called when `open_publishers` needs to be called.
         pacer: Timer for messages that the rate limit delays.
         max_rate_hz: Maximum number of messages per second; 0 for no limit.
@@ -149,7 +149,7 @@ class Route:
         end: RouteEnd,
         *,
         bridge: str,
-        own: set[int],
+        own_publishers: set[int],
         wake: Callable[[], None],
         pacer: Pacer,
         max_rate_hz: float = 0.0,
@@ -166,7 +166,7 @@ class Route:
         self.rival = ""
         """Name of another bridge that forwards these messages; then this route is inactive."""
         self._bridge = bridge
-        self._own = own
+        self._own = own_publishers
         self._wake = wake
         self._clock = clock
         self._pacer = pacer
@@ -257,9 +257,9 @@ class Route:
         Raises:
             NepError: The subscription failed.
         """
-        known = published_type(view, self.origin.topic, own_nodes)
+        known_type = published_type(view, self.origin.topic, own_nodes)
         if self._subscriber is None:
-            msg_type = self.origin.msg_type or known or default_type(self.origin.backend)
+            msg_type = self.origin.msg_type or known_type or default_type(self.origin.backend)
             self._waits_for_type = not msg_type
             if not msg_type:
                 return
@@ -267,8 +267,8 @@ class Route:
             subscriber = self._new_sub(node, msg_type, sink)
             with self._lock:
                 self._subscriber, self._sink = subscriber, sink
-        elif not self.origin.msg_type and known not in {"", self._subscriber.msg_type}:
-            self._resubscribe(node, known)
+        elif not self.origin.msg_type and known_type not in {"", self._subscriber.msg_type}:
+            self._resubscribe(node, known_type)
 
     def _resubscribe(self, node: Node, msg_type: str) -> None:
         # Keeps a subscription that receives messages: not every back end insists on the type.
@@ -433,8 +433,8 @@ class Route:
             origin: Graph of the origin's side.
             now: Monotonic time in seconds.
         """
-        there = origin.topics.get(self.origin.topic)
-        ids = {each.id for each in there.publishers} if there is not None else set()
+        topic_info = origin.topics.get(self.origin.topic)
+        ids = {each.id for each in topic_info.publishers} if topic_info is not None else set()
         ended = []
         with self._lock:
             for key in list(self._publishers):
@@ -458,9 +458,9 @@ class Route:
             if subscriber_count != self._subscriber_counts.get(publisher):  # a robot may have connected
                 self._subscriber_counts[publisher] = subscriber_count
                 self.end.guard.poll()
-            refusal = self.denial_reason
-            if refusal:
-                self._fail(refusal)
+            reason = self.denial_reason
+            if reason:
+                self._fail(reason)
                 return
         try:
             if form.matches(message):

@@ -85,7 +85,7 @@ _CHECKED = TypeVar("_CHECKED")
 
 def read_configuration(path: Path) -> BridgeConfiguration:
     """Read a bridge file. Raises `NepError`."""
-    shown = escaped(str(path))
+    shown_path = escaped(str(path))
     try:
         with path.open("rb") as file:
             data = file.read(_MAX_BYTES + 1)
@@ -93,13 +93,13 @@ def read_configuration(path: Path) -> BridgeConfiguration:
         reason = getattr(error, "strerror", None) or str(error)
         raise NepError(
             _("'{path}' can't be read: {reason}; 'nep bridge --example' prints an example").format(
-                path=shown, reason=reason[:1].lower() + reason[1:]
+                path=shown_path, reason=reason[:1].lower() + reason[1:]
             )
         ) from error
     if len(data) > _MAX_BYTES:
         raise NepError(
             _("'{path}' is too large for a bridge file (limit: {most} bytes); choose another file").format(
-                path=shown, most=_MAX_BYTES
+                path=shown_path, most=_MAX_BYTES
             )
         )
     try:
@@ -107,9 +107,11 @@ def read_configuration(path: Path) -> BridgeConfiguration:
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise NepError(
-            _("line {line} of '{path}' isn't UTF-8; save the file as UTF-8").format(line=line, path=shown)
+            _("line {line} of '{path}' isn't UTF-8; save the file as UTF-8").format(
+                line=line, path=shown_path
+            )
         ) from error
-    return parse_configuration(text, shown, path.stem)
+    return parse_configuration(text, shown_path, path.stem)
 
 
 def parse_configuration(text: str, path: str, stem: str) -> BridgeConfiguration:
@@ -127,10 +129,10 @@ def parse_configuration(text: str, path: str, stem: str) -> BridgeConfiguration:
     return _Reader(path, text).configuration(table, stem)
 
 
-def _toml_error_message(path: str, text: str, said: str) -> str:
-    at = _TOML_POSITION.search(said)
-    line = int(at.group(1)) if at and at.group(1) else text.count("\n") + 1
-    reason = escaped(shortened(_TOML_POSITION.sub("", said).strip(), _MAX_REASON_LENGTH))
+def _toml_error_message(path: str, text: str, message: str) -> str:
+    match = _TOML_POSITION.search(message)
+    line = int(match.group(1)) if match and match.group(1) else text.count("\n") + 1
+    reason = escaped(shortened(_TOML_POSITION.sub("", message).strip(), _MAX_REASON_LENGTH))
     return _(
         "line {line} of '{path}' isn't valid TOML: {reason}; 'nep bridge --example' prints an example"
     ).format(line=line, path=path, reason=reason[:1].lower() + reason[1:])
@@ -160,9 +162,9 @@ class _Reader:
             self._fail(
                 "topics", "", _("there are more than {most} topics; use patterns").format(most=_MAX_TOPICS)
             )
-        found = tuple(self._topic(each, number, a, b) for number, each in enumerate(topics))
-        self._check_duplicates(found)
-        return BridgeConfiguration(name, a, b, found)
+        parsed_topics = tuple(self._topic(each, number, a, b) for number, each in enumerate(topics))
+        self._check_duplicates(parsed_topics)
+        return BridgeConfiguration(name, a, b, parsed_topics)
 
     def _side(self, table: Mapping[str, Any], side: SideName) -> SideConfiguration:
         section = table.get(side)
@@ -199,16 +201,16 @@ class _Reader:
         key = "b" if section.get("b") else "a"
         self._checked(lambda: check_topic_names(on_a, on_b), key, "topics", number)
         direction = self._text(section, "direction", "topics", number, default="both")
-        way = self._checked(lambda: parse_direction(direction), "direction", "topics", number)
+        parsed_direction = self._checked(lambda: parse_direction(direction), "direction", "topics", number)
         ends = [
             TopicEnd(
                 name,
                 self._type(section, side, number),
-                self._qos(section, f"{side}_qos", number, of.backend),
+                self._qos(section, f"{side}_qos", number, configuration.backend),
             )
-            for name, side, of in ((on_a, "a", a), (on_b, "b", b))
+            for name, side, configuration in ((on_a, "a", a), (on_b, "b", b))
         ]
-        return BridgeTopic(ends[0], ends[1], way, self._rate(section, number))
+        return BridgeTopic(ends[0], ends[1], parsed_direction, self._rate(section, number))
 
     def _type(self, section: Mapping[str, Any], side: str, number: int) -> str:
         key = f"{side}_type" if f"{side}_type" in section else "type"
@@ -218,8 +220,8 @@ class _Reader:
         return name
 
     def _qos(self, section: Mapping[str, Any], key: str, number: int, backend: Backend) -> str:
-        word = self._text(section, key, "topics", number)
-        if word and not backend.qos:
+        profile = self._text(section, key, "topics", number)
+        if profile and not backend.qos:
             self._fail(
                 key,
                 "topics",
@@ -228,16 +230,16 @@ class _Reader:
                 ),
                 number,
             )
-        if word and word not in backend.qos:
+        if profile and profile not in backend.qos:
             self._fail(
                 key,
                 "topics",
                 _("unknown quality of service '{word}'; {did_you_mean}").format(
-                    word=_printable(word), did_you_mean=did_you_mean(word, backend.qos)
+                    word=_printable(profile), did_you_mean=did_you_mean(profile, backend.qos)
                 ),
                 number,
             )
-        return word
+        return profile
 
     def _rate(self, section: Mapping[str, Any], number: int) -> float:
         value = section.get("max_rate_hz")
@@ -255,11 +257,11 @@ class _Reader:
 
     def _check_duplicates(self, topics: Sequence[BridgeTopic]) -> None:
         # Messages of a topic that is listed twice would arrive twice.
-        known: set[tuple[SideName, str, str]] = set()
+        known_routes: set[tuple[SideName, str, str]] = set()
         for number, topic in enumerate(topics):
             for side in topic.origins:
-                way = (side, topic.a.name, topic.b.name)
-                if way in known:
+                route_key = (side, topic.a.name, topic.b.name)
+                if route_key in known_routes:
                     self._fail(
                         "a",
                         "topics",
@@ -268,59 +270,65 @@ class _Reader:
                         ),
                         number,
                     )
-                known.add(way)
+                known_routes.add(route_key)
 
     # ---- keys, values and their lines
 
     def _check_keys(
-        self, table: Mapping[str, Any], known: Sequence[str], where: str, number: int = 0
+        self, table: Mapping[str, Any], known_keys: Sequence[str], table_name: str, number: int = 0
     ) -> None:
         for key in table:
-            if key not in known:
-                said = _("unknown key; {did_you_mean}")
-                self._fail(key, where, said.format(did_you_mean=did_you_mean(key, known)), number)
+            if key not in known_keys:
+                template = _("unknown key; {did_you_mean}")
+                self._fail(
+                    key, table_name, template.format(did_you_mean=did_you_mean(key, known_keys)), number
+                )
 
     def _text(
-        self, table: Mapping[str, Any], key: str, where: str, number: int = 0, default: str = ""
+        self, table: Mapping[str, Any], key: str, table_name: str, number: int = 0, default: str = ""
     ) -> str:
         value = table.get(key, default)
         if not isinstance(value, str):
-            self._fail(key, where, _("must be a string in quotes"), number)
+            self._fail(key, table_name, _("must be a string in quotes"), number)
         return value
 
-    def _checked(self, check: Callable[[], _CHECKED], key: str, where: str, number: int = 0) -> _CHECKED:
+    def _checked(self, check: Callable[[], _CHECKED], key: str, table_name: str, number: int = 0) -> _CHECKED:
         try:
             return check()
         except (NepError, ValueError) as error:
-            self._fail(key, where, str(error), number)
+            self._fail(key, table_name, str(error), number)
 
-    def _fail(self, key: str, where: str, reason: str, number: int = 0) -> NoReturn:
-        shown = _printable(key)
-        if where:
-            shown = f"{where}[{number + 1}].{shown}" if where == "topics" else f"{where}.{shown}"
-        line = self._line_of(key, where, number)
-        said = _("line {line} of '{path}', {key}: {reason}") if line else _("'{path}', {key}: {reason}")
-        raise NepError(escaped(said.format(line=line, path=self._path, key=shown, reason=reason)))
+    def _fail(self, key: str, table_name: str, reason: str, number: int = 0) -> NoReturn:
+        shown_key = _printable(key)
+        if table_name:
+            shown_key = (
+                f"{table_name}[{number + 1}].{shown_key}"
+                if table_name == "topics"
+                else f"{table_name}.{shown_key}"
+            )
+        line = self._line_of(key, table_name, number)
+        template = _("line {line} of '{path}', {key}: {reason}") if line else _("'{path}', {key}: {reason}")
+        raise NepError(escaped(template.format(line=line, path=self._path, key=shown_key, reason=reason)))
 
-    def _line_of(self, key: str, where: str, number: int) -> int:
-        table, seen, table_line = "", -1, 0
+    def _line_of(self, key: str, table_name: str, number: int) -> int:
+        table, topic_index, table_line = "", -1, 0
         name = re.escape(key)
         assigned = re.compile(rf"\s*[\"']?{name}[\"']?\s*[=.]")
-        dotted = re.compile(rf"\s*{re.escape(where or key)}\s*[.=]")
-        for at, line in enumerate(self._lines, 1):
-            head = _TABLE_HEADER.match(line)
-            if head is not None:
-                table = head.group(1).strip("\"' ")
-                seen += table == "topics"
-                if not where and table == key:
-                    return at
-            is_here = table == where and (where != "topics" or seen == number)
-            if is_here and head is not None:
-                table_line = at
+        dotted = re.compile(rf"\s*{re.escape(table_name or key)}\s*[.=]")
+        for line_number, line in enumerate(self._lines, 1):
+            match = _TABLE_HEADER.match(line)
+            if match is not None:
+                table = match.group(1).strip("\"' ")
+                topic_index += table == "topics"
+                if not table_name and table == key:
+                    return line_number
+            is_here = table == table_name and (table_name != "topics" or topic_index == number)
+            if is_here and match is not None:
+                table_line = line_number
             elif is_here and assigned.match(line):
-                return at
+                return line_number
             elif not table and not table_line and dotted.match(line):
-                table_line = at
+                table_line = line_number
         return table_line
 
 
@@ -328,5 +336,5 @@ def _default_name(stem: str) -> str:
     return escaped(stem)[:40] or "bridge"
 
 
-def _printable(word: str) -> str:
-    return escaped(shortened(word, 80))
+def _printable(text: str) -> str:
+    return escaped(shortened(text, 80))

@@ -45,10 +45,10 @@ def published_type(view: GraphView, topic: str, own_nodes: Collection[str]) -> s
         topic: Name of the topic.
         own_nodes: Ids of the bridge's nodes.
     """
-    known = view.topics.get(topic)
-    if known is None or all(each.node_id in own_nodes for each in known.publishers):
+    topic_info = view.topics.get(topic)
+    if topic_info is None or all(each.node_id in own_nodes for each in topic_info.publishers):
         return ""
-    return "" if known.msg_type in _UNKNOWN_TYPES else known.msg_type
+    return "" if topic_info.msg_type in _UNKNOWN_TYPES else topic_info.msg_type
 
 
 def default_type(backend: Backend) -> str:
@@ -59,7 +59,9 @@ def default_type(backend: Backend) -> str:
     return _DEFAULT_TYPE if backend.codec_for is codec_for else ""
 
 
-def type_for(message: Message, backend: Backend, known: TopicInfo | None, own_nodes: Collection[str]) -> str:
+def type_for(
+    message: Message, backend: Backend, topic_info: TopicInfo | None, own_nodes: Collection[str]
+) -> str:
     """Return the message type for publishing messages like `message` on a topic without configured type.
 
     A topic must not have two types, so the topic's existing type is used if only this back end knows that
@@ -69,21 +71,23 @@ def type_for(message: Message, backend: Backend, known: TopicInfo | None, own_no
     Args:
         message: Message to forward.
         backend: Back end of the destination.
-        known: Topic in the destination's graph; None if it doesn't exist.
+        topic_info: Topic in the destination's graph; None if it doesn't exist.
         own_nodes: Ids of the bridge's nodes.
     """
-    own = _message_type(message, backend)
-    if known is None or known.msg_type in _UNKNOWN_TYPES:
-        return own
-    members = {each.node_id for each in known.publishers} | {each.node_id for each in known.subscribers}
-    codec = _codec_name(backend, known.msg_type)
+    own_type = _message_type(message, backend)
+    if topic_info is None or topic_info.msg_type in _UNKNOWN_TYPES:
+        return own_type
+    members = {each.node_id for each in topic_info.publishers} | {
+        each.node_id for each in topic_info.subscribers
+    }
+    codec = _codec_name(backend, topic_info.msg_type)
     if members <= set(own_nodes) or not codec:
-        return own
+        return own_type
     if codec not in CODECS:
-        return own if message.codec in _CODECS_WITHOUT_FIELDS else known.msg_type
-    is_published = any(each.node_id not in own_nodes for each in known.publishers)
-    is_same = is_published and codec == _codec_name(backend, own)
-    return known.msg_type if is_same else own
+        return own_type if message.codec in _CODECS_WITHOUT_FIELDS else topic_info.msg_type
+    is_published = any(each.node_id not in own_nodes for each in topic_info.publishers)
+    is_same = is_published and codec == _codec_name(backend, own_type)
+    return topic_info.msg_type if is_same else own_type
 
 
 def _message_type(message: Message, backend: Backend) -> str:

@@ -45,8 +45,8 @@ class Trail(NamedTuple):
             network: Id of the network into which it was forwarded.
             bridge: Id of the bridge.
         """
-        been = self.networks if origin in self.networks else (*self.networks, origin)
-        return Trail((*been, network), (*self.bridges, bridge))
+        visited = self.networks if origin in self.networks else (*self.networks, origin)
+        return Trail((*visited, network), (*self.bridges, bridge))
 
     def to_plain(self) -> dict[str, object]:
         """Return the trail as a JSON-serializable dict for the extension."""
@@ -55,17 +55,17 @@ class Trail(NamedTuple):
 
 def read_trail(extension: Mapping[str, object]) -> Trail:
     """Parse the trail in an extension; a missing or invalid trail is empty."""
-    found = extension.get(TRAIL_KEY)
-    if not isinstance(found, Mapping):
+    value = extension.get(TRAIL_KEY)
+    if not isinstance(value, Mapping):
         return Trail()
-    return Trail(_parse_ids(found.get("networks")), _parse_ids(found.get("bridges")))
+    return Trail(_parse_ids(value.get("networks")), _parse_ids(value.get("bridges")))
 
 
-def _parse_ids(found: object) -> tuple[str, ...]:
-    if not isinstance(found, list | tuple):
+def _parse_ids(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple):
         return ()
     return tuple(
-        each for each in found[: MAX_HOPS + 2] if isinstance(each, str) and len(each) <= _MAX_ID_LENGTH
+        each for each in value[: MAX_HOPS + 2] if isinstance(each, str) and len(each) <= _MAX_ID_LENGTH
     )
 
 
@@ -113,11 +113,11 @@ class LoopGuard:
         """
         key = _digest(data)
         with self._lock:
-            count, at = self._sent.pop(key, (0, 0.0))
-            if not count or now - at > ECHO_WINDOW_S:
+            count, sent_at = self._sent.pop(key, (0, 0.0))
+            if not count or now - sent_at > ECHO_WINDOW_S:
                 return False
             if count > 1:
-                self._sent[key] = count - 1, at
+                self._sent[key] = count - 1, sent_at
             return True
 
 

@@ -99,12 +99,12 @@ class Bench:
         """Pump for `seconds`, multiplied by the scale."""
         self.wait_until(lambda: False, seconds * self.scale)
 
-    def require(self, is_met: Callable[[], bool], what: str, timeout_s: float = 5.0) -> None:
+    def require(self, is_met: Callable[[], bool], event: str, timeout_s: float = 5.0) -> None:
         """Pump until a condition is met.
 
         Args:
             is_met: Condition, evaluated after each pump.
-            what: Name of the expected event, for the error message.
+            event: Name of the expected event, for the error message.
             timeout_s: Time limit in seconds, multiplied by the scale.
 
         Raises:
@@ -112,7 +112,7 @@ class Bench:
         """
         if not self.wait_until(is_met, max(timeout_s * self.scale, 2.0 if self.scale < 1 else timeout_s)):
             raise broken_rule_error(
-                _("no '{what}' within {seconds:g} s").format(what=what, seconds=timeout_s)
+                _("no '{what}' within {seconds:g} s").format(what=event, seconds=timeout_s)
             )
 
     # ---- the adapter
@@ -139,12 +139,12 @@ class Bench:
         Raises:
             AdapterError: The adapter reported an error, exited or did not reply.
         """
-        found: list[Mapping[str, Any]] = []
+        replies: list[Mapping[str, Any]] = []
 
         def has_finished() -> bool:
             reply = self.adapter.reply(number)
             if reply is not None:
-                found.append(reply)
+                replies.append(reply)
             return reply is not None or self.adapter.has_ended
 
         if not self.wait_until(has_finished, _REPLY_TIMEOUT_S):
@@ -153,9 +153,9 @@ class Bench:
                     do=do, seconds=_REPLY_TIMEOUT_S
                 )
             )
-        if not found:
+        if not replies:
             raise AdapterError(_("the adapter exited before it replied to '{do}'").format(do=do))
-        return found[0]
+        return replies[0]
 
     def new_topic(self) -> str:
         """Return the name of an unused topic."""
@@ -238,8 +238,8 @@ class Bench:
         Raises:
             BrokenRuleError: The master received no such record.
         """
-        for each in reversed(self.requests(f"{kind}+")):
-            record = each.fields.get(kind)
+        for request in reversed(self.requests(f"{kind}+")):
+            record = request.fields.get(kind)
             if isinstance(record, dict) and record.get("topic") == topic:
                 return record
         raise broken_rule_error(_("no '{what}' was received").format(what=f"{kind}+ {topic}"))
@@ -247,8 +247,8 @@ class Bench:
     @property
     def node_id(self) -> str:
         """Id of the adapter's node."""
-        for each in reversed(self.master.received):
-            node = each.fields.get("node")
+        for request in reversed(self.master.received):
+            node = request.fields.get("node")
             if isinstance(node, dict):
                 return str(node.get("id"))
         raise broken_rule_error(_("no '{what}' was received").format(what="node"))
@@ -336,12 +336,12 @@ class Bench:
         self.require(lambda: bool(publisher.hellos), "hello")
         return publisher, sub
 
-    def _on_push(self, each: OutgoingMessage) -> None:
-        if isinstance(each.body, PublisherAdded) and self.connect_delay_s is not None:
-            record = each.body.publisher.publisher
+    def _on_push(self, message: OutgoingMessage) -> None:
+        if isinstance(message.body, PublisherAdded) and self.connect_delay_s is not None:
+            record = message.body.publisher.publisher
             due = time.monotonic() + self.connect_delay_s * self.scale
             for subscriber in self.subscribers:
-                if subscriber.topic == record.topic and subscriber.node.id == each.to:
+                if subscriber.topic == record.topic and subscriber.node.id == message.to:
                     self._connecting.append((due, subscriber, record.endpoints[0]))
 
     # ---- between rules and at the end

@@ -58,12 +58,12 @@ def select_rules(ids: Iterable[str]) -> list[Rule]:
 
     Returns all rules if `ids` is empty. Raises `KeyError` for an unknown id.
     """
-    wanted = list(ids)
-    for each in wanted:
-        if each not in RULES:
-            raise KeyError(each)
-    found = [each for each in RULES.values() if not wanted or each.id in wanted]
-    return sorted(found, key=lambda each: _MODULES.index(each.check.__module__.rpartition(".")[2]))
+    requested = list(ids)
+    for rule_id in requested:
+        if rule_id not in RULES:
+            raise KeyError(rule_id)
+    selected = [rule_id for rule_id in RULES.values() if not requested or rule_id.id in requested]
+    return sorted(selected, key=lambda each: _MODULES.index(each.check.__module__.rpartition(".")[2]))
 
 
 def check(start: AdapterStarter, rules: Iterable[Rule], scale: float = 1.0) -> Iterator[Outcome]:
@@ -79,11 +79,11 @@ def check(start: AdapterStarter, rules: Iterable[Rule], scale: float = 1.0) -> I
     """
     bench: Bench | None = None
     try:
-        for each in rules:
+        for rule in rules:
             bench = bench or Bench(start, scale)
-            outcome = _check_rule(each, bench)
+            outcome = _check_rule(rule, bench)
             yield outcome
-            if outcome.status == "failed" or each.is_last or not _try_clear(bench):
+            if outcome.status == "failed" or rule.is_last or not _try_clear(bench):
                 bench.close()
                 bench = None
     finally:

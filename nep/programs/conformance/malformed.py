@@ -20,21 +20,21 @@ def _header(codec: int = 1, flags: int = 0, size: int = 0) -> bytes:
 
 def malformed_parts(topic: str) -> Iterator[tuple[str, list[bytes]]]:
     """Yield malformed messages as (error code, parts). The first part starts with the topic."""
-    first, head, extension = topic_part(topic), _header(), msgpack.packb({"a": 1})
+    first, header, extension = topic_part(topic), _header(), msgpack.packb({"a": 1})
     yield "part-count", [first]
-    yield "part-count", [first, head]
-    yield "part-count", [first, head, b"{}", extension]
-    yield "part-count", [first, head, b"{}", extension, b""]
+    yield "part-count", [first, header]
+    yield "part-count", [first, header, b"{}", extension]
+    yield "part-count", [first, header, b"{}", extension, b""]
     yield "part-count", [first, _header(flags=EXTENSION), b"{}"]
-    yield "part-count", [first + head[:20]]
+    yield "part-count", [first + header[:20]]
     yield "part-count", [first + _header(flags=EXTENSION) + b"{}"]
-    yield "topic-end", [first + b"more", head, b"{}"]
-    yield "topic", [first + b"\0", head, b"{}"]
+    yield "topic-end", [first + b"more", header, b"{}"]
+    yield "topic", [first + b"\0", header, b"{}"]
     for size in (0, 1, 31, 33):
-        yield "header-size", [first, (head + b"\0")[:size], b"{}"]
+        yield "header-size", [first, (header + b"\0")[:size], b"{}"]
     for version in (0, 2, 255):
-        yield "version", [first, bytes((version,)) + head[1:], b"{}"]
-        yield "version", [first + bytes((version,)) + head[1:] + b"{}"]
+        yield "version", [first, bytes((version,)) + header[1:], b"{}"]
+        yield "version", [first + bytes((version,)) + header[1:] + b"{}"]
     for size in (1, 3, 2**32 - 1):
         yield "payload-size", [first, _header(size=size), b"{}"]
         yield "payload-size", [first + _header(size=size) + b"{}"]
@@ -55,19 +55,19 @@ def malformed_parts(topic: str) -> Iterator[tuple[str, list[bytes]]]:
 
 
 def _batches(first: bytes) -> Iterator[tuple[str, list[bytes]]]:
-    good = struct.pack("<IIQ", 1, 2, 1) + b"{}"
-    yield "batch-form", [first, _header(flags=BATCH, size=len(good)), good]
-    yield "batch-form", [first + _header(flags=BATCH | LATCHED, size=len(good)) + good]
-    yield "payload-size", [first + _header(flags=BATCH) + good]
-    yield "payload-size", [first + _header(flags=BATCH, size=len(good) + 1) + good]
+    valid_batch = struct.pack("<IIQ", 1, 2, 1) + b"{}"
+    yield "batch-form", [first, _header(flags=BATCH, size=len(valid_batch)), valid_batch]
+    yield "batch-form", [first + _header(flags=BATCH | LATCHED, size=len(valid_batch)) + valid_batch]
+    yield "payload-size", [first + _header(flags=BATCH) + valid_batch]
+    yield "payload-size", [first + _header(flags=BATCH, size=len(valid_batch) + 1) + valid_batch]
     for code, body in (
         ("batch-count", b""),
         ("batch-count", struct.pack("<I", 0)),
         ("batch-count", struct.pack("<I", 257) + bytes(20)),
         ("batch-count", struct.pack("<I", 2**32 - 1) + bytes(20)),
-        ("batch-table", good[:10]),
+        ("batch-table", valid_batch[:10]),
         ("batch-table", struct.pack("<I", 256) + bytes(100)),
-        ("batch-sizes", good + b"more"),
+        ("batch-sizes", valid_batch + b"more"),
         ("batch-sizes", struct.pack("<IIQ", 1, 2**32 - 1, 1) + b"{}"),
         ("batch-sizes", struct.pack("<IIIQQ", 2, 2**32 - 1, 3, 1, 1) + b"{}"),
     ):

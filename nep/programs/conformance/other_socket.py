@@ -52,8 +52,8 @@ class OtherSocket:
 
     def close(self) -> None:
         """Close the listener and all connections."""
-        for each in (self._listener, *self._clients):
-            each.close()
+        for connection in (self._listener, *self._clients):
+            connection.close()
 
 
 def _is_disconnected(client: sockets.socket) -> bool:

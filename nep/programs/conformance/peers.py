@@ -240,15 +240,15 @@ class ScriptedSubscriber:
 
         Malformed ones are omitted.
         """
-        found = []
-        for at, parts in zip(self.times, self.received, strict=True):
+        parsed = []
+        for received_at, parts in zip(self.times, self.received, strict=True):
             if parts[0] == self.hello and len(parts) >= 2 and len(parts[1]) == HEADER_BYTES:
                 try:
                     header = read_header(parts[1])
                 except WireError:
                     continue
-                found.append(Notice(at, parts[0], header, parts[2] if len(parts) > 2 else None))
-        return found
+                parsed.append(Notice(received_at, parts[0], header, parts[2] if len(parts) > 2 else None))
+        return parsed
 
     @property
     def echoes(self) -> list[Notice]:

@@ -111,16 +111,16 @@ class ScriptedMaster:
 
     def submit(self, request: Request) -> None:
         """Execute a request of one of the tester's nodes. Raises `WireError` if it is rejected."""
-        for each in self.graph.apply(request, 1, 0.0, PEER):
-            if isinstance(each.body, RejectedReply):
-                raise WireError(each.body.reason)
-            if each.call is None:
-                self._push(each)
+        for message in self.graph.apply(request, 1, 0.0, PEER):
+            if isinstance(message.body, RejectedReply):
+                raise WireError(message.body.reason)
+            if message.call is None:
+                self._push(message)
 
     def drop(self, node_id: str) -> None:
         """Remove a node from the graph, as if its lease had expired."""
-        for each in self.graph.unregister_nodes([node_id]):
-            self._push(each)
+        for message in self.graph.unregister_nodes([node_id]):
+            self._push(message)
 
     def repeat_pushes(self, node_id: str, record: PublisherRecord, node: NodeRecord) -> None:
         """Push a publisher to the adapter's node two more times.
@@ -130,11 +130,11 @@ class ScriptedMaster:
             record: Record of the publisher.
             node: Node of the publisher.
         """
-        came = PublisherAdded(
+        notification = PublisherAdded(
             self.graph.epoch, self.graph.revision, RemotePublisher(record, node.id, node.name)
         )
         for _turn in range(2):
-            self.push(node_id, self._encoder.encode(came))
+            self.push(node_id, self._encoder.encode(notification))
 
     def push(self, node_id: str, body: bytes) -> None:
         """Send an encoded message to the adapter's node, even an invalid one."""
@@ -157,26 +157,26 @@ class ScriptedMaster:
                 ),
             )
             return
-        for each in self.graph.apply(received.request, received.call, 0.0, sender, is_foreign=True):
-            if each.call is None:
-                self._push(each)
+        for message in self.graph.apply(received.request, received.call, 0.0, sender, is_foreign=True):
+            if message.call is None:
+                self._push(message)
             else:
-                self._reply(request, each)
+                self._reply(request, message)
 
-    def _reply(self, request: RecordedRequest, each: OutgoingMessage) -> None:
-        encoded = self._encoder.encode(each.body, each.call or 0)
+    def _reply(self, request: RecordedRequest, message: OutgoingMessage) -> None:
+        encoded = self._encoder.encode(message.body, message.call or 0)
         reply = self.change(request, msgpack.unpackb(encoded, strict_map_key=False))
         if reply is not None:
-            self._send(each.to, msgpack.packb(reply))
+            self._send(message.to, msgpack.packb(reply))
 
-    def _push(self, each: OutgoingMessage) -> None:
-        member = self.graph.members.get(each.to)
+    def _push(self, message: OutgoingMessage) -> None:
+        member = self.graph.members.get(message.to)
         if member is None:
             return
         if member.route == PEER:
-            self._on_push(each)
+            self._on_push(message)
         else:
-            self._send(member.route, self._encoder.encode(each.body))
+            self._send(member.route, self._encoder.encode(message.body))
 
     def _send(self, route: str, body: bytes) -> None:
         if self._socket is None:
@@ -195,9 +195,9 @@ def _parse_request(sender: str, parts: list[bytes]) -> RecordedRequest:
         return RecordedRequest(now, sender, problem="not msgpack")
     if not isinstance(body, dict):
         return RecordedRequest(now, sender, problem="not a map")
-    do, call, what = body.get("do"), body.get("call"), body.get("what", {})
-    if not isinstance(do, str) or not isinstance(what, dict):
-        return RecordedRequest(now, sender, problem=f"do: {type(do).__name__}, what: {type(what).__name__}")
+    do, call, fields = body.get("do"), body.get("call"), body.get("what", {})
+    if not isinstance(do, str) or not isinstance(fields, dict):
+        return RecordedRequest(now, sender, problem=f"do: {type(do).__name__}, what: {type(fields).__name__}")
     if type(call) is not int or call < 1:
-        return RecordedRequest(now, sender, do, 0, what, f"call: {call!r}")
-    return RecordedRequest(now, sender, do, call, what)
+        return RecordedRequest(now, sender, do, 0, fields, f"call: {call!r}")
+    return RecordedRequest(now, sender, do, call, fields)

@@ -16,23 +16,23 @@ class BrokenRuleError(NepError):
     """Error for a client that breaks a rule; the message describes the observed behaviour."""
 
 
-def broken_rule_error(sentence: str) -> BrokenRuleError:
+def broken_rule_error(message: str) -> BrokenRuleError:
     """Return a `BrokenRuleError` with this message."""
-    return BrokenRuleError(sentence)
+    return BrokenRuleError(message)
 
 
-def expect(what: str, seen: object, wanted: object) -> None:
+def expect(label: str, actual: object, expected: object) -> None:
     """Raise `BrokenRuleError` unless two values are equal and of the same type.
 
     Args:
-        what: Name of the value, for the error message.
-        seen: Actual value.
-        wanted: Expected value.
+        label: Name of the value, for the error message.
+        actual: Actual value.
+        expected: Expected value.
     """
-    if seen != wanted or type(seen) is not type(wanted):
+    if actual != expected or type(actual) is not type(expected):
         raise BrokenRuleError(
             _("{what} is {seen}, expected {wanted}").format(
-                what=what, seen=printable(seen), wanted=printable(wanted)
+                what=label, seen=printable(actual), wanted=printable(expected)
             )
         )
 
@@ -40,9 +40,9 @@ def expect(what: str, seen: object, wanted: object) -> None:
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
     """Raise `BrokenRuleError` if the `with` block takes longer than `seconds`."""
-    began = time.monotonic()
+    started_s = time.monotonic()
     yield
-    took_s = time.monotonic() - began
+    took_s = time.monotonic() - started_s
     if took_s > seconds:
         raise broken_rule_error(_("the operation took {seconds:.1f} s").format(seconds=took_s))
 

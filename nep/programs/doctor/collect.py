@@ -60,21 +60,27 @@ _GATEWAY_OFF_VALUES = {"0", "false", "no", "off"}
 
 
 def collect_facts(
-    address: str | None = None, *, folders: Sequence[tuple[str, Path]] = (), here: Path | None = None
+    address: str | None = None,
+    *,
+    folders: Sequence[tuple[str, Path]] = (),
+    working_folder: Path | None = None,
 ) -> Facts:
     """Collect all facts. Takes up to two seconds if no master replies.
 
     Args:
         address: Address of the master (default: NEP_MASTER or the default address).
         folders: Further folders that must be writable, as (purpose, path).
-        here: Folder in which programs are started (default: the current folder).
+        working_folder: Folder in which programs are started (default: the current folder).
     """
-    *_parts, (_known, facts) = collect_in_steps(address, folders=folders, here=here)
+    *_parts, (_known, facts) = collect_in_steps(address, folders=folders, working_folder=working_folder)
     return facts
 
 
 def collect_in_steps(
-    address: str | None = None, *, folders: Sequence[tuple[str, Path]] = (), here: Path | None = None
+    address: str | None = None,
+    *,
+    folders: Sequence[tuple[str, Path]] = (),
+    working_folder: Path | None = None,
 ) -> Iterator[tuple[tuple[str, ...], Facts]]:
     """Collect facts step by step, quick steps first.
 
@@ -84,8 +90,8 @@ def collect_in_steps(
         Names of the checks in `nep.programs.doctor.diagnosis.CHECKS` whose facts are complete, and all facts
         so far.
     """
-    chosen, package = master_address(address), Path(nep.errors.__file__).parent
-    facts = Facts(time.time(), chosen, sys.platform, _versions(), str(package))
+    resolved_address, package = master_address(address), Path(nep.errors.__file__).parent
+    facts = Facts(time.time(), resolved_address, sys.platform, _versions(), str(package))
     yield ("clock", "versions"), facts
     facts = replace(facts, loopback_problem=loopback_problem())
     yield ("loopback",), facts
@@ -96,9 +102,9 @@ def collect_in_steps(
         facts,
         packages=tuple(_packages()),
         original_files=tuple(name for name in _ORIGINAL_FILES if (package / name).exists()),
-        shadow=_shadowing_file(here or Path.cwd(), package),
+        shadow=_shadowing_file(working_folder or Path.cwd(), package),
         path_package=namesakes.path_python_package(),
-        node_packages=namesakes.node_packages(here or Path.cwd()),
+        node_packages=namesakes.node_packages(working_folder or Path.cwd()),
     )
     yield ("packages",), facts
     facts, master_pid, listening = _collect_master(facts)
@@ -116,16 +122,16 @@ def collect_in_steps(
 
 
 def _collect_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | None]]:
-    chosen = facts.address
-    number = int(chosen.rpartition(":")[2])
-    view, answered_s, is_known = _query_graph(chosen)
+    address = facts.address
+    number = int(address.rpartition(":")[2])
+    view, answered_s, is_known = _query_graph(address)
     listening = processes.listening_ports()
-    master_port = _port(number, "the master's", listening) if _is_own_address(chosen) else None
+    master_port = _port(number, "the master's", listening) if _is_own_address(address) else None
     holder = master_port.holder if master_port is not None else None
     master_pid = holder.pid if view is not None and holder is not None else None
     elsewhere = view is None and master_port is not None and master_port.is_taken
     is_far = view is None and is_known and master_port is None
-    found = replace(
+    updated = replace(
         facts,
         view=view,
         reply_time_s=answered_s,
@@ -134,15 +140,15 @@ def _collect_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int |
         clocks=tuple(_clocks(view)),
         master_install=installs.install_of(master_pid) if master_pid is not None else None,
         is_host_known=is_known,
-        replying_address=_replying_address(chosen) if elsewhere else "",
-        reach_failure=probe_endpoint(f"tcp://{chosen}") if is_far else None,
+        replying_address=_replying_address(address) if elsewhere else "",
+        reach_failure=probe_endpoint(f"tcp://{address}") if is_far else None,
     )
-    return found, master_pid, listening
+    return updated, master_pid, listening
 
 
 def _replying_address(address: str) -> str:
-    own = f"127.0.0.1:{address.rpartition(':')[2]}"
-    return own if not is_loopback(address) and _query_graph(own)[0] is not None else ""
+    local_address = f"127.0.0.1:{address.rpartition(':')[2]}"
+    return local_address if not is_loopback(address) and _query_graph(local_address)[0] is not None else ""
 
 
 def start_blocker(address: str | None = None) -> Finding | None:
@@ -150,10 +156,10 @@ def start_blocker(address: str | None = None) -> Finding | None:
 
     An address that is not loopback is an obstacle, because masters are started at loopback addresses only.
     """
-    chosen = master_address(address)
-    facts = Facts(time.time(), chosen, sys.platform, {}, "", loopback_problem=loopback_problem())
-    if is_loopback(chosen):
-        port = _port(int(chosen.rpartition(":")[2]), "", processes.listening_ports())
+    resolved_address = master_address(address)
+    facts = Facts(time.time(), resolved_address, sys.platform, {}, "", loopback_problem=loopback_problem())
+    if is_loopback(resolved_address):
+        port = _port(int(resolved_address.rpartition(":")[2]), "", processes.listening_ports())
         facts = replace(facts, master_port=port)
     else:
         facts, *_more = _collect_master(facts)
@@ -164,10 +170,10 @@ def start_blocker(address: str | None = None) -> Finding | None:
 
 
 def _query_graph(address: str) -> tuple[GraphView | None, float | None, bool]:
-    began = time.monotonic()
+    start_s = time.monotonic()
     try:
         with Node(f"nep-doctor-{os.getpid()}", master=address) as node:
-            return node.graph(_GRAPH_TIMEOUT_S), time.monotonic() - began, True
+            return node.graph(_GRAPH_TIMEOUT_S), time.monotonic() - start_s, True
     except nep.errors.MasterUnreachable as error:
         return None, None, error.is_known
     except (nep.errors.NepError, zmq.ZMQError, OSError):
@@ -178,8 +184,8 @@ def _is_own_address(address: str) -> bool:
     host = host_of(address)
     if host in {"localhost", "*", "0.0.0.0", "[::1]"} or host.startswith("127."):  # noqa: S104 - no binding
         return True
-    own = {each.address for addresses in psutil.net_if_addrs().values() for each in addresses}
-    return host in own
+    own_addresses = {each.address for addresses in psutil.net_if_addrs().values() for each in addresses}
+    return host in own_addresses
 
 
 def _port(
@@ -214,14 +220,14 @@ def _versions() -> dict[str, str]:
 
 
 def _packages() -> Iterator[PackageFact]:
-    for found in metadata.distributions():
-        name = found.metadata["Name"] or ""
+    for distribution in metadata.distributions():
+        name = distribution.metadata["Name"] or ""
         if name.lower().replace("_", "-") in {"nep", "nep-studio"}:
-            yield PackageFact(name, found.version, str(found.locate_file("")))
+            yield PackageFact(name, distribution.version, str(distribution.locate_file("")))
 
 
-def _shadowing_file(here: Path, package: Path) -> str:
-    for candidate in (here / "nep.py", here / "nep" / "__init__.py"):
+def _shadowing_file(folder: Path, package: Path) -> str:
+    for candidate in (folder / "nep.py", folder / "nep" / "__init__.py"):
         if candidate.exists() and candidate.resolve().parent != package.resolve():
             return str(candidate)
     return ""
@@ -243,12 +249,12 @@ def _files(master_pid: int | None) -> FileFact:
 
 
 def _programs(view: GraphView | None) -> Iterator[ProgramFact]:
-    here = {
+    name_by_pid = {
         node.pid: node.name
         for node in (view.nodes.values() if view is not None else ())
         if node.generation == "native" and node.host == platform.node() and node.pid != os.getpid()
     }
-    for pid, name in here.items():
+    for pid, name in name_by_pid.items():
         if pid is None:
             continue
         opened, limit = processes.open_files(pid)
@@ -273,12 +279,14 @@ def _folder(purpose: str, path: Path) -> FolderFact:
 
 def _clocks(view: GraphView | None) -> Iterator[ClockFact]:
     now_s = time.time()
-    ahead: dict[str, float] = {}
+    ahead_s_by_host: dict[str, float] = {}
     for topic in view.topics.values() if view is not None else ():
         for publisher in topic.publishers:
             node = view.nodes.get(publisher.node_id) if view is not None else None
             if node is not None and publisher.last_stamp_ns is not None:
-                ahead[node.host] = max(ahead.get(node.host, 0.0), publisher.last_stamp_ns / 1e9 - now_s)
-    for host, seconds in ahead.items():
+                ahead_s_by_host[node.host] = max(
+                    ahead_s_by_host.get(node.host, 0.0), publisher.last_stamp_ns / 1e9 - now_s
+                )
+    for host, seconds in ahead_s_by_host.items():
         if seconds > _MAX_CLOCK_AHEAD_S:
             yield ClockFact(host, seconds)

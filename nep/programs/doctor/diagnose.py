@@ -24,7 +24,7 @@ def diagnose(
     address: str | None = None,
     topic: str = "",
     folders: Sequence[tuple[str, Path]] = (),
-    tell: ProgressCallback | None = None,
+    on_progress: ProgressCallback | None = None,
 ) -> tuple[Finding, ...]:
     """Run all checks and return the findings, worst first. Takes some seconds.
 
@@ -33,25 +33,27 @@ def diagnose(
         topic: Topic whose messages don't arrive; "" for none. Its findings come first among the findings
             of the same severity, and replace general findings with the same id.
         folders: Further folders that must be writable, as (purpose, path).
-        tell: Called after each step with the findings so far.
+        on_progress: Called after each step with the findings so far.
     """
-    found: dict[str, tuple[Finding, ...]] = {}
+    findings_by_check: dict[str, tuple[Finding, ...]] = {}
     facts: Facts | None = None
     count = len(CHECKS) + bool(topic)
     for names, facts in collect_in_steps(address, folders=folders):
-        found.update((name, tuple(CHECKS[name](facts))) for name in names)
-        if tell is not None:
-            tell(_merge_findings(found), len(found), count)
+        findings_by_check.update((name, tuple(CHECKS[name](facts))) for name in names)
+        if on_progress is not None:
+            on_progress(_merge_findings(findings_by_check), len(findings_by_check), count)
     missed = collect_topic(topic, address) if topic and facts is not None and facts.view is not None else None
-    result = _merge_findings(found, topic_findings(missed) if missed is not None else ())
-    if tell is not None:
-        tell(result, count, count)
+    result = _merge_findings(findings_by_check, topic_findings(missed) if missed is not None else ())
+    if on_progress is not None:
+        on_progress(result, count, count)
     return result
 
 
 def _merge_findings(
-    found: dict[str, tuple[Finding, ...]], about: Sequence[Finding] = ()
+    findings_by_check: dict[str, tuple[Finding, ...]], about: Sequence[Finding] = ()
 ) -> tuple[Finding, ...]:
     topic_ids = {each.id for each in about}
-    general = [each for name in CHECKS for each in found.get(name, ()) if each.id not in topic_ids]
+    general = [
+        each for name in CHECKS for each in findings_by_check.get(name, ()) if each.id not in topic_ids
+    ]
     return sort_findings([*about, *general])

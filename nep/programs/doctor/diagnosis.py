@@ -28,21 +28,21 @@ def findings(facts: Facts) -> tuple[Finding, ...]:
     return sort_findings(finding for part in CHECKS.values() for finding in part(facts))
 
 
-def sort_findings(found: Iterable[Finding]) -> tuple[Finding, ...]:
+def sort_findings(unsorted: Iterable[Finding]) -> tuple[Finding, ...]:
     """Sort findings by severity, worst first; the order is stable."""
-    return tuple(sorted(found, key=lambda finding: _SEVERITY_ORDER[finding.severity]))
+    return tuple(sorted(unsorted, key=lambda finding: _SEVERITY_ORDER[finding.severity]))
 
 
-def exit_code(found: Sequence[Finding]) -> Literal[0, 1, 2]:
+def exit_code(results: Sequence[Finding]) -> Literal[0, 1, 2]:
     """Return the exit code of `nep doctor`: 2 if there is an error, 1 if there is a warning, else 0."""
-    severities = {finding.severity for finding in found}
+    severities = {finding.severity for finding in results}
     return 2 if "error" in severities else 1 if "warning" in severities else 0
 
 
-def report_text(found: Sequence[Finding]) -> str:
+def report_text(results: Sequence[Finding]) -> str:
     """Format findings as plain text, for a bug report."""
     lines = []
-    for finding in found:
+    for finding in results:
         lines.append(f"{_SEVERITY_SIGNS[finding.severity]} {finding.sentence}")
         lines += [f"    {line}" for line in (finding.fix, finding.command) if line]
     return "\n".join(lines) + "\n"
@@ -54,15 +54,15 @@ def to_plain(found: Sequence[Finding]) -> list[dict[str, object]]:
 
 
 def _package_findings(facts: Facts) -> Iterator[Finding]:
-    originals = [each for each in facts.packages if each.name.lower() == "nep"]
-    for each in originals:
+    originals = [package for package in facts.packages if package.name.lower() == "nep"]
+    for package in originals:
         yield Finding(
             "package:nep",
             "error",
             _(
                 "The original package nep {version} is installed together with NEP Studio; both packages "
                 "are named “nep”."
-            ).format(version=each.version),
+            ).format(version=package.version),
             _(
                 "Uninstall it and reinstall NEP Studio. Use a separate Python environment for programs of "
                 "the original NEP."
@@ -114,7 +114,7 @@ def _python_namesake_findings(facts: Facts) -> Iterator[Finding]:
 
 def _node_package_finding(packages: Sequence[PackageFact]) -> Finding:
     imported, *hidden = packages
-    ours = next((each for each in hidden if each.is_ours), None)
+    own_package = next((each for each in hidden if each.is_ours), None)
     if imported.is_ours:
         return Finding(
             "package:nep-js",
@@ -123,14 +123,14 @@ def _node_package_finding(packages: Sequence[PackageFact]) -> Finding:
                 "JavaScript programs in this folder import nep-js {version} of NEP Studio from {folder}."
             ).format(version=imported.version, folder=imported.location),
         )
-    if ours is not None:
+    if own_package is not None:
         return Finding(
             "package:nep-js",
             "warning",
             _(
                 "JavaScript programs in this folder import another project's nep-js {version} from "
                 "{folder} instead of NEP Studio's in {hidden}."
-            ).format(version=imported.version, folder=imported.location, hidden=ours.location),
+            ).format(version=imported.version, folder=imported.location, hidden=own_package.location),
             _("Uninstall the other package, or keep programs of the original NEP in a separate folder."),
             command=f'npm uninstall --prefix "{Path(imported.location).parent.parent}" nep-js',
         )
@@ -228,8 +228,8 @@ def _clock_findings(facts: Facts) -> Iterator[Finding]:
 
 
 def _version_findings(facts: Facts) -> Iterator[Finding]:
-    words = ", ".join(f"{name} {version}" for name, version in facts.versions.items())
-    yield Finding("versions", "info", f"{words}.")
+    text = ", ".join(f"{name} {version}" for name, version in facts.versions.items())
+    yield Finding("versions", "info", f"{text}.")
 
 
 CHECKS: Mapping[str, Callable[[Facts], Iterator[Finding]]] = {

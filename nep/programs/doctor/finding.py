@@ -35,8 +35,8 @@ class Finding:
         """Finding in the form of an error message: lower case, hint after a semicolon, no full stop."""
         first = self.sentence.rstrip(".")
         step = self.fix.rstrip(".")
-        words = f"{first}; {step[:1].lower()}{step[1:]}" if step else first
-        return words[:1].lower() + words[1:]
+        message = f"{first}; {step[:1].lower()}{step[1:]}" if step else first
+        return message[:1].lower() + message[1:]
 
 
 def duration_text(seconds: float) -> str:
@@ -51,6 +51,6 @@ def duration_text(seconds: float) -> str:
     return ngettext("{count} day", "{count} days", days).format(count=days)
 
 
-def with_process(words: str, pid: int | None) -> str:
+def with_process(program: str, pid: int | None) -> str:
     """Append a process id to the name of a program; return the name alone if the id is None."""
-    return words if pid is None else _("{program} (process {pid})").format(program=words, pid=pid)
+    return program if pid is None else _("{program} (process {pid})").format(program=program, pid=pid)

@@ -44,10 +44,10 @@ def install_of(pid: int) -> Install | None:
     try:
         process = psutil.Process(pid)
         active = process.environ().get("VIRTUAL_ENV", "")
-        found = environment_of(process.cmdline(), process.exe(), process.cwd(), active)
+        environment = environment_of(process.cmdline(), process.exe(), process.cwd(), active)
     except psutil.Error:
         return None
-    return install_in(found) if found is not None else None
+    return install_in(environment) if environment is not None else None
 
 
 def environment_of(command: Sequence[str], executable: str, folder: str, active: str = "") -> Path | None:
@@ -62,24 +62,26 @@ def environment_of(command: Sequence[str], executable: str, folder: str, active:
         folder: Folder in which the program was started.
         active: Activated virtual environment (VIRTUAL_ENV), or "".
     """
-    called = command[0] if command else ""
-    if not Path(called).stem.lower().startswith("python"):
-        called = executable
-    if not Path(called).stem.lower().startswith("python"):
+    program = command[0] if command else ""
+    if not Path(program).stem.lower().startswith("python"):
+        program = executable
+    if not Path(program).stem.lower().startswith("python"):
         return None  # frozen by an installer: it contains its Python
-    if Path(called).name == called:
+    if Path(program).name == program:
         return Path(active) if active else Path(executable).parent.parent
-    return Path(folder, called).parent.parent
+    return Path(folder, program).parent.parent
 
 
 def install_in(environment: Path) -> Install | None:
     """Return the installation of NEP Studio in an environment; None if there is not exactly one."""
-    found = [info for place in _SITE_PACKAGES for info in environment.glob(f"{place}/nep_studio-*.dist-info")]
-    if len(found) != 1:
+    info_folders = [
+        info for pattern in _SITE_PACKAGES for info in environment.glob(f"{pattern}/nep_studio-*.dist-info")
+    ]
+    if len(info_folders) != 1:
         return None
     try:
-        since_s = (found[0] / "METADATA").stat().st_mtime
-        version = metadata.Distribution.at(found[0]).version
+        since_s = (info_folders[0] / "METADATA").stat().st_mtime
+        version = metadata.Distribution.at(info_folders[0]).version
     except (OSError, KeyError, TypeError):  # incomplete installation
         return None
     return Install(version, since_s, str(environment))

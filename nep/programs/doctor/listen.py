@@ -29,25 +29,25 @@ _REMEDIES = ("restart", "reset", "start")
 
 def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
     """Subscribe to a topic for up to 1.5 s and return the facts about it; None if no master replies."""
-    chosen = master_address(address)
+    master = master_address(address)
     try:
         check_topic(topic)
     except nep.errors.NepError as error:
-        return TopicFacts(topic, time.time(), chosen, name_problem=str(error))
+        return TopicFacts(topic, time.time(), master, name_problem=str(error))
     try:
-        with Node(f"nep-doctor-topic-{os.getpid()}", master=chosen) as node:
-            return _collect(node, topic, chosen)
+        with Node(f"nep-doctor-topic-{os.getpid()}", master=master) as node:
+            return _collect(node, topic, master)
     except (nep.errors.NepError, zmq.ZMQError, OSError):
         return None
 
 
 def probe_endpoint(endpoint: str) -> ReachFailure:
     """Try to connect to an endpoint; return the reason why it can't be reached, or "" if it can."""
-    place, colon, port = endpoint.removeprefix("tcp://").rpartition(":")
+    host, colon, port = endpoint.removeprefix("tcp://").rpartition(":")
     if not endpoint.startswith("tcp://") or not colon:
         return ""
     try:
-        with socket.create_connection((place, int(port)), timeout=_CONNECT_TIMEOUT_S):
+        with socket.create_connection((host, int(port)), timeout=_CONNECT_TIMEOUT_S):
             return ""
     except TimeoutError:
         return "timeout"
@@ -90,7 +90,7 @@ def _collect(node: Node, topic: str, address: str) -> TopicFacts:
 
 
 def _listen(node: Node, info: TopicInfo) -> tuple[int, int, str, float]:
-    began = time.monotonic()
+    start_s = time.monotonic()
     with node.new_sub(info.name, info.msg_type, wildcards=False) as subscriber:
         message, unreadable = subscriber.receive(_LISTEN_DURATION_S), ""
         if message is not None:
@@ -98,7 +98,7 @@ def _listen(node: Node, info: TopicInfo) -> tuple[int, int, str, float]:
                 message.kind.decode(message.raw, message.extension)
             except nep.errors.NepError as error:
                 unreadable = str(error)
-        return subscriber.received, subscriber.refused, unreadable, time.monotonic() - began
+        return subscriber.received, subscriber.refused, unreadable, time.monotonic() - start_s
 
 
 def _publishers(view: GraphView, info: TopicInfo, address: str) -> tuple[PublisherFact, ...]:
@@ -107,51 +107,51 @@ def _publishers(view: GraphView, info: TopicInfo, address: str) -> tuple[Publish
 
 
 def _publisher(
-    view: GraphView, each: PublisherInfo, address: str, tried: dict[str, ReachFailure]
+    view: GraphView, publisher: PublisherInfo, address: str, tried: dict[str, ReachFailure]
 ) -> PublisherFact:
-    node = view.nodes.get(each.node_id)
+    node = view.nodes.get(publisher.node_id)
     is_native = node is None or node.generation == "native"
-    endpoint, reach = _endpoint_and_reach(each, address, tried) if is_native else ("", "")
+    endpoint, reach_failure = _endpoint_and_reach(publisher, address, tried) if is_native else ("", "")
     services = [
         name
         for name, service in view.services.items()
-        if any(server.node_id == each.node_id for server in service.servers)
+        if any(server.node_id == publisher.node_id for server in service.servers)
     ]
     return PublisherFact(
         node.name if node is not None else _("a program that has disconnected"),
         node.host if node is not None else "",
         node.generation if node is not None else "native",
-        each.count if is_native else None,
-        _last_message_s(view, each),
+        publisher.count if is_native else None,
+        _last_message_s(view, publisher),
         endpoint,
-        reach,
+        reach_failure,
         tuple(name for name in services if name.rpartition("/")[2].lower().startswith(_REMEDIES)),
     )
 
 
 def _endpoint_and_reach(
-    each: PublisherInfo, address: str, tried: dict[str, ReachFailure]
+    publisher: PublisherInfo, address: str, tried: dict[str, ReachFailure]
 ) -> tuple[str, ReachFailure]:
     # Each endpoint is tried once.
-    if not each.endpoints:
+    if not publisher.endpoints:
         return "", ""
-    endpoint = reachable_endpoint(each.endpoints, address)
+    endpoint = reachable_endpoint(publisher.endpoints, address)
     if not endpoint:
-        return each.endpoints[0], "elsewhere"
+        return publisher.endpoints[0], "elsewhere"
     if endpoint not in tried and len(tried) < _MAX_ENDPOINTS_TRIED:
         tried[endpoint] = probe_endpoint(endpoint)
     return endpoint, tried.get(endpoint, "")
 
 
-def _last_message_s(view: GraphView, each: PublisherInfo) -> float | None:
-    if each.last_stamp_ns is None:
+def _last_message_s(view: GraphView, publisher: PublisherInfo) -> float | None:
+    if publisher.last_stamp_ns is None:
         return None
     offsets = _clock_offsets(view)
-    offset_ns = offsets.get(each.node_id, 0)
-    here = next(
+    offset_ns = offsets.get(publisher.node_id, 0)
+    local_offset_ns = next(
         (offsets[id] for id, node in view.nodes.items() if id in offsets and _is_local_host(node.host)), 0
     )
-    return (each.last_stamp_ns + offset_ns - here) / 1e9
+    return (publisher.last_stamp_ns + offset_ns - local_offset_ns) / 1e9
 
 
 def _clock_offsets(view: GraphView) -> Mapping[str, int]:

@@ -23,18 +23,18 @@ _SITE_PACKAGES = (
 _FIRST_NATIVE_VERSION = (0, 6)
 
 
-def node_packages(here: Path, environ: Mapping[str, str] = os.environ) -> tuple[PackageFact, ...]:
+def node_packages(program_folder: Path, environ: Mapping[str, str] = os.environ) -> tuple[PackageFact, ...]:
     """Return all packages `nep-js` on Node.js's search path; the first one is imported.
 
     Args:
-        here: Folder of the JavaScript program.
+        program_folder: Folder of the JavaScript program.
         environ: Environment variables.
     """
-    folder = here.absolute()
+    folder = program_folder.absolute()
     modules = [each / "node_modules" for each in (folder, *folder.parents) if each.name != "node_modules"]
     more = [Path(each) for each in environ.get("NODE_PATH", "").split(os.pathsep) if each]
-    found = (_node_package(each / "nep-js") for each in dict.fromkeys((*modules, *more)))
-    return tuple(each for each in found if each is not None)
+    packages = (_node_package(each / "nep-js") for each in dict.fromkeys((*modules, *more)))
+    return tuple(each for each in packages if each is not None)
 
 
 def _node_package(folder: Path) -> PackageFact | None:
@@ -49,7 +49,7 @@ def _node_package(folder: Path) -> PackageFact | None:
 
 
 def path_python_package(
-    path: str | None = None, own: Path = Path(sys.prefix), home: Path | None = None
+    path: str | None = None, own_environment: Path = Path(sys.prefix), home: Path | None = None
 ) -> PackageFact | None:
     """Return the original package `nep` that `python3` on the PATH imports, or None.
 
@@ -57,14 +57,14 @@ def path_python_package(
 
     Args:
         path: Search path (default: PATH).
-        own: Environment of this program.
+        own_environment: Environment of this program.
         home: Home folder with the user's packages (default: the user's).
     """
     python = shutil.which("python3", path=path) or shutil.which("python", path=path)
     if python is None:
         return None
     environment = Path(python).parent.resolve().parent
-    if environment == own.resolve():
+    if environment == own_environment.resolve():
         return None
     name = Path(python).resolve().name
     names = (name, "python3") if name.startswith("python3.") else ("python3*",)

@@ -122,42 +122,42 @@ def _not_running_finding(facts: Facts) -> Finding:
 
 
 def _not_loopback_finding(facts: Facts) -> Finding:
-    own = f"127.0.0.1:{facts.address.rpartition(':')[2]}"
+    local_address = f"127.0.0.1:{facts.address.rpartition(':')[2]}"
     return Finding(
         "master:network",
         "error",
         _("No master is running at {address}. A new one will start at {own}, for this computer only.").format(
-            address=facts.address, own=own
+            address=facts.address, own=local_address
         ),
         _(
             "Set NEP_MASTER to {own} for the programs on this computer, and allow other computers to "
             "connect in the settings of Studio."
-        ).format(own=own),
+        ).format(own=local_address),
     )
 
 
 def _unreachable_finding(facts: Facts) -> Finding:
     host, _colon, port = facts.address.rpartition(":")
     if facts.reach_failure == "timeout":
-        sentence = _("{address} doesn't respond, so the master can't be reached.")
+        message = _("{address} doesn't respond, so the master can't be reached.")
         fix = _(
             "{host} is off, is on another network, or has a firewall that blocks the connection. Allow "
             "NEP Studio (Python) in its firewall."
         )
     elif facts.reach_failure == "refused":
-        sentence = _("{host} can be reached, but accepts no connections from other computers on port {port}.")
+        message = _("{host} can be reached, but accepts no connections from other computers on port {port}.")
         fix = _("Start NEP Studio on that computer and allow other computers to connect in its settings.")
     elif facts.reach_failure:
-        sentence = _("This computer has no route to {address}, so the master can't be reached.")
+        message = _("This computer has no route to {address}, so the master can't be reached.")
         fix = _("Check that both computers are on the same network.")
     else:
-        sentence = _("{host} responds on port {port}, but the master doesn't.")
+        message = _("{host} responds on port {port}, but the master doesn't.")
         fix = _(
             "NEP Studio isn't responding there, or another program uses that port. Restart NEP Studio "
             "on that computer."
         )
     holes = {"address": facts.address, "host": host, "port": port}
-    return Finding("master:unreached", "error", sentence.format(**holes), fix.format(**holes))
+    return Finding("master:unreached", "error", message.format(**holes), fix.format(**holes))
 
 
 def _running_finding(facts: Facts, holder: ProcessFact | None) -> Finding:
@@ -171,34 +171,34 @@ def _running_finding(facts: Facts, holder: ProcessFact | None) -> Finding:
         people = f"{nodes}, {topics}"
     if holder is not None and holder.started_s is not None:
         since = duration_text(facts.now_s - holder.started_s)
-        words = _("A master has been running at {master} for {since}: {people}")
+        template = _("A master has been running at {master} for {since}: {people}")
     else:
         since = ""
-        words = _("A master is running at {master}: {people}")
-    sentence = words.format(master=_master_text(facts, holder), since=since, people=people)
+        template = _("A master is running at {master}: {people}")
+    message = template.format(master=_master_text(facts, holder), since=since, people=people)
     if facts.reply_time_s is not None and facts.reply_time_s > SLOW_REPLY_S:
         return Finding(
             "master:slow",
             "warning",
             _("{sentence}. It took {seconds} s to reply.").format(
-                sentence=sentence, seconds=number(facts.reply_time_s, ".1f")
+                sentence=message, seconds=number(facts.reply_time_s, ".1f")
             ),
             _("This computer is very busy. Check which program uses its processor."),
         )
-    return Finding("master", "ok", f"{sentence}.")
+    return Finding("master", "ok", f"{message}.")
 
 
 def _version_mismatch_findings(facts: Facts, holder: ProcessFact | None) -> Iterator[Finding]:
-    install, own = facts.master_install, facts.versions.get("NEP Studio", "")
-    if install is None or holder is None or not own[:1].isdigit():
+    install, own_version = facts.master_install, facts.versions.get("NEP Studio", "")
+    if install is None or holder is None or not own_version[:1].isdigit():
         return
-    if install.version != own:
-        words = _(
+    if install.version != own_version:
+        template = _(
             "The master at {master} belongs to NEP Studio {version} ({place}); this is {own}. New "
             "features and fixes may not work with it."
         )
     elif holder.started_s is not None and holder.started_s < install.installed_s:
-        words = _(
+        template = _(
             "The master at {master} was started before NEP Studio {own} was installed, so it is an "
             "older version. New features and fixes may not work with it."
         )
@@ -207,8 +207,11 @@ def _version_mismatch_findings(facts: Facts, holder: ProcessFact | None) -> Iter
     yield Finding(
         "master:version",
         "warning",
-        words.format(
-            master=_master_text(facts, holder), version=install.version, place=install.location, own=own
+        template.format(
+            master=_master_text(facts, holder),
+            version=install.version,
+            place=install.location,
+            own=own_version,
         ),
         _(
             "Stop it. If Studio is open, it starts a new master; otherwise, run “nep master”. Programs "
@@ -225,7 +228,7 @@ def _kill_command(facts: Facts, holder: ProcessFact) -> str:
 def _multiple_masters_findings(facts: Facts) -> Iterator[Finding]:
     if len(facts.masters) < 2:
         return
-    places = ", ".join(
+    addresses = ", ".join(
         (_("port {port} (process {pid})") if port else _("process {pid}")).format(port=port, pid=process.pid)
         for process, port in facts.masters
     )
@@ -235,7 +238,7 @@ def _multiple_masters_findings(facts: Facts) -> Iterator[Finding]:
         _(
             "{count} masters are running on this computer: {places}. Programs connected to different "
             "masters can't see each other."
-        ).format(count=len(facts.masters), places=places),
+        ).format(count=len(facts.masters), places=addresses),
         _("Stop all but one, or set the same NEP_MASTER for every program."),
     )
 
@@ -251,12 +254,12 @@ def original_programs(facts: Facts) -> Iterator[Finding]:
     served = [node for node in nodes if node.generation not in UNSUPPORTED_VERSIONS]
     if served:
         names = ", ".join(f"{node.name} ({_wire_name(node.generation)})" for node in served)
-        words = ngettext(
+        template = ngettext(
             "{count} program of the original NEP: {names}.",
             "{count} programs of the original NEP: {names}.",
             len(served),
         )
-        yield Finding("originals", "info", words.format(count=len(served), names=names))
+        yield Finding("originals", "info", template.format(count=len(served), names=names))
 
 
 def master_alerts(facts: Facts) -> Iterator[Finding]:
@@ -265,8 +268,8 @@ def master_alerts(facts: Facts) -> Iterator[Finding]:
         return
     for alert in facts.view.alerts:
         if not alert.id.startswith("port:"):
-            sentence = alert.sentence if alert.sentence.endswith(".") else f"{alert.sentence}."
-            yield Finding(alert.id, "warning", sentence, alert.hint)
+            message = alert.sentence if alert.sentence.endswith(".") else f"{alert.sentence}."
+            yield Finding(alert.id, "warning", message, alert.hint)
 
 
 def clocks(facts: Facts) -> Iterator[Finding]:

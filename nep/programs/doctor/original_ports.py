@@ -22,37 +22,39 @@ def ports(facts: Facts) -> Iterator[Finding]:
             _("Programs of the original NEP can't connect because the gateway is off (NEP_GATEWAY=0)."),
         )
         return
-    asked = [port for port in facts.ports if port.port != KILL_PORT]
-    own = [port for port in asked if port.is_taken and _belongs_to_master(facts, port)]
-    taken = [port for port in asked if port.is_taken and port not in own]
-    airplay = [port for port in taken if _is_airplay(facts, port)]
+    checked = [port for port in facts.ports if port.port != KILL_PORT]
+    own_ports = [port for port in checked if port.is_taken and _belongs_to_master(facts, port)]
+    conflicts = [port for port in checked if port.is_taken and port not in own_ports]
+    airplay = [port for port in conflicts if _is_airplay(facts, port)]
     yield from map(_airplay_finding, airplay)
-    yield from _taken_findings([port for port in taken if port not in airplay])
-    yield from _free_findings([port for port in asked if not port.is_taken and facts.view is not None])
-    if own:
-        words = ngettext(
+    yield from _taken_findings([port for port in conflicts if port not in airplay])
+    yield from _free_findings([port for port in checked if not port.is_taken and facts.view is not None])
+    if own_ports:
+        template = ngettext(
             "The master uses port {ports}, which programs of the original NEP connect to.",
             "The master uses ports {ports}, which programs of the original NEP connect to.",
-            len(own),
+            len(own_ports),
         )
-        yield Finding("ports", "ok", words.format(ports=_port_list(own)))
+        yield Finding("ports", "ok", template.format(ports=_port_list(own_ports)))
     yield from (_kill_port_finding(port) for port in facts.ports if port.port == KILL_PORT and port.is_taken)
 
 
 def _belongs_to_master(facts: Facts, port: PortFact) -> bool:
-    view, here = facts.view, facts.master_port
-    if here is None or (view is not None and any(each.id == f"port:{port.port}" for each in view.alerts)):
+    view, master_port = facts.view, facts.master_port
+    if master_port is None or (
+        view is not None and any(each.id == f"port:{port.port}" for each in view.alerts)
+    ):
         return False
-    if port.holder is not None and here.holder is not None:
-        return port.holder.pid == here.holder.pid
+    if port.holder is not None and master_port.holder is not None:
+        return port.holder.pid == master_port.holder.pid
     # no process is reported: a master with a gateway and without a port alert holds its ports
     return view is not None and any(node.generation == "gateway" for node in view.nodes.values())
 
 
 def _is_airplay(facts: Facts, port: PortFact) -> bool:
     name = port.holder.name if port.holder is not None else ""
-    is_there = facts.platform == "darwin" and port.port == AIRPLAY_PORT
-    return is_there and (not name or name.startswith(_AIRPLAY_PROCESSES))
+    is_airplay_port = facts.platform == "darwin" and port.port == AIRPLAY_PORT
+    return is_airplay_port and (not name or name.startswith(_AIRPLAY_PROCESSES))
 
 
 def _airplay_finding(port: PortFact) -> Finding:
@@ -67,40 +69,40 @@ def _airplay_finding(port: PortFact) -> Finding:
 def _taken_findings(ports: Sequence[PortFact]) -> Iterator[Finding]:
     if not ports:
         return
-    holders = [_holder_text(port.holder) for port in ports]
+    holder_texts = [_holder_text(port.holder) for port in ports]
     if len(ports) == 1:
-        sentence = _("Port {port}, {purpose}, is in use by {program}.").format(
-            port=ports[0].port, purpose=_(ports[0].purpose), program=holders[0]
+        message = _("Port {port}, {purpose}, is in use by {program}.").format(
+            port=ports[0].port, purpose=_(ports[0].purpose), program=holder_texts[0]
         )
-    elif len(set(holders)) == 1:
-        sentence = _(
+    elif len(set(holder_texts)) == 1:
+        message = _(
             "Ports {ports}, which programs of the original NEP need, are in use by {program}."
-        ).format(ports=_port_list(ports), program=holders[0])
+        ).format(ports=_port_list(ports), program=holder_texts[0])
     else:
         each = [
-            _("{port} ({program})").format(port=port.port, program=holder)
-            for port, holder in zip(ports, holders, strict=True)
+            _("{port} ({program})").format(port=port.port, program=holder_text)
+            for port, holder_text in zip(ports, holder_texts, strict=True)
         ]
-        sentence = _("Ports that programs of the original NEP need are in use: {each}.").format(
+        message = _("Ports that programs of the original NEP need are in use: {each}.").format(
             each=format_list(each)
         )
     yield Finding(
         "ports:taken",
         "warning",
-        sentence,
+        message,
         _("Close that program to let programs of the original NEP connect. Nothing else needs these ports."),
     )
 
 
 def _free_findings(ports: Sequence[PortFact]) -> Iterator[Finding]:
     if ports:
-        words = ngettext(
+        template = ngettext(
             "The gateway for programs of the original NEP isn't running: port {ports} isn't in use.",
             "The gateway for programs of the original NEP isn't running: ports {ports} aren't in use.",
             len(ports),
         )
-        why = _("The master was started without its gateway.")
-        yield Finding("ports:free", "info", words.format(ports=_port_list(ports)), why)
+        reason = _("The master was started without its gateway.")
+        yield Finding("ports:free", "info", template.format(ports=_port_list(ports)), reason)
 
 
 def _kill_port_finding(port: PortFact) -> Finding:

@@ -44,22 +44,22 @@ def port_holders(connections: Iterable[object]) -> dict[int, int | None]:
     """
     at_loopback: dict[int, int | None] = {}
     elsewhere: dict[int, int | None] = {}
-    for each in connections:
-        if getattr(each, "status", "") != psutil.CONN_LISTEN:
+    for connection in connections:
+        if getattr(connection, "status", "") != psutil.CONN_LISTEN:
             continue
-        local = getattr(each, "laddr", None)
+        local = getattr(connection, "laddr", None)
         port = getattr(local, "port", None)
         if isinstance(port, int):
-            found = at_loopback if getattr(local, "ip", "") in _LOOPBACK_ADDRESSES else elsewhere
-            found[port] = getattr(each, "pid", None) or found.get(port)
+            pid_by_port = at_loopback if getattr(local, "ip", "") in _LOOPBACK_ADDRESSES else elsewhere
+            pid_by_port[port] = getattr(connection, "pid", None) or pid_by_port.get(port)
     return elsewhere | at_loopback
 
 
 def _own_connections() -> Iterable[object]:
     for process in psutil.process_iter():
         try:
-            for each in process.net_connections(kind="tcp"):
-                yield _OwnedConnection(each, process.pid)
+            for connection in process.net_connections(kind="tcp"):
+                yield _OwnedConnection(connection, process.pid)
         except psutil.Error:
             continue
 
@@ -113,27 +113,31 @@ def master_processes(
         ports: Process ids by listening port.
         usual: Usual port of a master; the process at this port comes first.
     """
-    held: dict[int, list[int]] = {}
+    ports_by_pid: dict[int, list[int]] = {}
     for port, pid in ports.items():
         if pid is not None:
-            held.setdefault(pid, []).append(port)
-    found = []
-    for pid, own in held.items():
-        fact = process_fact(pid)
-        if fact is not None and fact.is_master:
-            found.append((fact, _master_port(own, usual)))
-    return tuple(sorted(found, key=lambda each: (each[1] != usual, each[1] or 0)))
+            ports_by_pid.setdefault(pid, []).append(port)
+    masters = []
+    for pid, own_ports in ports_by_pid.items():
+        process = process_fact(pid)
+        if process is not None and process.is_master:
+            masters.append((process, _master_port(own_ports, usual)))
+    return tuple(sorted(masters, key=lambda each: (each[1] != usual, each[1] or 0)))
 
 
 def _master_port(ports: Sequence[int], usual: int) -> int | None:
-    near = sorted(ports, key=lambda port: abs(port - usual))
-    return near[0] if near and (abs(near[0] - usual) <= _MAX_PORT_DISTANCE or len(near) == 1) else None
+    nearest = sorted(ports, key=lambda port: abs(port - usual))
+    return (
+        nearest[0]
+        if nearest and (abs(nearest[0] - usual) <= _MAX_PORT_DISTANCE or len(nearest) == 1)
+        else None
+    )
 
 
 def is_master_command(command: Sequence[str]) -> bool:
     """Return True if a command line runs a master, such as `nep master` or `python -m nep master`."""
-    for word, following in itertools.pairwise(command):
-        if following == "master" and PurePath(word).stem in {"nep", "__main__"}:
+    for argument, following in itertools.pairwise(command):
+        if following == "master" and PurePath(argument).stem in {"nep", "__main__"}:
             return True
     return False
 
@@ -159,9 +163,9 @@ def _command_line(process: psutil.Process) -> list[str]:
 
 def _program_name(name: str, command: Sequence[str]) -> str:
     if PurePath(name).stem.lower().startswith(("python", "node", "java")):
-        for word in command[1:]:
-            if word in _CODE_OPTIONS:
+        for argument in command[1:]:
+            if argument in _CODE_OPTIONS:
                 break
-            if not word.startswith("-"):
-                return f"{name} {PurePath(word).name}"
+            if not argument.startswith("-"):
+                return f"{name} {PurePath(argument).name}"
     return name

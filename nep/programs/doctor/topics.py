@@ -32,9 +32,12 @@ def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
         )
     if not facts.publishers:
         return tuple(_unpublished_findings(facts))
-    found = [finding for each in facts.publishers for finding in _publisher_findings(facts, each)]
-    found += [_alert_finding(each.id, each.sentence, each.hint) for each in facts.alerts]
-    return (*found, *_arrival_findings(facts, is_explained=any(each.severity == "error" for each in found)))
+    findings = [finding for each in facts.publishers for finding in _publisher_findings(facts, each)]
+    findings += [_alert_finding(each.id, each.sentence, each.hint) for each in facts.alerts]
+    return (
+        *findings,
+        *_arrival_findings(facts, is_explained=any(each.severity == "error" for each in findings)),
+    )
 
 
 def closest_topic(topic: str, names: Iterable[str]) -> str | None:
@@ -48,15 +51,17 @@ def closest_topic(topic: str, names: Iterable[str]) -> str | None:
         names: Names of the published topics.
     """
     names = [name for name in names if name != topic]
-    wanted = _normalized(topic)
-    same = [name for name in names if _normalized(name) == wanted]
+    normalized_topic = _normalized(topic)
+    same = [name for name in names if _normalized(name) == normalized_topic]
     if same:
         return same[0]
-    ends = [name for name in names if _normalized(name).rpartition("/")[2] == wanted.rpartition("/")[2]]
-    if len(ends) == 1:
-        return ends[0]
+    same_suffix = [
+        name for name in names if _normalized(name).rpartition("/")[2] == normalized_topic.rpartition("/")[2]
+    ]
+    if len(same_suffix) == 1:
+        return same_suffix[0]
     by_bare = {_normalized(name): name for name in names}
-    return next((by_bare[near] for near in get_close_matches(wanted, list(by_bare), n=1)), None)
+    return next((by_bare[match] for match in get_close_matches(normalized_topic, list(by_bare), n=1)), None)
 
 
 def _normalized(topic: str) -> str:
@@ -64,26 +69,26 @@ def _normalized(topic: str) -> str:
 
 
 def _unpublished_findings(facts: TopicFacts) -> Iterator[Finding]:
-    sentence = _("{topic} has no publisher.").format(topic=facts.topic)
-    near = closest_topic(facts.topic, facts.other_topics)
+    message = _("{topic} has no publisher.").format(topic=facts.topic)
+    similar = closest_topic(facts.topic, facts.other_topics)
     service = facts.topic if facts.topic in facts.services else ""
-    if near is not None:
-        yield Finding("topic:near", "error", sentence, _similar_name_text(facts, near), instead=near)
+    if similar is not None:
+        yield Finding("topic:near", "error", message, _similar_name_text(facts, similar), instead=similar)
     elif service:
-        words = _("A service has this name. Services reply to calls; they don't publish.")
-        yield Finding("topic:service", "error", sentence, words, instead=service)
+        hint = _("A service has this name. Services reply to calls; they don't publish.")
+        yield Finding("topic:service", "error", message, hint, instead=service)
     else:
-        words = _("Start the program that publishes it. Topics published now: {topics}.")
-        known = sorted(
+        hint = _("Start the program that publishes it. Topics published now: {topics}.")
+        topics = sorted(
             name for name in facts.other_topics if not name.startswith("/nep/")
         )  # hide nep's own topics
-        some = known[:_MAX_NAMES]
-        if not some:
-            words = _("Start the program that publishes it. No other topics are published either.")
-        more = len(known) - len(some)
-        names = [*some, _("{count} more").format(count=more)] if more else some
+        listed = topics[:_MAX_NAMES]
+        if not listed:
+            hint = _("Start the program that publishes it. No other topics are published either.")
+        more = len(topics) - len(listed)
+        names = [*listed, _("{count} more").format(count=more)] if more else listed
         yield Finding(
-            "topic:nobody", "error", sentence, words.format(topics=format_list(names) if names else "")
+            "topic:nobody", "error", message, hint.format(topics=format_list(names) if names else "")
         )
     if facts.is_shared:
         yield Finding(
@@ -106,79 +111,79 @@ def _unpublished_findings(facts: TopicFacts) -> Iterator[Finding]:
         )
 
 
-def _similar_name_text(facts: TopicFacts, near: str) -> str:
-    rate_hz = facts.other_topics[near]
+def _similar_name_text(facts: TopicFacts, similar: str) -> str:
+    rate_hz = facts.other_topics[similar]
     if rate_hz is None:
-        return _("Did you mean {topic}?").format(topic=near)
-    words = _("Did you mean {topic}? Its publishers send {rate} messages per second.")
-    return words.format(topic=near, rate=number(rate_hz, ".3g" if rate_hz < 100 else ".0f"))
+        return _("Did you mean {topic}?").format(topic=similar)
+    template = _("Did you mean {topic}? Its publishers send {rate} messages per second.")
+    return template.format(topic=similar, rate=number(rate_hz, ".3g" if rate_hz < 100 else ".0f"))
 
 
-def _publisher_findings(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
-    if each.generation in UNSUPPORTED_VERSIONS:
-        yield unsupported_finding(f"topic:version:{each.node}", each.node, each.generation)
-    elif each.reach_failure:
-        yield _unreachable_finding(each)
+def _publisher_findings(facts: TopicFacts, publisher: PublisherFact) -> Iterator[Finding]:
+    if publisher.generation in UNSUPPORTED_VERSIONS:
+        yield unsupported_finding(f"topic:version:{publisher.node}", publisher.node, publisher.generation)
+    elif publisher.reach_failure:
+        yield _unreachable_finding(publisher)
     elif not facts.received:
-        yield from _silence_findings(facts, each)
+        yield from _silence_findings(facts, publisher)
 
 
-def _unreachable_finding(each: PublisherFact) -> Finding:
-    place = each.endpoint.removeprefix("tcp://")
-    if each.reach_failure == "elsewhere":
-        sentence = _("“{node}” can be reached only from its own computer, {host}.")
+def _unreachable_finding(publisher: PublisherFact) -> Finding:
+    address = publisher.endpoint.removeprefix("tcp://")
+    if publisher.reach_failure == "elsewhere":
+        message = _("“{node}” can be reached only from its own computer, {host}.")
         fix = _(
             "Its NEP_MASTER is an address that works only on that computer. Restart it with the "
             "master's network address as NEP_MASTER."
         )
-    elif each.reach_failure == "timeout":
-        sentence = _("“{node}” publishes at {place} ({host}), but that address doesn't respond.")
+    elif publisher.reach_failure == "timeout":
+        message = _("“{node}” publishes at {place} ({host}), but that address doesn't respond.")
         fix = _(
             "A firewall blocks the connection, or the computers are on different networks. Allow "
             "Python in the firewall of {host}."
         )
-    elif each.reach_failure == "refused":
-        sentence = _("“{node}” published at {place} ({host}), but nothing is listening there now.")
+    elif publisher.reach_failure == "refused":
+        message = _("“{node}” published at {place} ({host}), but nothing is listening there now.")
         fix = _("The program has stopped or isn't responding. Start it again.")
     else:
-        sentence = _(
-            "“{node}” publishes at {place} ({host}), but this computer has no route to that address."
-        )
+        message = _("“{node}” publishes at {place} ({host}), but this computer has no route to that address.")
         fix = _("Check that both computers are on the same network.")
-    holes = {"node": each.node, "host": each.host, "place": place}
-    return Finding(f"topic:address:{each.node}", "error", sentence.format(**holes), fix.format(**holes))
+    holes = {"node": publisher.node, "host": publisher.host, "place": address}
+    return Finding(f"topic:address:{publisher.node}", "error", message.format(**holes), fix.format(**holes))
 
 
-def _silence_findings(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
-    quiet_s = facts.now_s - each.last_message_s if each.last_message_s is not None else None
+def _silence_findings(facts: TopicFacts, publisher: PublisherFact) -> Iterator[Finding]:
+    quiet_s = facts.now_s - publisher.last_message_s if publisher.last_message_s is not None else None
     if quiet_s is not None and quiet_s < max(MIN_SILENCE_S, facts.listen_duration_s):
         return  # it sends; `_arrival_findings` reports missing messages
-    if quiet_s is None and each.sent:
+    if quiet_s is None and publisher.sent:
         return
-    if quiet_s is None or each.last_message_s is None:
-        sentence = _("“{node}” is connected but has sent nothing on {topic} yet.")
+    if quiet_s is None or publisher.last_message_s is None:
+        message = _("“{node}” is connected but has sent nothing on {topic} yet.")
         fix = _("Check what that program is waiting for.")
     else:
-        sentence = _("“{node}” is connected but has sent nothing on {topic} for {ago}.")
-        at = time.strftime("%H:%M:%S", time.localtime(each.last_message_s))
-        words = _("Its last message was at {at}. Check what that program is waiting for.")
-        if each.sent:
-            words = _("Its last message was number {count}, at {at}. Check what that program is waiting for.")
-        fix = words.format(count=number(each.sent or 0, ".0f"), at=at)
-    remedy = next(iter(each.remedies), "")
+        message = _("“{node}” is connected but has sent nothing on {topic} for {ago}.")
+        time_text = time.strftime("%H:%M:%S", time.localtime(publisher.last_message_s))
+        template = _("Its last message was at {at}. Check what that program is waiting for.")
+        if publisher.sent:
+            template = _(
+                "Its last message was number {count}, at {at}. Check what that program is waiting for."
+            )
+        fix = template.format(count=number(publisher.sent or 0, ".0f"), at=time_text)
+    remedy = next(iter(publisher.remedies), "")
     if remedy:
         fix += " " + _("Call its service “{service}” to restart it.").format(service=remedy)
     yield Finding(
-        f"topic:silent:{each.node}",
+        f"topic:silent:{publisher.node}",
         "error",
-        sentence.format(node=each.node, topic=facts.topic, ago=duration_text(quiet_s or 0.0)),
+        message.format(node=publisher.node, topic=facts.topic, ago=duration_text(quiet_s or 0.0)),
         fix,
         instead=remedy,
     )
 
 
-def _alert_finding(id: str, sentence: str, hint: str) -> Finding:
-    return Finding(id, "error", sentence if sentence.endswith(".") else f"{sentence}.", hint)
+def _alert_finding(id: str, message: str, hint: str) -> Finding:
+    return Finding(id, "error", message if message.endswith(".") else f"{message}.", hint)
 
 
 def _arrival_findings(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
@@ -194,8 +199,8 @@ def _arrival_findings(facts: TopicFacts, *, is_explained: bool) -> Iterator[Find
             ),
         )
     elif facts.received:
-        words = _("Messages on {topic} arrive and can be read.")
-        yield Finding("topic", "ok", words.format(topic=facts.topic))
+        template = _("Messages on {topic} arrive and can be read.")
+        yield Finding("topic", "ok", template.format(topic=facts.topic))
     elif facts.rejected:
         yield Finding(
             "topic:wire",
@@ -221,5 +226,5 @@ def _arrival_findings(facts: TopicFacts, *, is_explained: bool) -> Iterator[Find
 
 
 def _publisher_text(publishers: Sequence[PublisherFact]) -> str:
-    places = dict.fromkeys(f"{each.node} ({each.host})" for each in publishers)
-    return format_list(list(places)[:_MAX_NAMES])
+    locations = dict.fromkeys(f"{each.node} ({each.host})" for each in publishers)
+    return format_list(list(locations)[:_MAX_NAMES])

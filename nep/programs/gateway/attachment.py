@@ -211,14 +211,14 @@ class NativeNetwork:
             created = make(self._node)
         except NepError as error:
             now = time.monotonic()
-            self._retry_at = {each: at for each, at in self._retry_at.items() if at > now}
+            self._retry_at = {each: retry_at for each, retry_at in self._retry_at.items() if retry_at > now}
             self._retry_at[topic] = now + _RETRY_S
-            why, hint = str(error), ""
+            reason, hint = str(error), ""
             if isinstance(error, BadTopicError):
-                why, hint = error.reason, _("Rename the topic.")
+                reason, hint = error.reason, _("Rename the topic.")
             self.report(
                 id,
-                _("“{topic}” isn't forwarded to native programs: {why}").format(topic=topic, why=why),
+                _("“{topic}” isn't forwarded to native programs: {why}").format(topic=topic, why=reason),
                 hint,
             )
             return None
@@ -249,15 +249,15 @@ class NativeNetwork:
         else:
             self.resolve("gateway:full")
 
-    def report(self, id: str, sentence: str, hint: str = "") -> None:
+    def report(self, id: str, message: str, hint: str = "") -> None:
         """Report a problem as an alert. Repeated reports of the same problem have no effect.
 
         Args:
             id: Id of the alert, for `resolve`.
-            sentence: Description of the problem.
+            message: Description of the problem.
             hint: Next step for the user, or "".
         """
-        alert = Alert(escaped(id), escaped(sentence), escaped(hint))
+        alert = Alert(escaped(id), escaped(message), escaped(hint))
         if self._alerts.get(id) != alert and (id in self._alerts or len(self._alerts) < _MAX_ALERTS):
             self._alerts[id] = alert
             self._report(tuple(self._alerts.values()))

@@ -57,12 +57,12 @@ class FrameError(ValueError):
     """Error for an invalid frame.
 
     Args:
-        sentence: Description of the problem.
+        message: Description of the problem.
         version: Release of the original NEP that writes such frames, if known.
     """
 
-    def __init__(self, sentence: str, version: str | None = None) -> None:
-        super().__init__(sentence)
+    def __init__(self, message: str, version: str | None = None) -> None:
+        super().__init__(message)
         self.version = version
 
 
@@ -113,21 +113,21 @@ class FrameFormat:
         return self.framing == "bare" and bool(subscription) and self.topic.encode().startswith(subscription)
 
     def _strip_prefix(self, frame: bytes) -> bytes:
-        own = f"{self.topic} ".encode()
+        prefix = f"{self.topic} ".encode()
         if self.framing == "prefixed":
-            if frame.startswith(own):
-                return frame[len(own) :]
+            if frame.startswith(prefix):
+                return frame[len(prefix) :]
             if self.codec == "json" and frame.startswith((b"{", b"[", b'"')):
                 return frame
             raise FrameError(
                 _("A message on “{topic}” doesn't begin with the topic name").format(topic=self.topic)
             )
         if self.codec == "json":
-            self._check_version(frame, own)
+            self._check_version(frame, prefix)
         return frame
 
-    def _check_version(self, frame: bytes, own: bytes) -> None:
-        if frame.startswith(own):
+    def _check_version(self, frame: bytes, prefix: bytes) -> None:
+        if frame.startswith(prefix):
             raise FrameError(
                 _("A message on “{topic}” begins with the topic name").format(topic=self.topic),
                 version="0.5.4.6",
@@ -155,8 +155,8 @@ def escape_for_javascript(data: bytes, topic: str) -> bytes:
     contains its own topic would crash the program. The topic's first character is written as ``\uXXXX``,
     which JSON readers decode.
     """
-    word = topic.encode()
-    if not word or word not in data:
+    topic_bytes = topic.encode()
+    if not topic_bytes or topic_bytes not in data:
         return data
     escaped = "".join(f"\\u{unit:04x}" for unit in _utf16_units(topic[0])).encode()
     spot = re.compile(
@@ -189,7 +189,7 @@ def escape_for_csharp(data: bytes) -> bytes:
 
 def _utf16_units(letter: str) -> tuple[int, ...]:
     packed = letter.encode("utf-16-be", "surrogatepass")
-    return tuple(int.from_bytes(packed[at : at + 2], "big") for at in range(0, len(packed), 2))
+    return tuple(int.from_bytes(packed[offset : offset + 2], "big") for offset in range(0, len(packed), 2))
 
 
 def _decode_base64(data: bytes) -> bytes:

@@ -204,7 +204,11 @@ class Gateway:
     def _restore(self) -> None:
         # Binds the ports of running programs again, because programs request a port only once.
         self._programs.remove_ended()
-        for line in {known.line for known in self._port_map.registrations if not known.line.is_service}:
+        for line in {
+            registration.line
+            for registration in self._port_map.registrations
+            if not registration.line.is_service
+        }:
             base = self._port_map.port_of(line)
             if base is not None and not self._open_line(line, base):
                 self._outside.report(
@@ -235,9 +239,11 @@ class Gateway:
         return reply_port(line, base, request.socket)
 
     def _port_for(self, line: TopicLine) -> int:
-        known = self._port_map.port_of(line)
-        if known is not None and (line.is_service or self._relay.pair(line) or self._open_line(line, known)):
-            return known
+        assigned_port = self._port_map.port_of(line)
+        if assigned_port is not None and (
+            line.is_service or self._relay.pair(line) or self._open_line(line, assigned_port)
+        ):
+            return assigned_port
         if not has_free_descriptors(_FILES_PER_PAIR + RESERVED_DESCRIPTORS):
             raise RequestError(
                 _("the master has too many files open; close programs, or restart the master"), line.topic

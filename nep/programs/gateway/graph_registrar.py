@@ -93,13 +93,13 @@ class GraphRegistrar:
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
         """Register these programs, and unregister all others."""
-        wanted = {program.node_id: self._record(program) for program in programs}
-        for node_id in [known for known in self._shown if known not in wanted]:
+        joins = {program.node_id: self._record(program) for program in programs}
+        for node_id in [shown_id for shown_id in self._shown if shown_id not in joins]:
             del self._shown[node_id]
             self._since.pop(node_id, None)
             self._loads.pop(node_id, None)
             self._submit(Leave(node_id))
-        for node_id, join in wanted.items():
+        for node_id, join in joins.items():
             if self._shown.get(node_id) != join:
                 self._shown[node_id] = join
                 self._submit(join)
@@ -156,13 +156,13 @@ class GraphRegistrar:
         )
 
     def _assign_stats(self, programs: tuple[OriginalProgram, ...]) -> None:
-        chosen: dict[Key, int] = {}
+        id_by_key: dict[Key, int] = {}
         for program in programs:
             for link in program.links:
                 if link.role == "publisher":
-                    chosen.setdefault((link.topic, link.codec), _stable_id(program, link))
-        self._stat_keys = {carrier: key for key, carrier in chosen.items()}
-        self._counts = {key: counted for key, counted in self._counts.items() if key in chosen}
+                    id_by_key.setdefault((link.topic, link.codec), _stable_id(program, link))
+        self._stat_keys = {carrier: key for key, carrier in id_by_key.items()}
+        self._counts = {key: counted for key, counted in self._counts.items() if key in id_by_key}
 
     def _publisher_count(self, record: PublisherRecord) -> PublisherCount:
         key = self._stat_keys.get(record.id)

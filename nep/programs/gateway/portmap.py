@@ -124,7 +124,11 @@ class PortMap:
 
     def assign(self, line: TopicLine, port: int) -> None:
         """Assign a base port to a line, and remove its assignment to another line."""
-        for other in [known for known, used in self._ports.items() if used == port and known != line]:
+        for other in [
+            assigned_line
+            for assigned_line, assigned_port in self._ports.items()
+            if assigned_port == port and assigned_line != line
+        ]:
             del self._ports[other]
         self._ports[line] = port
 
@@ -136,7 +140,9 @@ class PortMap:
     def remove(self, registrations: set[Registration]) -> None:
         """Remove registrations. Their lines keep their ports."""
         self._registrations = {
-            key: known for key, known in self._registrations.items() if known not in registrations
+            key: registration
+            for key, registration in self._registrations.items()
+            if registration not in registrations
         }
 
     def save(self) -> None:
@@ -171,9 +177,9 @@ class PortMap:
             if abs(document["boot"] - self._boot) > _BOOT_TIME_TOLERANCE_S:
                 return
             for entry in document["programs"]:
-                known = _parse_registration(entry)
-                if known.line in self._ports:
-                    self.add(known)
+                registration = _parse_registration(entry)
+                if registration.line in self._ports:
+                    self.add(registration)
         except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
             return
 
@@ -183,9 +189,9 @@ def default_file(port: int) -> Path:
 
     The file is in the folder `NEP_STATE_DIR`, or in the user's folder for application state.
     """
-    chosen = os.environ.get("NEP_STATE_DIR")
-    if chosen:
-        folder = Path(chosen)
+    state_dir = os.environ.get("NEP_STATE_DIR")
+    if state_dir:
+        folder = Path(state_dir)
     elif sys.platform == "win32":
         folder = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "nep"
     elif sys.platform == "darwin":

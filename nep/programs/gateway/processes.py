@@ -84,7 +84,7 @@ class SystemProcesses:
             name = PurePath(psutil.Process(pid).name()).stem.lower()
         except psutil.Error:
             return None
-        return next((language for word, language in _INTERPRETERS.items() if name.startswith(word)), None)
+        return next((language for prefix, language in _INTERPRETERS.items() if name.startswith(prefix)), None)
 
     def is_connected(self, pid: int, port: int, *, binds: bool) -> bool | None:
         """Return True if a process has an established connection over a port, None if access is denied."""

@@ -67,7 +67,7 @@ class ProgramTable:
     """Tracker of the programs that are registered in a port map. Used in the gateway's thread only.
 
     Args:
-        known: Port map with the registrations.
+        port_map: Port map with the registrations.
         processes: Information about the processes of this computer.
         pair_of: Returns the open sockets of a line, or None.
         clock: Monotonic clock in seconds.
@@ -75,13 +75,13 @@ class ProgramTable:
 
     def __init__(
         self,
-        known: PortMap,
+        port_map: PortMap,
         processes: Processes,
         pair_of: Callable[[TopicLine], ProxyPair | None],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._clock = clock
-        self._port_map = known
+        self._port_map = port_map
         self._processes = processes
         self._pair_of = pair_of
         self._roles: dict[Registration, frozenset[Role]] = {}
@@ -90,9 +90,9 @@ class ProgramTable:
 
     def update(self, lines: Iterable[TopicLine] | None = None) -> None:
         """Update the roles of the programs on some lines, or on all lines if `lines` is None."""
-        chosen = None if lines is None else set(lines)
+        selected_lines = None if lines is None else set(lines)
         for registration in self._port_map.registrations:
-            if chosen is None or registration.line in chosen:
+            if selected_lines is None or registration.line in selected_lines:
                 roles = frozenset(self._roles_of(registration))
                 self._roles[registration] = roles
                 if roles or self._was_briefly_connected(registration):
@@ -135,7 +135,7 @@ class ProgramTable:
         grouped: dict[str, list[Registration]] = {}
         for registration in self._port_map.registrations:
             grouped.setdefault(registration.node_id, []).append(registration)
-        return tuple(self._program(node_id, asked) for node_id, asked in grouped.items())
+        return tuple(self._program(node_id, registrations) for node_id, registrations in grouped.items())
 
     def names(self, line: TopicLine, role: Role) -> tuple[str, ...]:
         """Return the names of the nodes that have a role on a line."""
@@ -184,26 +184,32 @@ class ProgramTable:
             return True
         return any(registration.line == line for registration in self._port_map.registrations)
 
-    def _program(self, node_id: str, asked: list[Registration]) -> OriginalProgram:
+    def _program(self, node_id: str, registrations: list[Registration]) -> OriginalProgram:
         links = {
             TopicLink(registration.line.topic, registration.msg_type, registration.line.codec, role): None
-            for registration in asked
+            for registration in registrations
             for role in sorted(self._roles.get(registration, ()))
         }
-        links |= dict.fromkeys(self._service_links(asked))
-        first = asked[0]
-        generation = self._unsupported_version(asked) or first.generation
+        links |= dict.fromkeys(self._service_links(registrations))
+        first = registrations[0]
+        generation = self._unsupported_version(registrations) or first.generation
         return OriginalProgram(node_id, first.node, first.pid, generation, first.language, tuple(links))
 
-    def _service_links(self, asked: list[Registration]) -> Iterator[TopicLink]:
-        for each in asked:
-            if each.line.is_service and each.started is not None and each.socket in get_args(ServiceRole):
-                role = cast("ServiceRole", each.socket)
-                port = self._port_map.port_of(each.line)
-                yield TopicLink(each.line.topic, each.msg_type, each.line.codec, role, port)
+    def _service_links(self, registrations: list[Registration]) -> Iterator[TopicLink]:
+        for registration in registrations:
+            if (
+                registration.line.is_service
+                and registration.started is not None
+                and registration.socket in get_args(ServiceRole)
+            ):
+                role = cast("ServiceRole", registration.socket)
+                port = self._port_map.port_of(registration.line)
+                yield TopicLink(
+                    registration.line.topic, registration.msg_type, registration.line.codec, role, port
+                )
 
-    def _unsupported_version(self, asked: list[Registration]) -> str | None:
-        for registration in asked:
+    def _unsupported_version(self, registrations: list[Registration]) -> str | None:
+        for registration in registrations:
             pair = self._pair_of(registration.line)
             for role in self._roles.get(registration, ()):
                 version = pair.unserved.get(role) if pair is not None else None
@@ -221,9 +227,11 @@ class ProgramTable:
 
     def _is_connected(self, registration: Registration, end: Endpoint) -> bool:
         if registration.pid is not None and registration.started is not None:
-            known = self._processes.is_connected(registration.pid, end.port, binds=end.is_bound_by_program)
-            if known is not None:
-                return known
+            is_connected = self._processes.is_connected(
+                registration.pid, end.port, binds=end.is_bound_by_program
+            )
+            if is_connected is not None:
+                return is_connected
         return registration.socket == end.role
 
     def _was_briefly_connected(self, registration: Registration) -> bool:

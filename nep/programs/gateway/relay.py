@@ -43,12 +43,12 @@ class NativeSide(Protocol):
 class AlertSink(Protocol):
     """Interface through which problems are reported as alerts."""
 
-    def report(self, id: str, sentence: str, hint: str = "") -> None:
+    def report(self, id: str, message: str, hint: str = "") -> None:
         """Report a problem as an alert. Repeated reports of the same problem have no effect.
 
         Args:
             id: Id of the alert, for `resolve`.
-            sentence: Description of the problem.
+            message: Description of the problem.
             hint: Next step for the user, or "".
         """
 
@@ -183,11 +183,11 @@ class Relay:
             key: Topic and codec.
         """
         pairs = self._pairs_of(key)
-        wanted = any(pair.has_subscribers for pair in pairs)
-        if wanted and key not in self._subscribed:
+        is_needed = any(pair.has_subscribers for pair in pairs)
+        if is_needed and key not in self._subscribed:
             if self._native.subscribe(*key):
                 self._subscribed.add(key)
-        elif not wanted and key in self._subscribed:
+        elif not is_needed and key in self._subscribed:
             self._subscribed.discard(key)
             self._native.unsubscribe(*key)
         if key in self._publishing and not any(pair.connections["publisher"] for pair in pairs):
@@ -239,8 +239,8 @@ class Relay:
 
     def _report_rejected(self, topic: str, rejected: _RejectedMessages) -> None:
         rejected.reported = rejected.count
-        words = ngettext("{reason}", "{reason} ({count} messages)", rejected.count)
-        self._alerts.report(f"message:{topic}", words.format(reason=rejected.reason, count=rejected.count))
+        template = ngettext("{reason}", "{reason} ({count} messages)", rejected.count)
+        self._alerts.report(f"message:{topic}", template.format(reason=rejected.reason, count=rejected.count))
 
     def _check_versions(self, pair: ProxyPair) -> None:
         if pair.has_0546_subscriber:
@@ -257,21 +257,21 @@ class Relay:
         pair.unserved[role] = version
         names = [f"“{name}”" for name in self._program_names(pair.line, role)]
         if not names:
-            words = _(
+            template = _(
                 "A program on “{topic}” uses nep {version}, which isn't compatible with any other version"
             )
         elif len(names) == 1:
-            words = _(
+            template = _(
                 "{programs} on “{topic}” uses nep {version}, which isn't compatible with any other version"
             )
         else:
-            words = _(
+            template = _(
                 "One of {programs} on “{topic}” uses nep {version}, which isn't compatible with any other "
                 "version"
             )
         self._alerts.report(
             f"version:{pair.line.topic}:{role}",
-            words.format(programs=", ".join(names), topic=pair.line.topic, version=version),
+            template.format(programs=", ".join(names), topic=pair.line.topic, version=version),
             _("Install nep 0.5.4.8 or 0.5.4.5 for that program."),
         )
 

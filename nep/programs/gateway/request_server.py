@@ -82,8 +82,8 @@ class RequestServer:
             (self._ports.requests_b, "nep 0.5.4.8"),
         ):
             if port and port not in self._request_sockets:
-                words = _("Another program is using port {port}: programs of {version} can't connect")
-                bound = self._bind(zmq.ROUTER, port, words.format(port=port, version=versions))
+                template = _("Another program is using port {port}: programs of {version} can't connect")
+                bound = self._bind(zmq.ROUTER, port, template.format(port=port, version=versions))
                 if bound is not None:
                     self._request_sockets[port] = bound
         if self._ports.broadcast and self._broadcast_socket is None:
@@ -116,9 +116,9 @@ class RequestServer:
         if b"" not in parts:
             return
         end = parts.index(b"") + 1
-        envelope, asked = parts[:end], b"".join(parts[end:])
+        envelope, body = parts[:end], b"".join(parts[end:])
         try:
-            request = parse_request(asked, port)
+            request = parse_request(body, port)
             reply = encode_grant(request, self._assign_port(request))
         except RequestError as error:
             reply = encode_rejection(error)
@@ -142,7 +142,7 @@ class RequestServer:
         self._request_sockets.clear()
         self._broadcast_socket = None
 
-    def _bind(self, kind: int, port: int, taken: str) -> zmq.Socket[bytes] | None:
+    def _bind(self, kind: int, port: int, conflict_message: str) -> zmq.Socket[bytes] | None:
         socket = self._context.socket(kind)
         socket.setsockopt(zmq.MAXMSGSIZE, _MAX_REQUEST_BYTES)
         try:
@@ -151,7 +151,7 @@ class RequestServer:
             socket.close(0)
             self._alerts.report(
                 f"port:{port}",
-                taken,
+                conflict_message,
                 _("Close that program. It may be another master, or the AirPlay Receiver on macOS."),
             )
             return None

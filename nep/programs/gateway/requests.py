@@ -24,12 +24,12 @@ class RequestError(ValueError):
     """Error for a request that can't be granted.
 
     Args:
-        sentence: Reason of the rejection.
+        message: Reason of the rejection.
         topic: Requested topic, if known.
     """
 
-    def __init__(self, sentence: str, topic: object = None) -> None:
-        super().__init__(sentence)
+    def __init__(self, message: str, topic: object = None) -> None:
+        super().__init__(message)
         self.topic = topic
 
 
@@ -109,10 +109,10 @@ def parse_request(data: bytes, asked_port: int) -> Request:
 
 def encode_grant(request: Request, port: int) -> bytes:
     """Encode the reply that assigns `port`, in the format that original programs expect."""
-    answer: dict[str, object] = {"topic": request.topic, "port": port}
+    reply: dict[str, object] = {"topic": request.topic, "port": port}
     if not request.is_service:
-        answer["mode"] = request.mode
-    return _encode_json({**answer, "ip": LOOPBACK, "socket": request.socket, "state": "success"})
+        reply["mode"] = request.mode
+    return _encode_json({**reply, "ip": LOOPBACK, "socket": request.socket, "state": "success"})
 
 
 def encode_rejection(error: RequestError) -> bytes:
@@ -181,7 +181,7 @@ def _name(fields: Mapping[str, object], key: str, topic: object) -> str:
 def _choice(
     fields: Mapping[str, object],
     key: str,
-    known: frozenset[str] | None,
+    allowed: frozenset[str] | None,
     topic: object,
     default: str | None = None,
 ) -> str:
@@ -190,8 +190,8 @@ def _choice(
         raise RequestError(f"the request has no '{key}'", topic)
     if len(value) > MAX_NAME_BYTES:
         raise RequestError(f"the '{key}' of the request has {len(value)} letters", topic)
-    if known is not None and value not in known:
-        raise RequestError(f"no {key} '{value[:40]}'; one of {', '.join(sorted(known))}", topic)
+    if allowed is not None and value not in allowed:
+        raise RequestError(f"no {key} '{value[:40]}'; one of {', '.join(sorted(allowed))}", topic)
     return value
 
 

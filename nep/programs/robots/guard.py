@@ -134,21 +134,21 @@ class MotionGuard:
             msg_type: Message type to publish with, if known.
         """
         key = topic, msg_type
-        said = self._cache.get(key)
-        if said is None:
+        reason = self._cache.get(key)
+        if reason is None:
             with self._lock:
-                said = denial_text(topic, self._moving.robots_moved_by(topic, msg_type), self._allowed)
+                reason = denial_text(topic, self._moving.robots_moved_by(topic, msg_type), self._allowed)
                 if len(self._cache) >= _MAX_CACHED:
                     self._cache.clear()
-                self._cache[key] = said
-        return said
+                self._cache[key] = reason
+        return reason
 
     def close(self) -> None:
         """Unsubscribe from the descriptions. Robots that are already known stay protected."""
         with self._lock:
             subscribers, self._subscribers = list(self._subscribers.values()), {}
-        for each in subscribers:
-            each.close()
+        for subscriber in subscribers:
+            subscriber.close()
 
     # ---- descriptions
 
@@ -231,13 +231,15 @@ def denial_text(topic: str, robots: Sequence[str], allowed: Collection[str]) -> 
     missing = list(_denied_robots(topic, robots, allowed))
     if not missing:
         return ""
-    shown = shortened(escaped(topic), _MAX_NAME_SHOWN)
+    topic_text = shortened(escaped(topic), _MAX_NAME_SHOWN)
     names = [shortened(escaped(name), _MAX_NAME_SHOWN) for name in missing]
     is_named = missing != [topic] and len(names) <= _MAX_NAMES_SHOWN
-    options = " ".join(f"--allow-moving {shlex.quote(each)}" for each in (names if is_named else [shown]))
+    options = " ".join(
+        f"--allow-moving {shlex.quote(each)}" for each in (names if is_named else [topic_text])
+    )
     if missing == [topic]:
-        said = _("'{topic}' moves a robot; make sure that nobody is in the way, then add {options}")
-        return said.format(topic=shown, options=options)
+        template = _("'{topic}' moves a robot; make sure that nobody is in the way, then add {options}")
+        return template.format(topic=topic_text, options=options)
     robots = names[:_MAX_NAMES_SHOWN] + ["…"] * (len(names) > _MAX_NAMES_SHOWN)
-    said = _("'{topic}' moves {robots}; make sure that nobody is in the way, then add {options}")
-    return said.format(topic=shown, robots=format_list(robots), options=options)
+    template = _("'{topic}' moves {robots}; make sure that nobody is in the way, then add {options}")
+    return template.format(topic=topic_text, robots=format_list(robots), options=options)

@@ -61,15 +61,15 @@ class MovingTopics:
         unidentified: Iterable[str] = (),
         uses_names: bool = False,
     ) -> None:
-        known = tuple(robots)
+        robot_controls = tuple(robots)
         by_topic: dict[str, dict[str, None]] = {}
-        for robot in known:
+        for robot in robot_controls:
             for topic in robot.topics:
                 by_topic.setdefault(topic, {})[robot.name] = None
         self._by_topic = {topic: tuple(names) for topic, names in by_topic.items()}
         self._unidentified = frozenset(unidentified)
         self._patterns = tuple(topic for topic in {*self._by_topic, *self._unidentified} if is_pattern(topic))
-        self._all_names = tuple(dict.fromkeys(robot.name for robot in known))
+        self._all_names = tuple(dict.fromkeys(robot.name for robot in robot_controls))
         self._uses_names = uses_names
 
     @property
@@ -80,10 +80,10 @@ class MovingTopics:
     @property
     def topics(self) -> dict[str, tuple[str, ...]]:
         """Names of the identified robots by the topic or pattern that moves them."""
-        found = dict(self._by_topic)
+        robots_by_topic = dict(self._by_topic)
         if self._all_names:
-            found[RIZE_COMMAND_TOPIC] = self._all_names
-        return found
+            robots_by_topic[RIZE_COMMAND_TOPIC] = self._all_names
+        return robots_by_topic
 
     def robots_on(self, topic: str) -> tuple[str, ...]:
         """Return the names of the identified robots that messages on a topic move."""
@@ -143,9 +143,11 @@ def parse_controls(description: object, fallback_name: str = "") -> RobotControl
 
 
 def _controlling_topics(description: Mapping[object, object]) -> Iterator[str]:
-    named = description.get("rb:topics")
-    if isinstance(named, Mapping):
-        yield from (topic for key in _CONTROL_KEYS if isinstance(topic := named.get(key), str) and topic)
+    topics_by_key = description.get("rb:topics")
+    if isinstance(topics_by_key, Mapping):
+        yield from (
+            topic for key in _CONTROL_KEYS if isinstance(topic := topics_by_key.get(key), str) and topic
+        )
     actions = description.get("actions")
     for action in actions.values() if isinstance(actions, Mapping) else ():
         forms = action.get("forms") if isinstance(action, Mapping) else None
@@ -185,7 +187,7 @@ def moving_topics(
             count as moving, as do the default topics of a robot.
         own_nodes: Ids of the caller's nodes, whose subscriptions are ignored.
     """
-    known = [*robots, *_unread_robots(view, unread, own_nodes)]
+    all_robots = [*robots, *_unread_robots(view, unread, own_nodes)]
     typed = [(info.name, info.subscribers) for info in view.topics.values() if info.msg_type == COMMAND_TYPE]
     typed += [
         (info.name, info.subscribers) for info in view.patterns.values() if info.msg_type == COMMAND_TYPE
@@ -193,7 +195,7 @@ def moving_topics(
     subscribed = (
         name for name, subscribers in typed if any(each.node_id not in own_nodes for each in subscribers)
     )
-    return MovingTopics(known, unidentified=subscribed)
+    return MovingTopics(all_robots, unidentified=subscribed)
 
 
 def _unread_robots(
@@ -224,13 +226,13 @@ def _publishers(view: GraphView, topic: str) -> set[str]:
 
 
 def _subscriptions(view: GraphView) -> dict[str, set[str]]:
-    found: dict[str, set[str]] = {}
+    topics_by_node: dict[str, set[str]] = {}
     subscriptions = [(info.name, info.subscribers) for info in view.topics.values()]
     subscriptions += [(info.name, info.subscribers) for info in view.patterns.values()]
     for name, subscribers in subscriptions:
         for subscriber in subscribers:
-            found.setdefault(subscriber.node_id, set()).add(name)
-    return found
+            topics_by_node.setdefault(subscriber.node_id, set()).add(name)
+    return topics_by_node
 
 
 def original_robots(view: GraphView) -> Iterator[RobotControls]:

@@ -84,18 +84,23 @@ class Access:
     origins: Collection[str] = ()
     token: str = ""
 
-    def origin_rejection_reason(self, origin: str | None, own: str = "") -> str:
+    def origin_rejection_reason(self, origin: str | None, own_origin: str = "") -> str:
         """Return the reason why a page with this origin may not connect; "" if the page may connect.
 
         Args:
             origin: Origin of the page; None for a program.
-            own: Origin of the server's own pages: the address and port at which the connection arrived.
+            own_origin: Origin of the server's own pages: the address and port at which the connection
+                arrived.
         """
         if origin is None:
             return ""
         try:
-            known = checked_origin(origin)
-            if known == own or known in self.origins or is_local_host(urlsplit(known).hostname or ""):
+            normalized = checked_origin(origin)
+            if (
+                normalized == own_origin
+                or normalized in self.origins
+                or is_local_host(urlsplit(normalized).hostname or "")
+            ):
                 return ""
         except NepError:
             pass
@@ -110,16 +115,16 @@ class Access:
             path: Path of the URL, with a query such as ``/?token=TOKEN``.
             authorization: Authorization header, such as ``Bearer TOKEN``, or None.
         """
-        given = [*parse_qs(urlsplit(path).query, keep_blank_values=True).get("token", ())]
+        tokens = [*parse_qs(urlsplit(path).query, keep_blank_values=True).get("token", ())]
         scheme, _space, value = (authorization or "").partition(" ")
         if scheme.lower() == "bearer" and value:
-            given.append(value.strip())
-        if not given:
+            tokens.append(value.strip())
+        if not tokens:
             return None
-        return sum(map(self._is_valid_token, given)) > 0
+        return sum(map(self._is_valid_token, tokens)) > 0
 
-    def _is_valid_token(self, given: str) -> bool:
-        return hmac.compare_digest(given.encode("utf-8", "replace"), self.token.encode())
+    def _is_valid_token(self, token: str) -> bool:
+        return hmac.compare_digest(token.encode("utf-8", "replace"), self.token.encode())
 
 
 class AuthVerifier:

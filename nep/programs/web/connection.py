@@ -81,7 +81,7 @@ class PageConnection:
         """Encode a message of a topic. Raises `NepError` if the protocol can't represent the message."""
         raise NotImplementedError
 
-    def _warn(self, sentence: str) -> None:
+    def _warn(self, message: str) -> None:
         """Send a warning to the page."""
         raise NotImplementedError
 
@@ -116,8 +116,8 @@ class PageConnection:
         request = self._connection.request
         if request is None:
             return "", "", "", ""
-        found = (request.headers.get_all(name) for name in ("Origin", "Referer", "User-Agent"))
-        origin, referer, user_agent = (each[0] if len(each) == 1 else "" for each in found)
+        headers = (request.headers.get_all(name) for name in ("Origin", "Referer", "User-Agent"))
+        origin, referer, user_agent = (each[0] if len(each) == 1 else "" for each in headers)
         return request.path, origin, referer, user_agent
 
     @property
@@ -204,9 +204,9 @@ class PageConnection:
     def _report_dropped(self, topic: str, count: int) -> None:
         self._counts.dropped += count
         self._dropped += count
-        said = ngettext(
+        template = ngettext(
             "this page is too slow: {count} message of '{topic}' was dropped",
             "this page is too slow: {count} messages of '{topic}' were dropped",
             count,
         )
-        self._warn(said.format(count=count, topic=topic))
+        self._warn(template.format(count=count, topic=topic))

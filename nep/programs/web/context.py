@@ -175,24 +175,24 @@ class PageContext:
         self._refused_at: dict[str, float] = {}
         self._refused_lock = threading.Lock()
 
-    async def run_in_thread(self, function: Callable[_P, _T], *args: _P.args, **named: _P.kwargs) -> _T:
+    async def run_in_thread(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Call a function in the page's thread, because the function waits for the network.
 
         Calls are executed in order.
         """
         loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._thread, lambda: function(*args, **named))
+        return await loop.run_in_executor(self._thread, lambda: function(*args, **kwargs))
 
     def motion_denial_reason(self, topic: str, msg_type: str) -> str:
         """Return and report the reason why the page may not publish on a topic; "" if it may.
 
         Thread-safe.
         """
-        refusal = self.guard.denial_reason(topic, msg_type)
-        if refusal:
+        reason = self.guard.denial_reason(topic, msg_type)
+        if reason:
             for robot in self.guard.denied_robots(topic, msg_type):
-                self._report_rejected(robot, refusal)
-        return refusal
+                self._report_rejected(robot, reason)
+        return reason
 
     def _report_rejected(self, robot: str, reason: str) -> None:
         now = time.monotonic()
@@ -205,20 +205,20 @@ class PageContext:
                 del self._refused_at[next(iter(self._refused_at))]
         self._on_robot_refused(robot, reason)
 
-    def send_status(self, level: Level, sentence: str, id_: OperationId = None) -> None:
+    def send_status(self, level: Level, message: str, id_: OperationId = None) -> None:
         """Send a status to the page unless its level is below the level that the page requested.
 
         Args:
             level: Level of the status.
-            sentence: Message for the page.
+            message: Message for the page.
             id_: Id of the operation that caused the status, if any.
         """
         if LEVELS.index(level) < LEVELS.index(self.level):
             return
         if self._send_status is not None:
-            self._send_status(level, sentence)
+            self._send_status(level, message)
             return
-        status: dict[str, object] = {"op": "status", "level": level, "msg": sentence}
+        status: dict[str, object] = {"op": "status", "level": level, "msg": message}
         if id_ is not None:
             status["id"] = id_
         self.queue.put(operation_frames(status, EncodingOptions()))

@@ -165,13 +165,13 @@ def _typed_array_fields(value: object, kinds: list[tuple[str, FieldKind]]) -> di
     for name, kind in kinds:
         if name not in value:
             continue
-        inside = value[name]
+        field_value = value[name]
         if kind.element is not None and kind.element.name in _TYPED_ARRAYS:
-            packed[name] = _pack_typed_array(inside, kind.element.name)
-        elif kind.fields and isinstance(inside, Mapping):
+            packed[name] = _pack_typed_array(field_value, kind.element.name)
+        elif kind.fields and isinstance(field_value, Mapping):
             packed[name] = {
-                **inside,
-                **_typed_array_fields(inside, [(each.name, each.kind) for each in kind.fields]),
+                **field_value,
+                **_typed_array_fields(field_value, [(each.name, each.kind) for each in kind.fields]),
             }
     return packed
 

@@ -30,8 +30,8 @@ class RateMeter:
         """Count a message of this size."""
         self.total += 1
         number = int(self._clock() / _SLOT_S)
-        known, messages, size = self._slots[number % len(self._slots)]
-        if known != number:
+        slot_number, messages, size = self._slots[number % len(self._slots)]
+        if slot_number != number:
             messages = size = 0
         self._slots[number % len(self._slots)] = number, messages + 1, size + size_bytes
 

@@ -75,19 +75,19 @@ class Feed:
         """Number of the page's subscriptions that share the feed."""
         return len(self._wishes)
 
-    def subscribe(self, wish: Subscribe, *, as_pixels: bool) -> None:
+    def subscribe(self, request: Subscribe, *, as_pixels: bool) -> None:
         """Add a subscription, or replace the one with the same id.
 
         A further subscription receives the latched messages again.
 
         Args:
-            wish: Subscription that the page requests.
+            request: Subscription that the page requests.
             as_pixels: Send images as the pixels of ``sensor_msgs/Image``.
         """
-        if self._wishes and wish.id not in self._wishes:
-            for each in tuple(self._latched.values()):
-                self.add(each)
-        self._wishes[wish.id] = wish
+        if self._wishes and request.id not in self._wishes:
+            for message in tuple(self._latched.values()):
+                self.add(message)
+        self._wishes[request.id] = request
         self._update_options(as_pixels=as_pixels)
 
     def unsubscribe(self, id_: OperationId) -> bool:
@@ -96,14 +96,14 @@ class Feed:
         Returns:
             False if there was no such subscription.
         """
-        found = bool(self._wishes) if id_ is None else id_ in self._wishes
+        was_subscribed = bool(self._wishes) if id_ is None else id_ in self._wishes
         if id_ is None:
             self._wishes.clear()
         else:
             self._wishes.pop(id_, None)
         if self._wishes:
             self._update_options(as_pixels=self.form.as_pixels)
-        return found
+        return was_subscribed
 
     def _update_options(self, *, as_pixels: bool) -> None:
         wishes = self._wishes.values()

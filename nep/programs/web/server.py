@@ -239,17 +239,17 @@ class WebServer:
             )
 
     def _disconnect(self, is_chosen: Callable[[Page | FoxglovePage, Access], bool], reason: str) -> int:
-        found = [
+        pages = [
             page
             for page, access in self._pages.copy().items()
             if not page.is_closing and is_chosen(page, access)
         ]
-        for page in found:
+        for page in pages:
             page.is_closing = True
             if self._loop is not None:
                 with suppress(RuntimeError):  # the event loop is closed
                     self._loop.call_soon_threadsafe(page.start_closing, reason)
-        return len(found)
+        return len(pages)
 
     def start(self) -> Self:
         """Start the server and wait until pages can connect.
@@ -397,29 +397,34 @@ class WebServer:
         access = self.settings.access
         origins = request.headers.get_all("Origin")
         origin = origins[0] if origins else None
-        refusal: _HandshakeRejection | None
+        rejection: _HandshakeRejection | None
         if len(origins) > 1:
-            refusal = _HandshakeRejection(
+            rejection = _HandshakeRejection(
                 HTTPStatus.FORBIDDEN, "other", _("the request has more than one Origin header")
             )
         elif len(self._pages) + self._locked >= MAX_PAGES:
-            refusal = _HandshakeRejection(HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("too many connections"))
-        elif said := access.origin_rejection_reason(origin, server_origin(connection)):
-            refusal = _HandshakeRejection(HTTPStatus.FORBIDDEN, "origin", said)
+            rejection = _HandshakeRejection(
+                HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("too many connections")
+            )
+        elif reason := access.origin_rejection_reason(origin, server_origin(connection)):
+            rejection = _HandshakeRejection(HTTPStatus.FORBIDDEN, "origin", reason)
         elif self._kept_out.is_blocked(connection, request):
-            refusal = _HandshakeRejection(
+            rejection = _HandshakeRejection(
                 HTTPStatus.FORBIDDEN, "kept out", _("the user disconnected this page")
             )
         elif not (self.settings.rosbridge or is_offered(request.headers.get_all("Sec-WebSocket-Protocol"))):
-            refusal = _HandshakeRejection(HTTPStatus.FORBIDDEN, "other", _("rosbridge is turned off"))
+            rejection = _HandshakeRejection(HTTPStatus.FORBIDDEN, "other", _("rosbridge is turned off"))
         else:
-            refusal = self._token_rejection(connection, request, access)
-        if refusal is None:
+            rejection = self._token_rejection(connection, request, access)
+        if rejection is None:
             return None
         self._record_rejection(
-            connection, refusal.kind, refusal.message, (origin or "") if refusal.kind == "origin" else ""
+            connection,
+            rejection.kind,
+            rejection.message,
+            (origin or "") if rejection.kind == "origin" else "",
         )
-        return connection.respond(refusal.status, refusal.message + "\n")
+        return connection.respond(rejection.status, rejection.message + "\n")
 
     def _page_response(self, connection: ServerConnection, request: Request) -> Response:
         """Return the response to an HTTP request for one of the server's own pages."""
@@ -428,23 +433,23 @@ class WebServer:
 
         authorizations = request.headers.get_all("Authorization")
         method = getattr(request, "method", "GET")  # websockets before 17 refuses other methods itself
-        asked = PageRequest(
+        page_request = PageRequest(
             method,
             request.path,
             tuple(request.headers.get_all("Host")),
             server_origin(connection),
             authorizations[0] if len(authorizations) == 1 else None,
         )
-        found = respond(asked, self.settings.access)
-        if found.is_token_rejected:
+        page_response = respond(page_request, self.settings.access)
+        if page_response.is_token_rejected:
             self._record_rejection(
                 connection, "token", _("a page connected without the token or with a wrong one")
             )
-        headers = Headers(found.headers)
+        headers = Headers(page_response.headers)
         headers["Connection"] = "close"
-        headers["Content-Length"] = str(len(found.body))
-        body = b"" if method == "HEAD" else found.body
-        return Response(found.status.value, found.status.phrase, headers, body)
+        headers["Content-Length"] = str(len(page_response.body))
+        body = b"" if method == "HEAD" else page_response.body
+        return Response(page_response.status.value, page_response.status.phrase, headers, body)
 
     def _token_rejection(
         self, connection: ServerConnection, request: Request, access: Access
@@ -474,23 +479,23 @@ class WebServer:
         return next((each for each in offered if each in SUBPROTOCOLS), None)
 
     def _record_rejection(
-        self, connection: ServerConnection, kind: RejectionKind, said: str, origin: str = ""
+        self, connection: ServerConnection, kind: RejectionKind, message: str, origin: str = ""
     ) -> None:
-        who = escaped((origin or host_of(connection))[:200])
-        self._add_rejection(Rejection(time.time(), who, said, origin[:200], kind))
+        source = escaped((origin or host_of(connection))[:200])
+        self._add_rejection(Rejection(time.time(), source, message, origin[:200], kind))
         self.counts.turned_away += 1
         if is_logged(self.counts.turned_away):
-            where = address_of(connection)
-            _logger.warning("refused %s: %s (%d so far)", where, said, self.counts.turned_away)
+            address = address_of(connection)
+            _logger.warning("refused %s: %s (%d so far)", address, message, self.counts.turned_away)
 
-    def _record_robot_rejection(self, connection: ServerConnection, robot: str, said: str) -> None:
-        who = escaped((origin_of(connection) or host_of(connection))[:200])
-        self._add_rejection(Rejection(time.time(), who, said, kind="robot", robot=escaped(robot[:200])))
+    def _record_robot_rejection(self, connection: ServerConnection, robot: str, message: str) -> None:
+        source = escaped((origin_of(connection) or host_of(connection))[:200])
+        self._add_rejection(Rejection(time.time(), source, message, kind="robot", robot=escaped(robot[:200])))
 
-    def _add_rejection(self, refusal: Rejection) -> None:
+    def _add_rejection(self, rejection: Rejection) -> None:
         with self._refusals_lock:
-            others = (each for each in self._refusals if replace(each, time_s=refusal.time_s) != refusal)
-            self._refusals = (*others, refusal)[-_MAX_REJECTIONS:]
+            others = (each for each in self._refusals if replace(each, time_s=rejection.time_s) != rejection)
+            self._refusals = (*others, rejection)[-_MAX_REJECTIONS:]
 
     async def _serve_page(self, guard: MotionGuard, connection: ServerConnection) -> None:
         access: Access = connection.access  # type: ignore[attr-defined]
@@ -533,13 +538,13 @@ class WebServer:
             )
         return Page(connection, name, self._new_node, guard, self.counts, report)
 
-    def _is_still_allowed(self, connection: ServerConnection, known: Access) -> bool:
-        """Return True if the current rules allow a page that was accepted under the rules `known`."""
+    def _is_still_allowed(self, connection: ServerConnection, previous_access: Access) -> bool:
+        """Return True if the current rules allow a page accepted under the rules `previous_access`."""
         access = self.settings.access
         if not self.settings.rosbridge and connection.subprotocol not in SUBPROTOCOLS:
             return False
         is_refused = access.origin_rejection_reason(origin_of(connection), server_origin(connection))
-        return not is_refused and (not access.token or access.token == known.token)
+        return not is_refused and (not access.token or access.token == previous_access.token)
 
     async def _is_authenticated(self, connection: ServerConnection, auth: AuthVerifier) -> bool:
         self._locked += 1
@@ -548,8 +553,8 @@ class WebServer:
                 return True
         finally:
             self._locked -= 1
-        said = _("a token is required; connect to ws://HOST:PORT/?token=TOKEN")
-        self._record_rejection(connection, "token", said)
+        message = _("a token is required; connect to ws://HOST:PORT/?token=TOKEN")
+        self._record_rejection(connection, "token", message)
         await connection.close(_POLICY_VIOLATION, "the token is missing or wrong")
         return False
 

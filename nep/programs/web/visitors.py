@@ -39,22 +39,22 @@ def client_name(user_agent: str, *, is_foxglove: bool = False) -> str:
         user_agent: User-Agent header, which is untrusted. Names of programs are shortened.
         is_foxglove: True if the client uses Foxglove's protocol, for which "Foxglove" is the default name.
     """
-    given = user_agent[:_MAX_READ_LENGTH]
+    agent = user_agent[:_MAX_READ_LENGTH]
     if is_foxglove:
-        return "Lichtblick" if "lichtblick" in given.lower() else "Foxglove"
+        return "Lichtblick" if "lichtblick" in agent.lower() else "Foxglove"
     for mark, name in _CLIENTS:
-        if mark in given:
+        if mark in agent:
             return name
-    product = _PRODUCT_TOKEN.match(given)
+    product = _PRODUCT_TOKEN.match(agent)
     return "" if product is None or product[0] == "Mozilla" else product[0][:MAX_DISPLAYED_LENGTH]
 
 
 def device_kind(user_agent: str) -> Device:
     """Return the kind of device according to a User-Agent; "" for a computer or an unknown device."""
-    given = user_agent[:_MAX_READ_LENGTH]
-    if "iPhone" in given or ("Android" in given and "Mobile" in given):
+    agent = user_agent[:_MAX_READ_LENGTH]
+    if "iPhone" in agent or ("Android" in agent and "Mobile" in agent):
         return "phone"
-    return "tablet" if any(mark in given for mark in ("iPad", "Android", "Tablet")) else ""
+    return "tablet" if any(mark in agent for mark in ("iPad", "Android", "Tablet")) else ""
 
 
 def page_title(path: str, referer: str, origin: str) -> str:
@@ -66,8 +66,8 @@ def page_title(path: str, referer: str, origin: str) -> str:
         origin: Origin of the page, which every browser sends. Its host and port have the lowest priority.
     """
     for title in (_title_parameter(path), _last_part(referer), _host(origin)):
-        if shown := escaped(title.strip())[:MAX_DISPLAYED_LENGTH]:
-            return shown
+        if display_title := escaped(title.strip())[:MAX_DISPLAYED_LENGTH]:
+            return display_title
     return ""
 
 

@@ -27,10 +27,10 @@ def write_frame(stream: IO[bytes], content: Mapping[str, object]) -> None:
 
 def read_frame(stream: IO[bytes]) -> dict[str, object] | None:
     """Read a frame; return None at the end of the stream or if the data is invalid. Raises `OSError`."""
-    head = stream.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
+    header = stream.read(_LENGTH.size)
+    if len(header) < _LENGTH.size:
         return None
-    (length,) = _LENGTH.unpack(head)
+    (length,) = _LENGTH.unpack(header)
     packed = stream.read(length) if length <= _MAX_FRAME_BYTES else b""
     if len(packed) < length:
         return None
@@ -55,15 +55,15 @@ def corruption_to_plain(damage: Iterable[CorruptRange]) -> list[dict[str, object
     return [asdict(each) for each in damage]
 
 
-def corruption_from_plain(plain: object) -> tuple[CorruptRange, ...]:
+def corruption_from_plain(value: object) -> tuple[CorruptRange, ...]:
     """Convert plain values of a frame to the damage of a file. Raises `TypeError` for invalid data."""
-    return tuple(CorruptRange(**each) for each in plain) if isinstance(plain, list) else ()
+    return tuple(CorruptRange(**each) for each in value) if isinstance(value, list) else ()
 
 
-def file_info_to_plain(facts: FileInfo) -> dict[str, object]:
+def file_info_to_plain(info: FileInfo) -> dict[str, object]:
     """Convert the properties of a file to plain values for a frame."""
     return {
-        **{name: getattr(facts, name) for name in _SCALAR_FIELDS},
+        **{name: getattr(info, name) for name in _SCALAR_FIELDS},
         "channels": {
             number: (
                 each.topic,
@@ -73,34 +73,34 @@ def file_info_to_plain(facts: FileInfo) -> dict[str, object]:
                 each.schema_data,
                 each.metadata,
             )
-            for number, each in facts.channels.items()
+            for number, each in info.channels.items()
         },
-        "counts": dict(facts.counts),
-        "metadata": [(name, dict(values)) for name, values in facts.metadata],
-        "attachments": [asdict(each) for each in facts.attachments],
-        "compressions": dict(facts.compressions),
+        "counts": dict(info.counts),
+        "metadata": [(name, dict(values)) for name, values in info.metadata],
+        "attachments": [asdict(each) for each in info.attachments],
+        "compressions": dict(info.compressions),
     }
 
 
 _SCALAR_FIELDS = ("start_ns", "end_ns", "size_bytes", "is_complete", "profile", "library")
 
 
-def file_info_from_plain(plain: object) -> FileInfo:
+def file_info_from_plain(value: object) -> FileInfo:
     """Convert plain values of a frame to the properties of a file.
 
     Raises `TypeError` or `KeyError` for invalid data.
     """
-    if not isinstance(plain, dict):
+    if not isinstance(value, dict):
         raise TypeError("facts")
     definitions = {
         number: ChannelDefinition(topic, encoding, name, kind, data, tuple(map(tuple, metadata)))
-        for number, (topic, encoding, name, kind, data, metadata) in plain["channels"].items()
+        for number, (topic, encoding, name, kind, data, metadata) in value["channels"].items()
     }
     return FileInfo(
         channels=definitions,
-        counts=plain["counts"],
-        metadata=tuple((name, values) for name, values in plain["metadata"]),
-        attachments=tuple(AttachedFile(**each) for each in plain["attachments"]),
-        compressions=plain["compressions"],
-        **{name: plain[name] for name in _SCALAR_FIELDS},
+        counts=value["counts"],
+        metadata=tuple((name, values) for name, values in value["metadata"]),
+        attachments=tuple(AttachedFile(**each) for each in value["attachments"]),
+        compressions=value["compressions"],
+        **{name: value[name] for name in _SCALAR_FIELDS},
     )

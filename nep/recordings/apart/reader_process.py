@@ -39,11 +39,11 @@ class RecordingService:
     """Executor of the requests of another process.
 
     Args:
-        tell: Called with the content of progress frames.
+        report_progress: Called with the content of progress frames.
     """
 
-    def __init__(self, tell: Callable[[Reply], object]) -> None:
-        self._report_progress = tell
+    def __init__(self, report_progress: Callable[[Reply], object]) -> None:
+        self._report_progress = report_progress
         self._files: dict[int, FileReader] = {}
         self._numbers = count(1)
         self._reported_damage: dict[int, int] = {}
@@ -79,7 +79,7 @@ class RecordingService:
         self._add_corruption(answer, request.get("file", answer.get("file")))
         return answer
 
-    def _add_corruption(self, answer: dict[str, object], number: object) -> None:
+    def _add_corruption(self, reply: dict[str, object], number: object) -> None:
         # Adds the damage of a file if it has grown since the last reply.
         file = self._files.get(number) if isinstance(number, int) else None
         if file is None or not isinstance(number, int):
@@ -87,14 +87,14 @@ class RecordingService:
         damage = file.corruption
         if len(damage) != self._reported_damage.get(number, 0):
             self._reported_damage[number] = len(damage)
-            answer["damage"] = corruption_to_plain(damage)
+            reply["damage"] = corruption_to_plain(damage)
 
     def _open(self, request: Mapping[str, Any]) -> Reply:
         path = Path(request["path"])
         budget = None if request["budget"] is None else ReadBudget(path, *request["budget"])
 
-        def progress(done: int, whole: int) -> None:
-            self._report_progress({"progress": (done, whole)})
+        def progress(done: int, total: int) -> None:
+            self._report_progress({"progress": (done, total)})
 
         file = FileReader(path, cache_bytes=request["cache_bytes"], progress=progress, budget=budget)
         number = next(self._numbers)
@@ -130,10 +130,10 @@ class RecordingService:
         return {"cursor": number, "messages": pack_messages(batch)}
 
     def _newest(self, request: Mapping[str, Any]) -> Reply:
-        found = self._files[request["file"]].newest(request["at_ns"], request["groups"])
+        messages = self._files[request["file"]].newest(request["at_ns"], request["groups"])
         return {
-            "are_there": [each is not None for each in found],
-            "messages": pack_messages(each for each in found if each is not None),
+            "are_there": [each is not None for each in messages],
+            "messages": pack_messages(each for each in messages if each is not None),
         }
 
     def _newest_times(self, request: Mapping[str, Any]) -> Reply:
@@ -165,16 +165,16 @@ def _limit_memory(limit_mb: int) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (limit_mb * 2**20, limit_mb * 2**20))
 
 
-def serve(requests: IO[bytes], answers: IO[bytes]) -> None:
+def serve(requests: IO[bytes], replies: IO[bytes]) -> None:
     """Execute requests until the input stream ends.
 
     Args:
         requests: Stream of request frames.
-        answers: Stream to which progress and reply frames are written.
+        replies: Stream to which progress and reply frames are written.
     """
-    service = RecordingService(lambda content: write_frame(answers, content))
+    service = RecordingService(lambda content: write_frame(replies, content))
     while (request := read_frame(requests)) is not None:
-        write_frame(answers, service.reply(request))
+        write_frame(replies, service.reply(request))
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -82,8 +82,8 @@ class ReaderProcess:
                 self._pipe = _Pipe(self._command, path)
             pipe = self._pipe
         request = {"op": "open", "path": str(path), "cache_bytes": cache_bytes, "budget": budget}
-        answer = pipe.request(path, request, self._timeout_s, progress)
-        return Recording(path, file=_RemoteFile(pipe, path, answer, self._timeout_s))
+        reply = pipe.request(path, request, self._timeout_s, progress)
+        return Recording(path, file=_RemoteFile(pipe, path, reply, self._timeout_s))
 
     def close(self) -> None:
         """Kill the process; concurrent reads raise `ClosedError`. Idempotent."""
@@ -155,29 +155,29 @@ class _Pipe:
                     write_frame(stdin, request)
             while True:
                 try:
-                    answer = self._answers.get(timeout=timeout_s)
+                    reply = self._answers.get(timeout=timeout_s)
                 except queue.Empty:
                     self._kill()
                     raise RecordingTooLargeError(str(path), _("reading the file takes too long")) from None
-                if answer is None:
+                if reply is None:
                     self._answers.put(None)
                     self._check(path)
                     self._kill()
                     reason = _("the process that reads the file stopped; the file may be damaged")
                     raise RecordingError(str(path), reason)
-                if "progress" not in answer:
+                if "progress" not in reply:
                     break
-                done = answer["progress"]
+                reported = reply["progress"]
                 try:
-                    if progress is not None and isinstance(done, list):
-                        progress(*done)
+                    if progress is not None and isinstance(reported, list):
+                        progress(*reported)
                 except BaseException:
                     self._kill()
                     raise
-        if "error" in answer:
-            kind = RecordingTooLargeError if answer.get("is_too_large") else RecordingError
-            raise kind(str(answer.get("path") or path), str(answer["error"]))
-        return answer
+        if "error" in reply:
+            kind = RecordingTooLargeError if reply.get("is_too_large") else RecordingError
+            raise kind(str(reply.get("path") or path), str(reply["error"]))
+        return reply
 
     def _check(self, path: Path) -> None:
         if self._was_ended:
@@ -222,11 +222,11 @@ class _RemoteFile:
     def _request(self, op: str, **request: object) -> dict[str, Any]:
         if self._is_closed:
             raise ClosedError(f"recording '{self._path.name}'")
-        asked = {"op": op, "file": self._number, **request}
-        answer = self._pipe.request(self._path, asked, self._timeout_s)
-        if "damage" in answer:
-            self._damage = corruption_from_plain(answer["damage"])
-        return answer
+        content = {"op": op, "file": self._number, **request}
+        reply = self._pipe.request(self._path, content, self._timeout_s)
+        if "damage" in reply:
+            self._damage = corruption_from_plain(reply["damage"])
+        return reply
 
     def read_raw(
         self,
@@ -237,28 +237,28 @@ class _RemoteFile:
     ) -> Iterator[RawMessage]:
         if not channels:
             return
-        most = _FIRST_BATCH
-        answer = self._request(
+        max_count = _FIRST_BATCH
+        reply = self._request(
             "raw",
             start_ns=_clamp_time(start_ns),
             end_ns=_clamp_time(end_ns),
             channels=list(channels),
             pieces=None if pieces is None else list(pieces),
-            most=most,
+            most=max_count,
         )
-        while answer["cursor"]:
-            for record in messages_in(answer["messages"]):
+        while reply["cursor"]:
+            for record in messages_in(reply["messages"]):
                 if isinstance(record, RawMessage):
                     yield record
-            most = min(_GROWTH * most, _MAX_BATCH)
-            answer = self._request("next", cursor=answer["cursor"], most=most)
+            max_count = min(_GROWTH * max_count, _MAX_BATCH)
+            reply = self._request("next", cursor=reply["cursor"], most=max_count)
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
         if not groups:
             return []
-        answer = self._request("newest", at_ns=_clamp_time(at_ns), groups=[list(each) for each in groups])
-        messages = (each for each in messages_in(answer["messages"]) if isinstance(each, RawMessage))
-        return [next(messages, None) if is_there else None for is_there in answer["are_there"]]
+        reply = self._request("newest", at_ns=_clamp_time(at_ns), groups=[list(each) for each in groups])
+        messages = (each for each in messages_in(reply["messages"]) if isinstance(each, RawMessage))
+        return [next(messages, None) if has_message else None for has_message in reply["are_there"]]
 
     def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
         times: dict[int, int] = self._request(
@@ -270,8 +270,8 @@ class _RemoteFile:
         self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
     ) -> dict[int, Sequence[int]]:
         span = {"start_ns": _clamp_time(start_ns), "end_ns": _clamp_time(end_ns)}
-        answer = self._request("densities", **span, buckets=buckets, channels=list(channels))
-        counts: dict[int, Sequence[int]] = answer["counts"]
+        reply = self._request("densities", **span, buckets=buckets, channels=list(channels))
+        counts: dict[int, Sequence[int]] = reply["counts"]
         return counts
 
     def chunks_with(self, channels: Collection[int]) -> Sequence[int]:

@@ -146,9 +146,9 @@ def _pack_extra(extra: Mapping[str, Any]) -> bytes:
     try:
         return pack(extra)
     except ValueError:  # an extension or number that can't have been received from a wire
-        plain = {key: value for key, value in extra.items() if key != "extension"}
-        numbers = {key: max(-(2**63), min(each, _U64)) for key, each in plain.items() if type(each) is int}
-        return pack(plain | numbers)
+        filtered = {key: value for key, value in extra.items() if key != "extension"}
+        numbers = {key: max(-(2**63), min(each, _U64)) for key, each in filtered.items() if type(each) is int}
+        return pack(filtered | numbers)
 
 
 def _determine_form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:

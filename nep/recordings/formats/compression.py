@@ -60,51 +60,51 @@ def compress(data: bytes, compression: str) -> bytes:
     return data
 
 
-def decompress(data: memoryview, head: ChunkHead) -> bytes | memoryview:
+def decompress(data: memoryview, header: ChunkHead) -> bytes | memoryview:
     """Decompress the records of a chunk, and verify the size and the CRC.
 
     Memory is limited to the declared size plus one step, and the declared size to `max_chunk_bytes`.
 
     Args:
         data: Compressed data.
-        head: Header of the chunk.
+        header: Header of the chunk.
 
     Raises:
         ValueError: The chunk is damaged or too large.
     """
-    size = head.uncompressed_bytes
-    if size > max_chunk_bytes(head.data_bytes):
+    size = header.uncompressed_bytes
+    if size > max_chunk_bytes(header.data_bytes):
         raise ValueError("too large")
     result: bytes | memoryview
     try:
-        if not head.compression:
+        if not header.compression:
             result = data
-        elif head.compression == "zstd" and zstandard.frame_content_size(data) == size:
+        elif header.compression == "zstd" and zstandard.frame_content_size(data) == size:
             result = zstandard.ZstdDecompressor(max_window_size=_MAX_WINDOW_BYTES).decompress(data)
         else:
-            result = _join(_decompress_stream(data, head.compression, size + 1))
+            result = _join(_decompress_stream(data, header.compression, size + 1))
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
         raise ValueError(str(error)) from error
     if len(result) != size:
         raise ValueError("size")
-    if head.crc and zlib.crc32(result) != head.crc:
+    if header.crc and zlib.crc32(result) != header.crc:
         raise ValueError("crc")
     return result
 
 
-def decompress_partial(data: memoryview, head: ChunkHead) -> bytes | memoryview:
+def decompress_partial(data: memoryview, header: ChunkHead) -> bytes | memoryview:
     """Decompress as many records as possible from a truncated chunk, without verification.
 
     Args:
         data: First bytes of the compressed data.
-        head: Header of the chunk.
+        header: Header of the chunk.
     """
-    if not head.compression:
+    if not header.compression:
         return data
-    size = min(head.uncompressed_bytes, max_chunk_bytes(head.data_bytes))
+    size = min(header.uncompressed_bytes, max_chunk_bytes(header.data_bytes))
     buffer = bytearray()
     try:
-        for piece in _decompress_stream(data, head.compression, size, _PART_STEP_BYTES):
+        for piece in _decompress_stream(data, header.compression, size, _PART_STEP_BYTES):
             buffer += piece
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):
         pass  # pieces before the cut are intact
@@ -130,10 +130,10 @@ def _decompress_stream(
                 yield piece
         return
     with lz4_frame.LZ4FrameDecompressor() as lz4:
-        at = 0
-        while most_bytes > 0 and not lz4.eof and (at < len(data) or not lz4.needs_input):
-            part = data[at : at + step_bytes] if lz4.needs_input else b""
-            at += len(part)
+        offset = 0
+        while most_bytes > 0 and not lz4.eof and (offset < len(data) or not lz4.needs_input):
+            part = data[offset : offset + step_bytes] if lz4.needs_input else b""
+            offset += len(part)
             decoded: bytes = lz4.decompress(part, max_length=min(step_bytes, most_bytes))
             most_bytes -= len(decoded)
             if decoded:

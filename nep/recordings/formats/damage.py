@@ -22,26 +22,28 @@ def corruption_text(damage: Sequence[CorruptRange], start_ns: int) -> str:
     """
     if not damage:
         return ""
-    known = [each.message_count for each in damage]
+    counts = [each.message_count for each in damage]
     start_ns = start_ns or damage[0].start_ns
-    places = "; ".join(_format_range(each, start_ns) for each in damage[:_MAX_RANGES_LISTED])
+    ranges_text = "; ".join(_format_range(each, start_ns) for each in damage[:_MAX_RANGES_LISTED])
     if len(damage) > _MAX_RANGES_LISTED:
-        places += "; …"
+        ranges_text += "; …"
     summary = ngettext(
         "{count} part of the file is damaged and was skipped ({places})",
         "{count} parts of the file are damaged and were skipped ({places})",
         len(damage),
-    ).format(count=len(damage), places=places)
-    if any(each is None for each in known):
+    ).format(count=len(damage), places=ranges_text)
+    if any(each is None for each in counts):
         return _("{damage}; the number of missing messages is unknown").format(damage=summary)
-    missing = sum(each or 0 for each in known)
+    missing = sum(each or 0 for each in counts)
     return ngettext(
         "{damage}; {count} message is missing", "{damage}; {count} messages are missing", missing
     ).format(damage=summary, count=missing)
 
 
-def _format_range(each: CorruptRange, start_ns: int) -> str:
-    if not each.end_ns:
-        return _("{size} bytes at byte {offset}").format(size=each.length, offset=each.offset)
-    begin, end = ((at_ns - start_ns) / 1e9 for at_ns in (each.start_ns, each.end_ns))
+def _format_range(corrupt_range: CorruptRange, start_ns: int) -> str:
+    if not corrupt_range.end_ns:
+        return _("{size} bytes at byte {offset}").format(
+            size=corrupt_range.length, offset=corrupt_range.offset
+        )
+    begin, end = ((at_ns - start_ns) / 1e9 for at_ns in (corrupt_range.start_ns, corrupt_range.end_ns))
     return _("{begin} s to {end} s").format(begin=number(begin, ".1f"), end=number(end, ".1f"))

@@ -110,10 +110,10 @@ class SingleFile:
 
 def _file_identity(path: Path) -> tuple[int, int] | None:
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError:
         return None
-    return found.st_dev, found.st_ino
+    return status.st_dev, status.st_ino
 
 
 def disk_error(path: Path, error: OSError) -> RecordingError:

@@ -118,8 +118,8 @@ class RecordCounter:
             return
         self._count += 1
         if self._count > _MAX_OTHER_RECORDS:
-            said = _("the file contains more than {most} records other than messages")
-            raise RecordingTooLargeError(str(self._path), said.format(most=_MAX_OTHER_RECORDS))
+            template = _("the file contains more than {most} records other than messages")
+            raise RecordingTooLargeError(str(self._path), template.format(most=_MAX_OTHER_RECORDS))
 
 
 class Definitions:
@@ -149,24 +149,24 @@ class Definitions:
         Returns:
             Numbers of the channels that are now complete.
         """
-        most = _MAX_RECORD_SIZES.get(opcode, 0)
-        if not 2 <= len(content) <= most:
+        max_size = _MAX_RECORD_SIZES.get(opcode, 0)
+        if not 2 <= len(content) <= max_size:
             return []
-        whole = bytes(content)
-        key = (opcode, int.from_bytes(whole[:2], "little"))
-        mark = hash(whole)
+        record_bytes = bytes(content)
+        key = (opcode, int.from_bytes(record_bytes[:2], "little"))
+        mark = hash(record_bytes)
         if self._read.get(key) == mark or self._size_bytes > _MAX_DEFINITION_BYTES:
             return []
         self._read[key] = mark
-        self._size_bytes += len(whole)
+        self._size_bytes += len(record_bytes)
         try:
-            made = read_record("Schema" if opcode == Opcode.SCHEMA else "Channel", whole)
+            record = read_record("Schema" if opcode == Opcode.SCHEMA else "Channel", record_bytes)
         except ValueError:
             return []
-        channels = [made]
+        channels = [record]
         if opcode == Opcode.SCHEMA:
-            self._schemas[made.id] = made
-            channels = list(self._without_schema.pop(made.id, {}).values())
+            self._schemas[record.id] = record
+            channels = list(self._without_schema.pop(record.id, {}).values())
         for channel in channels:
             self._add_channel(channel)
         return [channel.id for channel in channels]
@@ -228,12 +228,12 @@ def read_index(
     file.seek(0)
     if file.read(len(MAGIC)) != MAGIC:
         raise RecordingError(str(path), _("not an MCAP file"))
-    work = budget or open_budget(path, size)
+    work_budget = budget or open_budget(path, size)
     footer = _footer(file, size)
-    index = None if footer is None else _SummaryReader(file, path, size, work).read(footer)
+    index = None if footer is None else _SummaryReader(file, path, size, work_budget).read(footer)
     if index is None:
         data_end = size if footer is None else size - _FOOTER_BYTES
-        index = _Scanner(file, path, size, work, progress, data_end).run()
+        index = _Scanner(file, path, size, work_budget, progress, data_end).run()
         index.is_complete = footer is not None
     _read_header(file, index)
     index.chunks.sort(key=lambda each: each.start_ns)
@@ -253,29 +253,29 @@ def _footer(file: BinaryIO, size: int) -> bytes | None:
 
 def _read_header(file: BinaryIO, index: FileIndex) -> None:
     file.seek(len(MAGIC))
-    head = file.read(HEAD_BYTES)
-    if len(head) < HEAD_BYTES:
+    record_head = file.read(HEAD_BYTES)
+    if len(record_head) < HEAD_BYTES:
         return
-    opcode, length = RECORD_HEAD.unpack(head)
+    opcode, length = RECORD_HEAD.unpack(record_head)
     if opcode == Opcode.HEADER and length <= _MAX_HEADER_BYTES:
         with suppress(ValueError):
             header = read_record("Header", file.read(length))
             index.profile, index.library = header.profile, header.library
 
 
-def _read_content(file: BinaryIO, place: RecordLocation) -> bytes:
-    if len(place.prefix) == place.length:
-        return place.prefix
-    file.seek(place.offset + HEAD_BYTES)
-    return file.read(place.length)
+def _read_content(file: BinaryIO, location: RecordLocation) -> bytes:
+    if len(location.prefix) == location.length:
+        return location.prefix
+    file.seek(location.offset + HEAD_BYTES)
+    return file.read(location.length)
 
 
-def _read_metadata(file: BinaryIO, place: RecordLocation, index: FileIndex) -> None:
-    index.metadata_bytes += place.length
-    if not 0 < place.length <= MAX_RECORD_BYTES or index.metadata_bytes > _MAX_METADATA_BYTES:
+def _read_metadata(file: BinaryIO, location: RecordLocation, index: FileIndex) -> None:
+    index.metadata_bytes += location.length
+    if not 0 < location.length <= MAX_RECORD_BYTES or index.metadata_bytes > _MAX_METADATA_BYTES:
         return
     with suppress(ValueError):
-        record = read_record("Metadata", _read_content(file, place))
+        record = read_record("Metadata", _read_content(file, location))
         index.metadata.append((record.name, record.metadata))
 
 
@@ -301,51 +301,51 @@ class _SummaryReader:
         if not len(MAGIC) <= start < end or not self._is_crc_valid(start, end, footer):
             return None
         try:
-            for place in walk_records(self._file, end, self._budget, start):
-                self._add(place)
+            for location in walk_records(self._file, end, self._budget, start):
+                self._add(location)
         except ValueError:
             return None
         index = self._index
         return index if index.chunks and self._is_plausible(start) else None
 
     def _is_crc_valid(self, start: int, end: int, footer: bytes) -> bool:
-        wanted = int.from_bytes(footer[25:29], "little")
-        if not wanted:
+        expected_crc = int.from_bytes(footer[25:29], "little")
+        if not expected_crc:
             return True
         self._budget.spend(end - start)
         self._file.seek(start)
-        crc, left = 0, end - start
-        while left and (block := self._file.read(min(left, _READ_BYTES))):
-            crc, left = zlib.crc32(block, crc), left - len(block)
-        return zlib.crc32(footer[:25], crc) == wanted
+        crc, remaining = 0, end - start
+        while remaining and (block := self._file.read(min(remaining, _READ_BYTES))):
+            crc, remaining = zlib.crc32(block, crc), remaining - len(block)
+        return zlib.crc32(footer[:25], crc) == expected_crc
 
-    def _add(self, place: RecordLocation) -> None:
+    def _add(self, location: RecordLocation) -> None:
         # Raises `ValueError` for invalid entries.
-        index, opcode = self._index, place.opcode
+        index, opcode = self._index, location.opcode
         self._others.add(opcode)
         self._opcodes.add(opcode)
         if opcode == Opcode.CHUNK_INDEX:
-            self._add_chunk(read_chunk_info(_read_content(self._file, place)))
+            self._add_chunk(read_chunk_info(_read_content(self._file, location)))
         elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
-            if place.length <= _MAX_SCHEMA_BYTES:
-                index.definitions.add(opcode, _read_content(self._file, place))
-        elif opcode == Opcode.STATISTICS and place.length <= _MAX_METADATA_BYTES:
-            statistics = read_record("Statistics", _read_content(self._file, place))
+            if location.length <= _MAX_SCHEMA_BYTES:
+                index.definitions.add(opcode, _read_content(self._file, location))
+        elif opcode == Opcode.STATISTICS and location.length <= _MAX_METADATA_BYTES:
+            statistics = read_record("Statistics", _read_content(self._file, location))
             index.counts, self._message_count = statistics.channel_message_counts, statistics.message_count
             self._has_unlisted = {
                 Opcode.METADATA_INDEX: bool(statistics.metadata_count),
                 Opcode.ATTACHMENT_INDEX: bool(statistics.attachment_count),
             }
-        elif opcode == Opcode.METADATA_INDEX and place.length <= _MAX_HEADER_BYTES:
-            at = read_record("MetadataIndex", _read_content(self._file, place))
-            if at.offset + at.length <= index.end and self._is_new(at.offset):
+        elif opcode == Opcode.METADATA_INDEX and location.length <= _MAX_HEADER_BYTES:
+            entry = read_record("MetadataIndex", _read_content(self._file, location))
+            if entry.offset + entry.length <= index.end and self._is_new(entry.offset):
                 _read_metadata(
                     self._file,
-                    RecordLocation(at.offset, Opcode.METADATA, max(0, at.length - HEAD_BYTES)),
+                    RecordLocation(entry.offset, Opcode.METADATA, max(0, entry.length - HEAD_BYTES)),
                     index,
                 )
-        elif opcode == Opcode.ATTACHMENT_INDEX and place.length <= _MAX_HEADER_BYTES:
-            record = read_record("AttachmentIndex", _read_content(self._file, place))
+        elif opcode == Opcode.ATTACHMENT_INDEX and location.length <= _MAX_HEADER_BYTES:
+            record = read_record("AttachmentIndex", _read_content(self._file, location))
             if self._is_new(record.offset) and len(index.attachments) < _MAX_ATTACHMENTS:
                 index.attachments.append(AttachedFile(record.name, record.media_type, record.data_size))
 
@@ -370,7 +370,7 @@ class _SummaryReader:
 
     def _is_plausible(self, start: int) -> bool:
         # Chunks must not overlap, all channels must be known, and everything in the file must be listed.
-        index, known = self._index, self._index.definitions.channels
+        index, channels = self._index, self._index.definitions.channels
         if any(lacks and opcode not in self._opcodes for opcode, lacks in self._has_unlisted.items()):
             return False
         end = 0
@@ -378,7 +378,7 @@ class _SummaryReader:
             if info.offset < end or info.offset + info.length > start:
                 return False
             end = info.offset + info.length
-        if any(channel not in known for info in index.chunks for channel in info.channels):
+        if any(channel not in channels for info in index.chunks for channel in info.channels):
             return False
         if len(index.chunks) > _MAX_COUNTED_CHUNKS or not all(info.index_bytes for info in index.chunks):
             return True
@@ -413,14 +413,14 @@ class _Scanner:
         # Raises `RecordingTooLargeError`, `OSError`, and what `progress` raises.
         index, reported = self._index, 0
         is_closed = self._data_end < self._size
-        for place in walk_records(self._file, self._data_end, self._budget):
-            self._add(place)
-            index.end = place.end
+        for location in walk_records(self._file, self._data_end, self._budget):
+            self._add(location)
+            index.end = location.end
             if self._progress is not None and index.end - reported >= _READ_BYTES:
                 reported = index.end
                 self._progress(index.end, self._size)
-            if place.opcode == Opcode.DATA_END:
-                index.end = self._data_end if is_closed else place.end
+            if location.opcode == Opcode.DATA_END:
+                index.end = self._data_end if is_closed else location.end
                 break
         self._end_chunk()
         self._end_run()
@@ -433,42 +433,42 @@ class _Scanner:
             index.end = self._size
         return index
 
-    def _add(self, place: RecordLocation) -> None:
-        opcode = place.opcode
+    def _add(self, location: RecordLocation) -> None:
+        opcode = location.opcode
         if opcode == Opcode.MESSAGE:
             self._end_chunk()
-            self._add_message(place)
+            self._add_message(location)
             return
         if opcode == Opcode.MESSAGE_INDEX:
-            if self._chunk is not None and place.length >= 2:
-                self._offsets[int.from_bytes(place.prefix[:2], "little")] = place.offset
-                self._chunk.index_bytes += HEAD_BYTES + place.length
+            if self._chunk is not None and location.length >= 2:
+                self._offsets[int.from_bytes(location.prefix[:2], "little")] = location.offset
+                self._chunk.index_bytes += HEAD_BYTES + location.length
             return
         self._end_chunk()
         self._others.add(opcode)
-        if opcode == Opcode.CHUNK or place.length > _MAX_RUN_RECORD_BYTES:
+        if opcode == Opcode.CHUNK or location.length > _MAX_RUN_RECORD_BYTES:
             self._end_run()
         if opcode == Opcode.CHUNK:
-            self._start_chunk(place)
+            self._start_chunk(location)
         elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
-            if place.length <= _MAX_SCHEMA_BYTES:
-                self._index.definitions.add(opcode, _read_content(self._file, place))
+            if location.length <= _MAX_SCHEMA_BYTES:
+                self._index.definitions.add(opcode, _read_content(self._file, location))
         elif opcode == Opcode.METADATA:
-            _read_metadata(self._file, place, self._index)
+            _read_metadata(self._file, location, self._index)
         elif opcode == Opcode.ATTACHMENT:
-            self._add_attachment(place)
+            self._add_attachment(location)
 
     # -- messages outside of chunks
 
-    def _add_message(self, place: RecordLocation) -> None:
-        if place.length < MESSAGE_FIELDS_BYTES:
+    def _add_message(self, location: RecordLocation) -> None:
+        if location.length < MESSAGE_FIELDS_BYTES:
             return
-        channel, _sequence, log_ns = MESSAGE_START.unpack_from(place.prefix)
+        channel, _sequence, log_ns = MESSAGE_START.unpack_from(location.prefix)
         run = self._run
-        if run is None or place.end - run.offset > _MAX_RUN_BYTES:
+        if run is None or location.end - run.offset > _MAX_RUN_BYTES:
             self._end_run()
-            run = self._run = ChunkInfo(log_ns, log_ns, place.offset, 0, b"", 0, "", 0, 0, is_run=True)
-        run.length = place.end - run.offset
+            run = self._run = ChunkInfo(log_ns, log_ns, location.offset, 0, b"", 0, "", 0, 0, is_run=True)
+        run.length = location.end - run.offset
         if log_ns < run.start_ns:
             run.start_ns = log_ns
         elif log_ns > run.end_ns:
@@ -487,12 +487,14 @@ class _Scanner:
 
     # -- chunks
 
-    def _start_chunk(self, place: RecordLocation) -> None:
-        head = read_chunk_head(RECORD_HEAD.pack(place.opcode, place.length) + place.prefix, place.length)
-        if head is None:
-            self._index.corruption.append(CorruptRange(place.offset, HEAD_BYTES + place.length))
+    def _start_chunk(self, location: RecordLocation) -> None:
+        header = read_chunk_head(
+            RECORD_HEAD.pack(location.opcode, location.length) + location.prefix, location.length
+        )
+        if header is None:
+            self._index.corruption.append(CorruptRange(location.offset, HEAD_BYTES + location.length))
         else:
-            self._chunk = _chunk_info(place, head)
+            self._chunk = _chunk_info(location, header)
 
     def _end_chunk(self) -> None:
         # Called after the message indexes of the chunk.
@@ -500,40 +502,40 @@ class _Scanner:
             return
         chunk, self._chunk = self._chunk, None
         chunk.packed_offsets, self._offsets = pack_offsets(self._offsets), {}
-        known = self._index.definitions.channels
-        if not chunk.packed_offsets or not all(each in known for each in chunk.channels):
+        channels = self._index.definitions.channels
+        if not chunk.packed_offsets or not all(each in channels for each in chunk.channels):
             damage = _index_from_records(self._file, chunk, self._index.definitions, self._budget)
             self._index.corruption.extend(damage)
         if chunk.packed_offsets:
             self._index.chunks.append(chunk)
 
-    def _add_attachment(self, place: RecordLocation) -> None:
+    def _add_attachment(self, location: RecordLocation) -> None:
         if len(self._index.attachments) >= _MAX_ATTACHMENTS:
             return
-        self._file.seek(place.offset + HEAD_BYTES + 16)  # after its two times
-        begin = self._file.read(min(place.length, _MAX_HEADER_BYTES))
-        words, at = [], 0
+        self._file.seek(location.offset + HEAD_BYTES + 16)  # after its two times
+        begin = self._file.read(min(location.length, _MAX_HEADER_BYTES))
+        texts, offset = [], 0
         for _word in range(2):
-            end = at + 4 + int.from_bytes(begin[at : at + 4], "little")
+            end = offset + 4 + int.from_bytes(begin[offset : offset + 4], "little")
             if end + 4 > len(begin):
                 return
-            words.append(begin[at + 4 : end].decode("utf-8", "replace"))
-            at = end
-        size = int.from_bytes(begin[at : at + 8], "little")
-        self._index.attachments.append(AttachedFile(words[0], words[1], min(size, place.length)))
+            texts.append(begin[offset + 4 : end].decode("utf-8", "replace"))
+            offset = end
+        size = int.from_bytes(begin[offset : offset + 8], "little")
+        self._index.attachments.append(AttachedFile(texts[0], texts[1], min(size, location.length)))
 
 
-def _chunk_info(place: RecordLocation, head: ChunkHead) -> ChunkInfo:
+def _chunk_info(location: RecordLocation, header: ChunkHead) -> ChunkInfo:
     return ChunkInfo(
-        head.start_ns,
-        head.end_ns,
-        place.offset,
-        HEAD_BYTES + place.length,
+        header.start_ns,
+        header.end_ns,
+        location.offset,
+        HEAD_BYTES + location.length,
         b"",
         0,
-        head.compression,
-        head.data_bytes,
-        head.uncompressed_bytes,
+        header.compression,
+        header.data_bytes,
+        header.uncompressed_bytes,
     )
 
 
@@ -582,10 +584,10 @@ def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
         return record
     if len(record) < HEAD_BYTES or record[0] != Opcode.CHUNK:
         raise ValueError("cut")
-    head = read_chunk_head(record, info.length - HEAD_BYTES)
-    if head is None:
+    header = read_chunk_head(record, info.length - HEAD_BYTES)
+    if header is None:
         raise ValueError("head")
-    return decompress(record[head.data_offset :], head)
+    return decompress(record[header.data_offset :], header)
 
 
 def read_entries(file: BinaryIO, info: ChunkInfo, channel: int) -> Sequence[tuple[int, int]] | None:
@@ -603,10 +605,10 @@ def read_entries(file: BinaryIO, info: ChunkInfo, channel: int) -> Sequence[tupl
     if not info.has_index_at(offset):
         return None
     file.seek(offset)
-    head = file.read(HEAD_BYTES)
-    if len(head) < HEAD_BYTES:
+    record_head = file.read(HEAD_BYTES)
+    if len(record_head) < HEAD_BYTES:
         return None
-    opcode, length = RECORD_HEAD.unpack(head)
+    opcode, length = RECORD_HEAD.unpack(record_head)
     if opcode != Opcode.MESSAGE_INDEX or length > info.index_bytes:
         return None
     try:

@@ -235,10 +235,10 @@ class FileWriter:
             chunk.start_ns = log_ns
         index.append(log_ns)
         index.append(chunk.size)
-        head = pack_message_head(channel, sequence, log_ns, times[1], size)
-        chunk.parts.append(head + before if before else head)
+        header = pack_message_head(channel, sequence, log_ns, times[1], size)
+        chunk.parts.append(header + before if before else header)
         chunk.parts.append(data)
-        chunk.size += len(head) + size
+        chunk.size += len(header) + size
 
     def flush(self) -> int:
         """Write the current chunk; return the number of messages written."""
@@ -250,7 +250,7 @@ class FileWriter:
         payload, compression = compress(data, self._compression), self._compression
         if len(payload) >= size:
             payload, compression = data, ""
-        head = pack_chunk(payload, compression, size, crc, (chunk.start_ns, chunk.end_ns))
+        header = pack_chunk(payload, compression, size, crc, (chunk.start_ns, chunk.end_ns))
         indexes = {number: pack_message_index(number, entries) for number, entries in chunk.indexes.items()}
         counts = self.pending_counts
         self.write_channels(counts)
@@ -258,14 +258,14 @@ class FileWriter:
             chunk.start_ns,
             chunk.end_ns,
             self._at,
-            len(head) + len(payload),
+            len(header) + len(payload),
             b"",
             0,
             compression,
             len(payload),
             size,
         )
-        self._write_chunk(info, [head, payload], indexes, counts)
+        self._write_chunk(info, [header, payload], indexes, counts)
         self._chunk = _Chunk()
         return sum(counts.values())
 
@@ -290,12 +290,12 @@ class FileWriter:
         indexes: Mapping[int, bytes],
         counts: Mapping[int, int],
     ) -> None:
-        at = self._at + info.length
+        offset = self._at + info.length
         offsets = {}
         for number, index in indexes.items():
-            offsets[number] = at
-            at += len(index)
-        info.packed_offsets, info.index_bytes = pack_offsets(offsets), at - info.offset - info.length
+            offsets[number] = offset
+            offset += len(index)
+        info.packed_offsets, info.index_bytes = pack_offsets(offsets), offset - info.offset - info.length
         self._write(*record, b"".join(indexes.values()))
         if self.chunks is not None:
             self.chunks.append(info)
@@ -340,11 +340,11 @@ class FileWriter:
         size = 0
         try:
             for part in parts:
-                whole = memoryview(part)
-                at = 0
-                while at < whole.nbytes:
-                    at += self._file.write(whole[at:]) or 0
-                size += whole.nbytes
+                view = memoryview(part)
+                offset = 0
+                while offset < view.nbytes:
+                    offset += self._file.write(view[offset:]) or 0
+                size += view.nbytes
         except OSError:
             self.truncate()
             raise
@@ -389,9 +389,9 @@ class FileWriter:
         footer = mcap_records.Footer(
             summary_start=start, summary_offset_start=start + len(summary), summary_crc=0
         )
-        head = pack_record(footer)[:-4]
-        crc = zlib.crc32(summary + offsets + head)
-        return data_end + summary + offsets + head + crc.to_bytes(4, "little") + MAGIC
+        footer_prefix = pack_record(footer)[:-4]
+        crc = zlib.crc32(summary + offsets + footer_prefix)
+        return data_end + summary + offsets + footer_prefix + crc.to_bytes(4, "little") + MAGIC
 
     def _summary_order(self, number: int) -> tuple[bool, int]:
         # Wrapped channels last: viewers read all messages of a topic as those of its first channel.

@@ -65,14 +65,14 @@ def timestamp_field(number: int, stamp_ns: int) -> bytes:
     return _complete_field(number, b"\x08" + _encode_varint(seconds) + b"\x10" + _encode_varint(rest))
 
 
-def _read_varint(data: memoryview, at: int) -> tuple[int, int]:
+def _read_varint(data: memoryview, offset: int) -> tuple[int, int]:
     number = shift = 0
     while shift < 70:
-        byte = data[at]
-        at += 1
+        byte = data[offset]
+        offset += 1
         number |= (byte & 0x7F) << shift
         if byte < 0x80:
-            return number, at
+            return number, offset
         shift += 7
     raise ValueError("varint")
 
@@ -82,26 +82,26 @@ def fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
 
     A value is a whole number, or a slice of the message. Raises `ValueError` for invalid data.
     """
-    at, size = 0, len(message)
-    while at < size:
+    offset, size = 0, len(message)
+    while offset < size:
         try:
-            tag, at = _read_varint(message, at)
+            tag, offset = _read_varint(message, offset)
             kind = tag & 7
             value: int | memoryview
             if kind == _VARINT:
-                value, at = _read_varint(message, at)
+                value, offset = _read_varint(message, offset)
             elif kind == _BYTES:
-                length, at = _read_varint(message, at)
-                value, at = message[at : at + length], at + length
+                length, offset = _read_varint(message, offset)
+                value, offset = message[offset : offset + length], offset + length
             elif kind == _FIXED32:
-                value, at = _U32.unpack_from(message, at)[0], at + 4
+                value, offset = _U32.unpack_from(message, offset)[0], offset + 4
             elif kind == _FIXED64:
-                value, at = _U64.unpack_from(message, at)[0], at + 8
+                value, offset = _U64.unpack_from(message, offset)[0], offset + 8
             else:
                 raise ValueError("kind")
         except (IndexError, struct.error) as error:
             raise ValueError("cut") from error
-        if at > size:
+        if offset > size:
             raise ValueError("cut")
         yield tag >> 3, value
 
@@ -138,13 +138,13 @@ SCHEMAS: Mapping[str, _Fields] = {
 def _message_descriptor(name: str, fields_of_it: _Fields) -> bytes:
     encoded = _complete_field(1, name.encode())
     for field_name, (number, kind) in fields_of_it.items():
-        one = _complete_field(1, field_name.encode())
-        one += (
+        encoded_field = _complete_field(1, field_name.encode())
+        encoded_field += (
             b"\x18" + _encode_varint(number) + b"\x20\x01\x28" + _encode_varint(kind)
         )  # number, optional, type
         if kind == _MESSAGE:
-            one += _complete_field(6, f".{_STAMP}".encode())
-        encoded += _complete_field(2, one)
+            encoded_field += _complete_field(6, f".{_STAMP}".encode())
+        encoded += _complete_field(2, encoded_field)
     return encoded
 
 

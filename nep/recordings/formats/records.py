@@ -98,8 +98,8 @@ def pack_record(record: Any) -> bytes:  # noqa: ANN401 - any record of mcap
     """Encode a record object of the package `mcap`."""
     builder = _builder_class()()
     record.write(builder)
-    made: bytes = builder.end()
-    return made
+    encoded: bytes = builder.end()
+    return encoded
 
 
 # ---- messages
@@ -149,25 +149,25 @@ def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessa
         chunk: Decompressed records.
         offset: Offset of the first record to return.
     """
-    whole = memoryview(chunk)
-    size, other_count = whole.nbytes, 0
+    view = memoryview(chunk)
+    size, other_count = view.nbytes, 0
     while offset + HEAD_BYTES <= size:
-        opcode, length = RECORD_HEAD.unpack_from(whole, offset)
+        opcode, length = RECORD_HEAD.unpack_from(view, offset)
         end = offset + HEAD_BYTES + length
         if end > size:
             return
         if opcode == Opcode.MESSAGE:
             if length < MESSAGE_FIELDS_BYTES:
                 return
-            _opcode, _length, channel, sequence, log_ns, publish_ns = MESSAGE_HEAD.unpack_from(whole, offset)
+            _opcode, _length, channel, sequence, log_ns, publish_ns = MESSAGE_HEAD.unpack_from(view, offset)
             yield RawMessage(
-                offset, channel, sequence, log_ns, publish_ns, whole[offset + MESSAGE_HEAD.size : end]
+                offset, channel, sequence, log_ns, publish_ns, view[offset + MESSAGE_HEAD.size : end]
             )
         else:
             other_count += 1
             if not opcode or other_count > _MAX_OTHER_RECORDS:
                 return
-            yield opcode, whole[offset + HEAD_BYTES : end]
+            yield opcode, view[offset + HEAD_BYTES : end]
         offset = end
 
 
@@ -198,17 +198,17 @@ def read_chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None
     if len(record) < HEAD_BYTES + _CHUNK.size:
         return None
     start_ns, end_ns, uncompressed, crc, letters = _CHUNK.unpack_from(record, HEAD_BYTES)
-    at = HEAD_BYTES + _CHUNK.size + letters
-    if letters > 16 or len(record) < at + _SIZE.size or max(uncompressed, length) > MAX_CHUNK_BYTES:
+    offset = HEAD_BYTES + _CHUNK.size + letters
+    if letters > 16 or len(record) < offset + _SIZE.size or max(uncompressed, length) > MAX_CHUNK_BYTES:
         return None
-    compression = bytes(record[at - letters : at])
-    (data_bytes,) = _SIZE.unpack_from(record, at)
-    at += _SIZE.size
-    if compression not in {b"", b"lz4", b"zstd"} or at + data_bytes != HEAD_BYTES + length:
+    compression = bytes(record[offset - letters : offset])
+    (data_bytes,) = _SIZE.unpack_from(record, offset)
+    offset += _SIZE.size
+    if compression not in {b"", b"lz4", b"zstd"} or offset + data_bytes != HEAD_BYTES + length:
         return None
     if start_ns > end_ns or (not compression and data_bytes != uncompressed):
         return None
-    return ChunkHead(start_ns, end_ns, uncompressed, crc, compression.decode("ascii"), at, data_bytes)
+    return ChunkHead(start_ns, end_ns, uncompressed, crc, compression.decode("ascii"), offset, data_bytes)
 
 
 def pack_chunk(
@@ -258,10 +258,10 @@ def read_message_index(content: bytes | memoryview) -> tuple[int, list[IndexEntr
     """Parse a message index record; return the channel number and the entries. Raises `ValueError`."""
     try:
         channel, size = _ENTRIES.unpack_from(content)
-        whole = memoryview(content)[_ENTRIES.size : _ENTRIES.size + size]
-        if len(whole) != size:
+        entries_view = memoryview(content)[_ENTRIES.size : _ENTRIES.size + size]
+        if len(entries_view) != size:
             raise ValueError("size")
-        return channel, [IndexEntry(*each) for each in _ENTRY.iter_unpack(whole)]
+        return channel, [IndexEntry(*each) for each in _ENTRY.iter_unpack(entries_view)]
     except struct.error as error:
         raise ValueError(str(error)) from error
 
@@ -350,14 +350,14 @@ def read_chunk_info(content: bytes | memoryview) -> ChunkInfo:
     """Parse a chunk index record. Raises `ValueError`."""
     try:
         start_ns, end_ns, offset, length, size = _INFO.unpack_from(content)
-        at = _INFO.size + size
-        if size % _OFFSET.size or at > len(content):
+        position = _INFO.size + size
+        if size % _OFFSET.size or position > len(content):
             raise ValueError("size")
-        index_bytes, letters = _INDEX_LENGTH.unpack_from(content, at)
-        packed_offsets = bytes(content[_INFO.size : at])
-        at += _INDEX_LENGTH.size
-        compression = str(content[at : at + letters], "ascii")
-        sizes = _SIZES.unpack_from(content, at + letters)
+        index_bytes, letters = _INDEX_LENGTH.unpack_from(content, position)
+        packed_offsets = bytes(content[_INFO.size : position])
+        position += _INDEX_LENGTH.size
+        compression = str(content[position : position + letters], "ascii")
+        sizes = _SIZES.unpack_from(content, position + letters)
     except struct.error as error:
         raise ValueError(str(error)) from error
     return ChunkInfo(start_ns, end_ns, offset, length, packed_offsets, index_bytes, compression, *sizes)

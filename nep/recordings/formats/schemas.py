@@ -48,8 +48,8 @@ def _schema_for(hint: Any, depth: int) -> dict[str, object] | None:  # noqa: ANN
     if hint in _SCALAR_TYPES:
         return {"type": _SCALAR_TYPES[hint]}
     if origin in {typing.Union, types.UnionType}:
-        known = [each for each in arguments if each is not type(None)]
-        return _schema_for(known[0], depth) if len(known) == 1 else None
+        members = [each for each in arguments if each is not type(None)]
+        return _schema_for(members[0], depth) if len(members) == 1 else None
     if origin in {list, Sequence} or (origin is tuple and arguments[1:] == (...,)):
         items = _schema_for(arguments[0], depth)
         return None if items is None or items["type"] == "array" else {"type": "array", "items": items}

@@ -58,19 +58,21 @@ def walk_records(
     """
     window, base, step, count = b"", offset, _SMALL_WINDOW, 0
     while offset + HEAD_BYTES <= size:
-        at = offset - base
-        if at + HEAD_BYTES + begin_bytes > len(window):
-            step = min(2 * step, _LARGE_WINDOW) if at <= len(window) else _SMALL_WINDOW
+        window_offset = offset - base
+        if window_offset + HEAD_BYTES + begin_bytes > len(window):
+            step = min(2 * step, _LARGE_WINDOW) if window_offset <= len(window) else _SMALL_WINDOW
             file.seek(offset)
-            window, base, at = file.read(max(step, HEAD_BYTES + begin_bytes)), offset, 0
+            window, base, window_offset = file.read(max(step, HEAD_BYTES + begin_bytes)), offset, 0
             if len(window) < HEAD_BYTES:
                 return
-        opcode, length = RECORD_HEAD.unpack_from(window, at)
+        opcode, length = RECORD_HEAD.unpack_from(window, window_offset)
         if (not 0 < opcode <= Opcode.DATA_END and opcode < 0x80) or offset + HEAD_BYTES + length > size:
             return
-        at += HEAD_BYTES
+        window_offset += HEAD_BYTES
         count += 1
         if count % _BUDGET_INTERVAL == 0:
             budget.spend(_BUDGET_INTERVAL * RECORD_COST_BYTES)
-        yield RecordLocation(offset, opcode, length, window[at : at + min(length, begin_bytes)])
+        yield RecordLocation(
+            offset, opcode, length, window[window_offset : window_offset + min(length, begin_bytes)]
+        )
         offset += HEAD_BYTES + length

@@ -179,11 +179,11 @@ def test_rize_robot_receives_commands_in_rize_format(master, node):
 def test_robots_are_found_by_topic_type(master, node, pepper):
     turtle = WireRobot(master.address, "Turtle 2")
     try:
-        found = find_robots(node, 5.0, wanted=["Pepper", "Turtle 2"])
+        found = find_robots(node, 5.0, expected=["Pepper", "Turtle 2"])
         assert [robot.name for robot in found.robots] == ["Pepper", "Turtle 2"]
         assert found.owners["Pepper"].node_id == pepper._node.id
         assert [robot.name for robot in find_robots(node, 5.0).robots] == ["Pepper", "Turtle 2"]
-        wanted = find_robots(node, 0.2, wanted=["NAO"])
+        wanted = find_robots(node, 0.2, expected=["NAO"])
         assert ([robot.name for robot in wanted.robots], wanted.rejected_claims) == (
             ["Pepper", "Turtle 2"],
             (),

@@ -85,7 +85,7 @@ def facts(
         services={each.name: each for each in SERVICES},
         patterns={each.name: each for each in patterns},
     )
-    known, heard = Nodes(), Topics(own=("nobody", 0))
+    known, heard = Nodes(), Topics(own_process=("nobody", 0))
     known.update(view, 0.0)
     heard.update(view, 0.0)
     return GraphInput([*known], [*heard], view.services, ["Pepper"], HERE)

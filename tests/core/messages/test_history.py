@@ -95,7 +95,7 @@ def test_shallow_history_requests_no_larger_queue_and_no_past_messages() -> None
         lambda _topic: Watching(log), lambda: 0, lambda topic, room: log.append(f"{topic} {room}")
     )
     shallow, deep = MessageHistory(), MessageHistory()
-    feed.register("/a", shallow, deep=False)
+    feed.register("/a", shallow, is_lossless=False)
     assert log == []
     feed.register("/a", deep)
     assert log == ["/a 8192"]

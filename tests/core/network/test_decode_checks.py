@@ -78,7 +78,7 @@ def test_healthy_topic_leaves_reserve_time_to_failing_topics() -> None:
 
 
 def test_malformed_message_allows_remaining_batch_to_use_reserve_time() -> None:
-    checks = DecodeChecker(work=Clock(step_s=0.01))
+    checks = DecodeChecker(cpu_clock=Clock(step_s=0.01))
     checks.check("/a", messages(BAD, *[GOOD] * 200))
     found = checks.pop_results()["/a"]
     assert found.bad_count == 1

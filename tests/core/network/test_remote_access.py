@@ -49,7 +49,12 @@ def make(world, tmp_path):
         here = (OwnAddress("192.168.1.20", "wlan0"),)
         alerts = Alerts()
         reach = RemoteAccess(
-            address, Settings(tmp_path), alerts, world.post, ask=world.ask, here=lambda: here
+            address,
+            Settings(tmp_path),
+            alerts,
+            world.post,
+            request_listen=world.ask,
+            local_addresses=lambda: here,
         )
         return reach, alerts
 

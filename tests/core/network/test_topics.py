@@ -93,7 +93,7 @@ def test_removed_watched_topic_is_unlisted_and_can_reappear() -> None:
 
 
 def test_own_subscription_does_not_keep_topic_alive() -> None:
-    topics = Topics(own=("here", 77))
+    topics = Topics(own_process=("here", 77))
     looking = NodeInfo("n2", "studio", "here", 77, "python", "native", 0)
     there = GraphView(
         1, 1, {"n1": NODE, "n2": looking}, {"/a": info("/a", subscribers=(SubscriberInfo(9, "n2", 0, 0),))}
@@ -254,7 +254,7 @@ def test_topic_that_never_sent_is_not_silent() -> None:
 
 def test_message_ages_are_corrected_by_clock_offset() -> None:
     hour = 3600 * 10**9
-    topics = Topics(own=("mine", 7))
+    topics = Topics(own_process=("mine", 7))
     mine = replace(NODE, id="me", host="mine", pid=7, clock_offset_ns=2 * hour, clock_uncertainty_ns=5)
     far = replace(NODE, clock_offset_ns=-hour, clock_uncertainty_ns=5)
     seen = replace(view(info("/a")), nodes={"n1": far, "me": mine})
@@ -270,7 +270,7 @@ def test_message_ages_are_corrected_by_clock_offset() -> None:
 
 
 def test_newest_message_of_publishers_on_two_computers_counts() -> None:
-    topics = Topics(own=("mine", 7))
+    topics = Topics(own_process=("mine", 7))
     mine = replace(NODE, id="me", host="mine", pid=7, clock_offset_ns=0)
     far = replace(NODE, clock_offset_ns=-(10**12))
     near = replace(publisher(), id=2, node_id="me", last_stamp_ns=4_000_000_000)
@@ -281,7 +281,7 @@ def test_newest_message_of_publishers_on_two_computers_counts() -> None:
 
 
 def test_ages_are_not_corrected_without_own_clock_offset() -> None:
-    topics = Topics(own=("mine", 7))
+    topics = Topics(own_process=("mine", 7))
     far = replace(NODE, clock_offset_ns=-(10**12))
     topics.update(replace(view(info("/a")), nodes={"n1": far}), 0)
     topics.update_ages(0, 1_500_000_000)

@@ -139,7 +139,7 @@ def test_disconnected_real_robot_is_reported_after_a_delay_and_resolved_on_retur
     alert = case.alert()
     assert alert is not None
     assert (alert.id, alert.title, alert.action) == ("robot:Rover", "Rover disconnected.", "help.doctor")
-    case.health.check(used={"Rover"})
+    case.health.check(used_names={"Rover"})
     used = case.alert()
     assert used is not None
     assert (used.severity, used.action) == ("error", "run.stop")

@@ -86,7 +86,7 @@ def node(master) -> Iterator[nep.Node]:
 
 
 def test_pause_interrupts_walk_and_resume_completes_it(master, pepper, node) -> None:
-    (robot,) = find_robots(node, 30, wanted=("Pepper",)).robots
+    (robot,) = find_robots(node, 30, expected=("Pepper",)).robots
     walk = block("robot_pepper_do_walk", ROBOT="Pepper", DISTANCE=number(WAY_M))
     program = compile_behaviour(workspace(started(walk)), (robot,), name="Walk")
     assert not program.errors, program.problems
@@ -113,7 +113,7 @@ def test_pause_interrupts_walk_and_resume_completes_it(master, pepper, node) -> 
 
 
 def test_step_completes_a_paused_action(master, pepper, node) -> None:
-    (robot,) = find_robots(node, 30, wanted=("Pepper",)).robots
+    (robot,) = find_robots(node, 30, expected=("Pepper",)).robots
     walks = [block("robot_pepper_do_walk", ROBOT="Pepper", DISTANCE=number(0.4)) for _ in range(2)]
     program = compile_behaviour(workspace(started(*walks)), (robot,), name="Walk")
     pose, heard = Pose(node), Heard()

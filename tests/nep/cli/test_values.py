@@ -35,8 +35,8 @@ ANYTHING = st.recursive(
 def test_every_decoded_value_becomes_valid_json(value):
     json.loads(encode_json(value))
     assert "\n" not in encode_json(value).decode()
-    assert format_payload(value, whole=True) is not None
-    assert format_payload(value, whole=False, indent=True) is not None
+    assert format_payload(value, in_full=True) is not None
+    assert format_payload(value, in_full=False, indent=True) is not None
 
 
 @pytest.mark.parametrize(
@@ -51,14 +51,14 @@ def test_every_decoded_value_becomes_valid_json(value):
     ],
 )
 def test_value_is_presented_for_the_terminal(value, shown):
-    assert format_payload(value, whole=False) == shown
+    assert format_payload(value, in_full=False) == shown
 
 
 def test_many_fields_are_abbreviated_and_all_shown_on_request():
     many = {f"field{number}": number for number in range(10_000)}
-    shown = format_payload(many, whole=False)
+    shown = format_payload(many, in_full=False)
     assert shown.endswith('"field99":99,"…":"9900 more"}')
-    assert json.loads(format_payload(many, whole=True)) == many
+    assert json.loads(format_payload(many, in_full=True)) == many
 
 
 def test_control_characters_are_escaped_in_json():
@@ -123,7 +123,7 @@ def test_terminal_output_is_truncated_unless_full_is_requested(monkeypatch, more
     assert "… 4980 more" in re.sub(r"\x1b\[[0-9;]*m", "", short)
     assert bool(re.search(r"\x1b\[(\d;)?3\dm", short)) == (not more.keys() & {"NO_COLOR", "TERM"})
     assert more.get("TERM") != "dumb" or "\x1b" not in short
-    MessagePrinter(whole=True)(long)
+    MessagePrinter(in_full=True)(long)
     assert "4999" in screen.getvalue()
 
 

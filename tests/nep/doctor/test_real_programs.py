@@ -113,7 +113,7 @@ def test_master_cannot_be_started_at_a_network_address(master: Master, own: str)
 
 def test_progress_reports_lead_to_the_same_final_result(master: Master) -> None:
     told = []
-    found = diagnose(master.address, "/arm/pose", tell=lambda *each: told.append(each))
+    found = diagnose(master.address, "/arm/pose", on_progress=lambda *each: told.append(each))
     done = [done for _found, done, _count in told]
     assert done == sorted(done)
     assert {count for _found, _done, count in told} == {done[-1]} == {len(CHECKS) + 1}

@@ -62,7 +62,7 @@ def test_leaves_yield_the_path_of_every_leaf_value():
     paths = list(leaf_paths(ODOM))
     assert paths == ["pose.x", "pose.y", "joints[0]", "joints[1]", "joints[2].name", '["a key"]']
     assert list(leaf_paths(7)) == ["."]
-    assert len(list(leaf_paths(list(range(5)) * 100, most=3))) == 3
+    assert len(list(leaf_paths(list(range(5)) * 100, max_count=3))) == 3
 
 
 @given(

@@ -74,12 +74,12 @@ def test_lifted_robot_pauses_its_motion_and_resumes_when_put_down() -> None:
     body = Body(theta_deg=180.0)
     motion = body.walk(0.5, 0.3)
     body.step(0.5)
-    body.set_lifted(held=True)
+    body.set_lifted(is_lifted=True)
     x = body.x
     body.step(2.0)
     assert (body.x, motion.done) == (x, False)
     body.carry(0.0, -1.0)
-    body.set_lifted(held=False)
+    body.set_lifted(is_lifted=False)
     body.step(5.0)
     assert motion.done
     assert motion.moved == pytest.approx(0.5, abs=0.01)
@@ -90,7 +90,7 @@ def test_stop_ends_the_motion_of_a_lifted_robot() -> None:
     body = Body(theta_deg=180.0)
     motion = body.walk(0.5, 0.3)
     body.step(0.5)
-    body.set_lifted(held=True)
+    body.set_lifted(is_lifted=True)
     body.halt()
     body.step(0.2)
     assert motion.done

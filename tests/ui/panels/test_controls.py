@@ -426,7 +426,7 @@ def test_url_is_sent_unchanged_and_bare_base64_where_the_robot_expects_it(qtbot,
     bare = parameter_of("p", schema)
     assert (bare.kind, bare.is_bare_base64) == ("image", True)
     image = QImage(str(drawn(tmp_path / "red.png", 32, 24)))
-    assert QImage.fromData(base64.b64decode(encode_image(image, bare=True))).width() == 32
+    assert QImage.fromData(base64.b64decode(encode_image(image, omit_prefix=True))).width() == 32
     linked = parameter_of("p", {"type": "string", "format": "uri-reference", "rb:widget": "image"})
     assert (linked.kind, linked.is_bare_base64) == ("image", False)
 

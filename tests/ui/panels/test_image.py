@@ -342,7 +342,7 @@ def test_pixels_have_sharp_edges_from_200_per_cent_zoom(view) -> None:
 def test_pixel_values_and_boxes_follow_rotation_and_flipping(view, turned: int, flipped: bool) -> None:
     view.show_image(stream_of(picture()), boxes_of(FACES))  # type: ignore[arg-type]
     if flipped:
-        view.place.flip(across=True)
+        view.place.flip(horizontally=True)
     view.place.rotate(turned)
     ball = view.place.to_view(view.area()).map(QPointF(250.5 / 320, 150.5 / 240))
     assert under(view, ball.toPoint()).endswith("210 62 58  #D23E3A")

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|
 @pytest.fixture
 def window(qtbot, theme: Theme) -> Iterator[MainWindow]:
     panels = {**PANELS, "publish": PUBLISH, "services": SERVICES}
-    made = MainWindow(Session.full(), theme, panels, [], asks=Answers())  # type: ignore[arg-type]
+    made = MainWindow(Session.full(), theme, panels, [], dialogs=Answers())  # type: ignore[arg-type]
     qtbot.addWidget(made)
     theme.apply()
     made.resize(1440, 900)

@@ -26,7 +26,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 def test_extra_space_is_distributed_to_panels_without_fixed_size(
     wanted: list[int], room: int, keep: list[bool], sizes: list[int]
 ) -> None:
-    assert shares(wanted, room, keep=keep) == sizes
+    assert shares(wanted, room, fixed=keep) == sizes
 
 
 def widths(window: MainWindow, *names: str) -> list[int]:

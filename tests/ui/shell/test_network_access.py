@@ -27,8 +27,8 @@ def make(qtbot, tmp_path):
             Settings(tmp_path),
             Alerts(),
             lambda _event: None,
-            ask=lambda hosts, _address: asked.append(tuple(hosts)),
-            here=lambda: own,
+            request_listen=lambda hosts, _address: asked.append(tuple(hosts)),
+            local_addresses=lambda: own,
         )
         window = QWidget()
         window.resize(1100, 700)

@@ -54,7 +54,7 @@ def window(qtbot, theme: Theme, home: Path) -> Iterator[MainWindow]:
     session.fleet.connect(parse(thing_description(simulated.ROBOT.thing_model, "Anna")), "/Anna/description")
     panels = PanelRegistry()
     behaviour = Panel("behaviour", "Behaviour", "blocks", (), lambda ctx: BehaviourPanel(ctx, Editor))
-    made = MainWindow(session, theme, {**panels, "behaviour": behaviour}, asks=Answers())
+    made = MainWindow(session, theme, {**panels, "behaviour": behaviour}, dialogs=Answers())
     qtbot.addWidget(made)
     theme.apply()
     theme.set_motion(True)

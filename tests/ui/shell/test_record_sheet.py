@@ -54,7 +54,7 @@ def recorder(home: Path) -> Recorder:
 
 @pytest.fixture
 def window(qtbot, theme: Theme, recorder: Recorder) -> MainWindow:
-    made = MainWindow(recorder.session, theme, PANELS, [], asks=Answers())
+    made = MainWindow(recorder.session, theme, PANELS, [], dialogs=Answers())
     qtbot.addWidget(made)
     theme.apply()
     theme.set_motion("on")

@@ -67,7 +67,7 @@ def path(tmp_path_factory) -> Path:
 
 @pytest.fixture
 def window(qtbot, theme: Theme, session: Session, answers: Answers) -> Iterator[MainWindow]:
-    made = MainWindow(session, theme, {**PanelRegistry(), "behaviour": BLOCKS}, [], asks=answers)
+    made = MainWindow(session, theme, {**PanelRegistry(), "behaviour": BLOCKS}, [], dialogs=answers)
     qtbot.addWidget(made)
     theme.apply()
     made.resize(1440, 900)

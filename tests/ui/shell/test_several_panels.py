@@ -51,7 +51,7 @@ SEVERAL = {**PANELS, "inspector": of_topics("inspector"), "image": of_topics("im
 
 @pytest.fixture
 def window(qtbot, theme: Theme, session: Session, answers: Answers) -> Iterator[MainWindow]:
-    made = MainWindow(session, theme, SEVERAL, [], asks=answers)
+    made = MainWindow(session, theme, SEVERAL, [], dialogs=answers)
     qtbot.addWidget(made)
     theme.set_motion("on")
     theme.apply()

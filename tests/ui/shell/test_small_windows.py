@@ -51,7 +51,7 @@ def window(qtbot, theme: Theme) -> Iterator[MainWindow]:
     """The window with its real panels, a robot and everything that it tells."""
     panels = {**PanelRegistry(), "behaviour": BLOCKS}
     examples = read_examples(resources.folder() / "examples")
-    made = MainWindow(Session.full(), theme, panels, examples, asks=Answers())
+    made = MainWindow(Session.full(), theme, panels, examples, dialogs=Answers())
     qtbot.addWidget(made)
     theme.set_motion("on")
     made.show()

@@ -139,7 +139,7 @@ def language(request: pytest.FixtureRequest) -> Iterator[str]:
 def whole(qtbot, language: str, session: Session, theme: Theme, tmp_path: Path) -> Iterator[MainWindow]:
     """The window with an example of everything that it can show around the panels."""
     session.settings.add_recent(saved(tmp_path / "Mine.nepb"))
-    window = MainWindow(session, theme, PANELS, EXAMPLES, asks=Answers())
+    window = MainWindow(session, theme, PANELS, EXAMPLES, dialogs=Answers())
     qtbot.addWidget(window)
     theme.set_motion("on")
     window.show()
@@ -330,7 +330,12 @@ def test_name_dialog_is_translated(whole: MainWindow) -> None:
 def test_network_access_sheet_is_translated(qtbot, pseudo, tmp_path: Path, here, address: str) -> None:
     own = tuple(OwnAddress(*each) for each in here)
     reach = RemoteAccess(
-        address, Settings(tmp_path), Alerts(), print, ask=lambda _hosts, _address: None, here=lambda: own
+        address,
+        Settings(tmp_path),
+        Alerts(),
+        print,
+        request_listen=lambda _hosts, _address: None,
+        local_addresses=lambda: own,
     )
     window = QWidget()
     window.resize(1100, 700)

@@ -139,7 +139,7 @@ def whole(qtbot, session: Session, theme: Theme, tmp_path: Path) -> Iterator[tup
     file.write_text("{}", "utf-8")
     session.settings.add_recent(file)
     window = MainWindow(
-        session, theme, PANELS, read_examples(resources.folder() / "examples"), asks=Answers()
+        session, theme, PANELS, read_examples(resources.folder() / "examples"), dialogs=Answers()
     )
     qtbot.addWidget(window)
     theme.set_motion("on")

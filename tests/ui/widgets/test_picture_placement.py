@@ -33,7 +33,7 @@ def test_zoom_keeps_the_point_under_the_mouse_in_every_orientation(turned, acros
     place.rotate(turned)
     for wanted, flip in ((across, True), (down, False)):
         if wanted:
-            place.flip(across=flip)
+            place.flip(horizontally=flip)
     area = place.area(VIEW, PICTURE)
     at = QPointF(area.x() + area.width() * 0.3, area.y() + area.height() * 0.6)
     before = place_of(place, at)
@@ -74,7 +74,7 @@ def test_zoom_has_limits() -> None:
 @pytest.mark.parametrize("turns", range(1, 4))
 def test_flipped_image_rotates_in_the_same_direction(turns: int) -> None:
     upright, flipped = PicturePlacement(), PicturePlacement()
-    flipped.flip(across=True)
+    flipped.flip(horizontally=True)
     corner = QPointF(0, 0)
     for place in (upright, flipped):
         place.rotate(90 * turns)
@@ -96,7 +96,7 @@ def test_four_quarter_turns_and_two_flips_are_the_identity() -> None:
     place.rotate(180)
     place.rotate(-180)
     for across in (True, False, True, False):
-        place.flip(across=across)
+        place.flip(horizontally=across)
     after = place.to_json()
     assert after.pop("centre") == pytest.approx(before.pop("centre"))
     assert after == before
@@ -106,7 +106,7 @@ def test_placement_is_restored_with_the_layout_and_invalid_state_is_ignored() ->
     place = PicturePlacement()
     place.zoom_at(4.0, QPointF(10, 90), VIEW, PICTURE)
     place.rotate(270)
-    place.flip(across=False)
+    place.flip(horizontally=False)
     again = PicturePlacement()
     again.restore(place.to_json())
     assert again == place

@@ -38,8 +38,8 @@ def absolute(value: object) -> int | float:
 
 def sign(value: object) -> int:
     """Return the sign of a number: 1, 0 or -1."""
-    found = number(value, lazy("“sign”"))
-    return (found > 0) - (found < 0)
+    operand = number(value, lazy("“sign”"))
+    return (operand > 0) - (operand < 0)
 
 
 def sine(degrees: object) -> int | float:
@@ -54,10 +54,10 @@ def cosine(degrees: object) -> int | float:
 
 def tangent(degrees: object) -> int | float:
     """Return the tangent of an angle in degrees. Raises BehaviourError at odd multiples of 90 degrees."""
-    what = lazy("“tan”")
-    if abs(number(degrees, what)) % 180 == 90:
-        raise _no_result_error(what, degrees)
-    return _rounded_result(math.tan(_to_radians(degrees, what)))
+    label = lazy("“tan”")
+    if abs(number(degrees, label)) % 180 == 90:
+        raise _no_result_error(label, degrees)
+    return _rounded_result(math.tan(_to_radians(degrees, label)))
 
 
 def arc_sine(value: object) -> int | float:
@@ -92,18 +92,18 @@ def e_to_the(power: object) -> float:
 
 def ten_to_the(power: object) -> int | float:
     """Return 10 to the power of a number."""
-    return _rounded_result(math.pow(10, number(power, lazy("“10 to the power”"))), places=None)
+    return _rounded_result(math.pow(10, number(power, lazy("“10 to the power”"))), decimal_places=None)
 
 
-def rounded_to(value: object, places: object) -> int | float:
+def rounded_to(value: object, decimal_places: object) -> int | float:
     """Round to a number of decimal places, halves up; negative places round to tens, hundreds and so on."""
-    found = number(value, lazy("“round”"))
-    wanted = number(places, lazy("“decimal places”"))
-    digits = max(-_MAX_DECIMAL_PLACES, min(_MAX_DECIMAL_PLACES, round(wanted)))
-    if abs(found) >= _MAX_EXACT_INTEGER:  # floats of this size have no fraction
-        return found
-    halves = ROUND_HALF_UP if found > 0 else ROUND_HALF_DOWN
-    exact = Decimal(repr(found)).scaleb(digits).to_integral_value(halves).scaleb(-digits)
+    operand = number(value, lazy("“round”"))
+    requested_digits = number(decimal_places, lazy("“decimal places”"))
+    digits = max(-_MAX_DECIMAL_PLACES, min(_MAX_DECIMAL_PLACES, round(requested_digits)))
+    if abs(operand) >= _MAX_EXACT_INTEGER:  # floats of this size have no fraction
+        return operand
+    halves = ROUND_HALF_UP if operand > 0 else ROUND_HALF_DOWN
+    exact = Decimal(repr(operand)).scaleb(digits).to_integral_value(halves).scaleb(-digits)
     return int(exact) if exact == int(exact) else float(exact)
 
 
@@ -119,8 +119,8 @@ def larger(one: object, other: object) -> int | float:
 
 def limited(value: object, low: object, high: object) -> int | float:
     """Limit a number to a range; the limits may be given in any order."""
-    found, first, last = (number(each, lazy("“limit”")) for each in (value, low, high))
-    return max(min(first, last), min(max(first, last), found))
+    operand, first, last = (number(each, lazy("“limit”")) for each in (value, low, high))
+    return max(min(first, last), min(max(first, last), operand))
 
 
 def mapped(value: object, low: object, high: object, new_low: object, new_high: object) -> int | float:
@@ -129,13 +129,15 @@ def mapped(value: object, low: object, high: object, new_low: object, new_high: 
     Raises:
         BehaviourError: The first range is empty.
     """
-    what = lazy("“map”")
-    found, first, last, to_first, to_last = (
-        number(each, what) for each in (value, low, high, new_low, new_high)
+    label = lazy("“map”")
+    operand, first, last, to_first, to_last = (
+        number(each, label) for each in (value, low, high, new_low, new_high)
     )
     if first == last:
-        raise BehaviourError(_("The first range of {name} needs two different numbers.").format(name=_(what)))
-    return to_first + (found - first) * (to_last - to_first) / (last - first)
+        raise BehaviourError(
+            _("The first range of {name} needs two different numbers.").format(name=_(label))
+        )
+    return to_first + (operand - first) * (to_last - to_first) / (last - first)
 
 
 def is_even(value: object) -> bool:
@@ -150,8 +152,8 @@ def is_odd(value: object) -> bool:
 
 def is_whole(value: object) -> bool:
     """Return True if the number has no fractional part."""
-    found = number(value, lazy("“is”"))
-    return isinstance(found, int) or found.is_integer()
+    operand = number(value, lazy("“is”"))
+    return isinstance(operand, int) or operand.is_integer()
 
 
 def is_positive(value: object) -> bool:
@@ -166,42 +168,44 @@ def is_negative(value: object) -> bool:
 
 def is_divisible(value: object, by: object) -> bool:
     """Return True if a number is divisible by another one, in decimal arithmetic: 0.3 is divisible by 0.1."""
-    found, divisor = (number(each, lazy("“is divisible by”")) for each in (value, by))
-    return Fraction(str(found)) % Fraction(str(divisor)) == 0
+    dividend, divisor = (number(each, lazy("“is divisible by”")) for each in (value, by))
+    return Fraction(str(dividend)) % Fraction(str(divisor)) == 0
 
 
 def counting(first: object, last: object, step: object) -> Iterator[int | float]:
     """Yield the numbers from `first` to `last`, ascending or descending; the sign of `step` is ignored."""
-    what = lazy("“count”")
-    begin, end, wide = (number(each, what) for each in (first, last, step))
-    if wide == 0:
-        raise BehaviourError(_("{name} needs a step other than 0.").format(name=_(what)))
-    wide = abs(wide) if end >= begin else -abs(wide)
+    label = lazy("“count”")
+    begin, end, step_size = (number(each, label) for each in (first, last, step))
+    if step_size == 0:
+        raise BehaviourError(_("{name} needs a step other than 0.").format(name=_(label)))
+    step_size = abs(step_size) if end >= begin else -abs(step_size)
     # Tolerance for rounding errors: 0 to 0.3 by 0.1 has four numbers.
-    rounds = min(math.floor((end - begin) / wide + 1e-9), _MAX_ITERATIONS)
-    whole = isinstance(begin, int) and isinstance(wide, int)
+    rounds = min(math.floor((end - begin) / step_size + 1e-9), _MAX_ITERATIONS)
+    is_integer = isinstance(begin, int) and isinstance(step_size, int)
     return (
-        begin + at * wide if whole else _rounded_result(begin + at * wide, places=12)
-        for at in range(rounds + 1)
+        begin + index * step_size
+        if is_integer
+        else _rounded_result(begin + index * step_size, decimal_places=12)
+        for index in range(rounds + 1)
     )
 
 
-def _to_radians(degrees: object, what: str) -> float:
-    return math.radians(math.fmod(number(degrees, what), 360))
+def _to_radians(degrees: object, label: str) -> float:
+    return math.radians(math.fmod(number(degrees, label), 360))
 
 
-def _apply(work_out: Callable[[float], float], value: object, what: str) -> int | float:
-    found = number(value, what)
+def _apply(work_out: Callable[[float], float], value: object, label: str) -> int | float:
+    operand = number(value, label)
     try:
-        return _rounded_result(work_out(found), places=None)
+        return _rounded_result(work_out(operand), decimal_places=None)
     except ValueError:
-        raise _no_result_error(what, found) from None
+        raise _no_result_error(label, operand) from None
 
 
-def _no_result_error(what: str, value: object) -> BehaviourError:
-    return BehaviourError(_("{name} has no result for {number}.").format(name=_(what), number=text(value)))
+def _no_result_error(label: str, value: object) -> BehaviourError:
+    return BehaviourError(_("{name} has no result for {number}.").format(name=_(label), number=text(value)))
 
 
-def _rounded_result(value: float, places: int | None = 10) -> int | float:
-    found = value if places is None else round(value, places)
-    return int(found) if found.is_integer() and abs(found) < _MAX_EXACT_INTEGER else found
+def _rounded_result(value: float, decimal_places: int | None = 10) -> int | float:
+    rounded = value if decimal_places is None else round(value, decimal_places)
+    return int(rounded) if rounded.is_integer() and abs(rounded) < _MAX_EXACT_INTEGER else rounded

@@ -61,14 +61,15 @@ def parse_moment(written: str, today: datetime) -> datetime:
     Raises:
         BehaviourError: The text is not a date or time.
     """
-    words = written.strip()
-    if ":" in words and "-" not in words:
-        words = f"{today:%Y-%m-%d} {words.zfill(5) if words.count(':') == 1 else words.zfill(8)}"
+    moment_text = written.strip()
+    if ":" in moment_text and "-" not in moment_text:
+        width = 5 if moment_text.count(":") == 1 else 8
+        moment_text = f"{today:%Y-%m-%d} {moment_text.zfill(width)}"
     try:
-        return datetime.fromisoformat(words).replace(tzinfo=None)
+        return datetime.fromisoformat(moment_text).replace(tzinfo=None)
     except ValueError:
-        said = _("“seconds since” needs a time such as 14:30 or a date such as 2026-11-23, not “{text}”.")
-        raise BehaviourError(said.format(text=written[:60])) from None
+        message = _("“seconds since” needs a time such as 14:30 or a date such as 2026-11-23, not “{text}”.")
+        raise BehaviourError(message.format(text=written[:60])) from None
 
 
 _FORMATS = {"date": "%Y-%m-%d", "time": "%H:%M", "date and time": "%Y-%m-%d %H:%M:%S"}

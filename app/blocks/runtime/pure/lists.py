@@ -31,80 +31,80 @@ def new_list(*items: object) -> list[object]:
     return _copy_list(items)
 
 
-def item(of: object, where: object) -> object:
+def item(values: object, selector: object) -> object:
     """Return an item of a list.
 
     Args:
-        of: List.
-        where: Number of the item, "first", "last" or "random".
+        values: List.
+        selector: Number of the item, "first", "last" or "random".
     """
-    items = _as_list(of)
-    return items[_index(items, where)]
+    items = _as_list(values)
+    return items[_index(items, selector)]
 
 
-def set_item(of: object, where: object, value: object) -> None:
+def set_item(values: object, selector: object, value: object) -> None:
     """Replace an item of a list; see `item` for positions."""
-    items = _mutable_list(of)
-    place = _index(items, where)
-    items[place] = _copy_if_room(items, value)
+    items = _mutable_list(values)
+    index = _index(items, selector)
+    items[index] = _copy_if_room(items, value)
 
 
-def insert_item(of: object, where: object, value: object) -> None:
+def insert_item(values: object, selector: object, value: object) -> None:
     """Insert a value before an item of a list, or at the end.
 
     Args:
-        of: List.
-        where: Number of the item, "first" or "random"; "last" or the number after the last item appends.
+        values: List.
+        selector: Number of the item, "first" or "random"; "last" or the number after the last item appends.
         value: Value to insert.
     """
-    items = _mutable_list(of)
-    if where == LAST or (where != FIRST and where == len(items) + 1):
-        place = len(items)
-    elif where == FIRST:
-        place = 0
+    items = _mutable_list(values)
+    if selector == LAST or (selector != FIRST and selector == len(items) + 1):
+        index = len(items)
+    elif selector == FIRST:
+        index = 0
     else:
-        place = _index(items, where)
-    items.insert(place, _copy_if_room(items, value))
+        index = _index(items, selector)
+    items.insert(index, _copy_if_room(items, value))
 
 
-def add_item(of: object, value: object) -> None:
+def add_item(values: object, value: object) -> None:
     """Append a value to a list."""
-    items = _mutable_list(of)
+    items = _mutable_list(values)
     items.append(_copy_if_room(items, value))
 
 
-def remove_item(of: object, where: object) -> object:
+def remove_item(values: object, selector: object) -> object:
     """Remove and return an item of a list; see `item` for positions."""
-    items = _mutable_list(of)
-    return items.pop(_index(items, where))
+    items = _mutable_list(values)
+    return items.pop(_index(items, selector))
 
 
-def contains(where: object, value: object) -> bool:
+def contains(container: object, value: object) -> bool:
     """Return True if a list contains an item, or a text contains another text."""
-    if isinstance(where, str):
-        return text(value) in where
-    return any(_are_equal(each, value) for each in _as_list(where))
+    if isinstance(container, str):
+        return text(value) in container
+    return any(_are_equal(each, value) for each in _as_list(container))
 
 
-def position(of: object, value: object) -> int:
+def position(values: object, value: object) -> int:
     """Return the number of the first item that equals a value; 0 if there is none."""
-    return next((place for place, each in enumerate(_as_list(of), 1) if _are_equal(each, value)), 0)
+    return next((index for index, each in enumerate(_as_list(values), 1) if _are_equal(each, value)), 0)
 
 
-def each(of: object) -> list[object]:
+def each(values: object) -> list[object]:
     """Return a shallow copy of a list for a loop, so that changes during the loop don't affect it."""
-    return list(_as_list(of))
+    return list(_as_list(values))
 
 
-def join_items(of: object, between: object) -> str:
+def join_items(values: object, between: object) -> str:
     """Convert all items of a list to text and join them with a separator.
 
     Raises:
         BehaviourError: The text is too long.
     """
     joint, pieces, size = text(between), [], 0
-    for one in _as_list(of):
-        pieces.append(text(one))
+    for value in _as_list(values):
+        pieces.append(text(value))
         size += len(pieces[-1]) + len(joint)
         if size > MAX_TEXT_LENGTH:
             raise BehaviourError(
@@ -113,86 +113,86 @@ def join_items(of: object, between: object) -> str:
     return joint.join(pieces)
 
 
-def split_text(words: object, at: object) -> list[object]:
+def split_text(value: object, separator: object) -> list[object]:
     """Split a text at a separator; into single characters if the separator is empty."""
-    whole, joint = text(words), text(at)
-    pieces = whole.split(joint) if joint else grapheme_clusters(whole)
+    full_text, joint = text(value), text(separator)
+    pieces = full_text.split(joint) if joint else grapheme_clusters(full_text)
     if len(pieces) > MAX_ITEMS:
         raise _full_error()
     return [*pieces]
 
 
-def part_of_list(of: object, first: object, last: object) -> list[object]:
+def part_of_list(values: object, first: object, last: object) -> list[object]:
     """Return the items from one number to another, inclusive; the range is limited to the list."""
     begin, end = (math.floor(number(each, lazy("“items”"))) for each in (first, last))
-    return _copy_list(_as_list(of)[max(begin, 1) - 1 : max(end, 0)])
+    return _copy_list(_as_list(values)[max(begin, 1) - 1 : max(end, 0)])
 
 
-def is_empty_list(of: object) -> bool:
+def is_empty_list(values: object) -> bool:
     """Return True if a list is empty."""
-    return not _as_list(of)
+    return not _as_list(values)
 
 
-def clear_list(of: object) -> None:
+def clear_list(values: object) -> None:
     """Remove all items from a list."""
-    _mutable_list(of).clear()
+    _mutable_list(values).clear()
 
 
-def copy_of(of: object) -> list[object]:
+def copy_of(values: object) -> list[object]:
     """Return a deep copy of a list."""
-    return _copy_list(_as_list(of))
+    return _copy_list(_as_list(values))
 
 
-def sorted_up(of: object) -> list[object]:
+def sorted_up(values: object) -> list[object]:
     """Return a list sorted in ascending order: numbers, then texts (ignoring case), then other values."""
-    return sorted(_copy_list(_as_list(of)), key=_sort_key)
+    return sorted(_copy_list(_as_list(values)), key=_sort_key)
 
 
-def sorted_down(of: object) -> list[object]:
+def sorted_down(values: object) -> list[object]:
     """Return a list sorted in descending order; see `sorted_up`."""
-    return sorted_up(of)[::-1]
+    return sorted_up(values)[::-1]
 
 
-def turned_round(of: object) -> list[object]:
+def turned_round(values: object) -> list[object]:
     """Return a list in reverse order."""
-    return _copy_list(_as_list(of))[::-1]
+    return _copy_list(_as_list(values))[::-1]
 
 
-def shuffled(of: object) -> list[object]:
+def shuffled(values: object) -> list[object]:
     """Return a list in random order."""
-    items = _copy_list(_as_list(of))
+    items = _copy_list(_as_list(values))
     random.shuffle(items)
     return items
 
 
-def sum_of(of: object) -> int | float:
+def sum_of(values: object) -> int | float:
     """Return the sum of a list of numbers; 0 if the list is empty."""
-    return sum(_numbers(of, lazy("“sum”")))
+    return sum(_numbers(values, lazy("“sum”")))
 
 
-def average_of(of: object) -> float:
+def average_of(values: object) -> float:
     """Return the mean of a list of numbers. Raises BehaviourError if the list is empty."""
-    items = _non_empty(_numbers(of, lazy("“average”")))
+    items = _non_empty(_numbers(values, lazy("“average”")))
     return sum(items) / len(items)
 
 
-def smallest_of(of: object) -> int | float:
+def smallest_of(values: object) -> int | float:
     """Return the smallest number of a list. Raises BehaviourError if the list is empty."""
-    return min(_non_empty(_numbers(of, lazy("“smallest number”"))))
+    return min(_non_empty(_numbers(values, lazy("“smallest number”"))))
 
 
-def largest_of(of: object) -> int | float:
+def largest_of(values: object) -> int | float:
     """Return the largest number of a list. Raises BehaviourError if the list is empty."""
-    return max(_non_empty(_numbers(of, lazy("“largest number”"))))
+    return max(_non_empty(_numbers(values, lazy("“largest number”"))))
 
 
-def middle_of(of: object) -> int | float:
+def middle_of(values: object) -> int | float:
     """Return the median of a list of numbers. Raises BehaviourError if the list is empty."""
-    return statistics.median(_non_empty(_numbers(of, lazy("“middle number”"))))
+    return statistics.median(_non_empty(_numbers(values, lazy("“middle number”"))))
 
 
-def _numbers(of: object, what: str) -> list[int | float]:
-    return [number(each, what) for each in _as_list(of)]
+def _numbers(values: object, label: str) -> list[int | float]:
+    return [number(each, label) for each in _as_list(values)]
 
 
 def _non_empty(items: list[int | float]) -> list[int | float]:
@@ -207,19 +207,19 @@ def _sort_key(value: object) -> tuple[int, float, str]:
     return (1 if isinstance(value, str) else 2, 0, text(value).casefold())
 
 
-def _as_list(of: object) -> Sequence[object]:
-    if isinstance(of, (list, tuple)):
-        return of
-    if of is None:
+def _as_list(value: object) -> Sequence[object]:
+    if isinstance(value, (list, tuple)):
+        return value
+    if value is None:
         raise BehaviourError(_("This list has no value yet."), unknown=True)
-    said = _("This block needs a list, not {kind}.")
-    if of == 0 and isinstance(of, int):
-        said = _("This block needs a list, not {kind}. Set the variable to an empty list first.")
-    raise BehaviourError(said.format(kind=type_name(of)))
+    message = _("This block needs a list, not {kind}.")
+    if value == 0 and isinstance(value, int):
+        message = _("This block needs a list, not {kind}. Set the variable to an empty list first.")
+    raise BehaviourError(message.format(kind=type_name(value)))
 
 
-def _mutable_list(of: object) -> list[object]:
-    items = _as_list(of)
+def _mutable_list(values: object) -> list[object]:
+    items = _as_list(values)
     if not isinstance(items, list):
         raise BehaviourError(
             _("This list can't be changed. Set a variable to a copy of it and change the copy.")
@@ -227,26 +227,28 @@ def _mutable_list(of: object) -> list[object]:
     return items
 
 
-def _index(items: Sequence[object], where: object) -> int:
+def _index(items: Sequence[object], selector: object) -> int:
     if not items:
         raise BehaviourError(_("The list is empty."))
-    if where == FIRST:
+    if selector == FIRST:
         return 0
-    if where == LAST:
+    if selector == LAST:
         return len(items) - 1
-    if where == RANDOM:
+    if selector == RANDOM:
         return random.randrange(len(items))  # noqa: S311 (a game, no secret)
-    place = number(where, lazy("“item number”"))
-    if place != int(place):
-        raise BehaviourError(_("“item number” needs a whole number, not {place}.").format(place=text(place)))
-    if not 1 <= place <= len(items):
-        said = ngettext(
+    item_number = number(selector, lazy("“item number”"))
+    if item_number != int(item_number):
+        raise BehaviourError(
+            _("“item number” needs a whole number, not {place}.").format(place=text(item_number))
+        )
+    if not 1 <= item_number <= len(items):
+        message = ngettext(
             "The list has only {count} item; it has no item {number}.",
             "The list has only {count} items; it has no item {number}.",
             len(items),
         )
-        raise BehaviourError(said.format(count=len(items), number=text(place)))
-    return int(place) - 1
+        raise BehaviourError(message.format(count=len(items), number=text(item_number)))
+    return int(item_number) - 1
 
 
 def _are_equal(one: object, other: object) -> bool:
@@ -266,11 +268,11 @@ def _copy_if_room(items: list[object], value: object) -> object:
 
 def _copy_list(items: Sequence[object]) -> list[object]:
     room = MAX_ITEMS - len(items)
-    for one in items:
-        room -= _count_items(one, MAX_ITEMS)
+    for value in items:
+        room -= _count_items(value, MAX_ITEMS)
         if room < 0:
             raise _full_error()
-    return [_deep_copy(one) for one in items]
+    return [_deep_copy(value) for value in items]
 
 
 def _deep_copy(value: object) -> object:
@@ -279,15 +281,15 @@ def _deep_copy(value: object) -> object:
     return value
 
 
-def _count_items(value: object, enough: int) -> int:
+def _count_items(value: object, max_count: int) -> int:
     if not isinstance(value, (list, tuple)):
         return 0
-    found, waiting = 0, [value]
-    while waiting and found <= enough:
-        here = waiting.pop()
-        found += len(here)
-        waiting += [each for each in here if isinstance(each, (list, tuple)) and each]
-    return found
+    item_count, waiting = 0, [value]
+    while waiting and item_count <= max_count:
+        current = waiting.pop()
+        item_count += len(current)
+        waiting += [each for each in current if isinstance(each, (list, tuple)) and each]
+    return item_count
 
 
 def _full_error() -> BehaviourError:

@@ -25,61 +25,61 @@ _GROUPED_NUMBER = re.compile(r"[1-9]\d{0,2}(?:,\d{3})+(?:\.\d+)?")
 _MAX_DIGITS = 300
 
 
-def letter(of: object, where: object) -> str:
+def letter(value: object, selector: object) -> str:
     """Return a character of a text.
 
     Args:
-        of: Text.
-        where: Number of the character, "first", "last" or "random".
+        value: Text.
+        selector: Number of the character, "first", "last" or "random".
     """
-    all_of_it = grapheme_clusters(text(of))
+    all_of_it = grapheme_clusters(text(value))
     if not all_of_it:
         raise BehaviourError(_("The text is empty."))
-    if where == "random":
+    if selector == "random":
         return random.choice(all_of_it)  # noqa: S311 (a game, no secret)
-    named = {"first": 1, "last": len(all_of_it)}
-    place = named.get(where) if isinstance(where, str) else None
-    wanted = number(where, lazy("“letter number”")) if place is None else place
-    if wanted != int(wanted):
+    number_by_name = {"first": 1, "last": len(all_of_it)}
+    named_number = number_by_name.get(selector) if isinstance(selector, str) else None
+    letter_number = number(selector, lazy("“letter number”")) if named_number is None else named_number
+    if letter_number != int(letter_number):
         raise BehaviourError(
-            _("“letter number” needs a whole number, not {place}.").format(place=text(wanted))
+            _("“letter number” needs a whole number, not {place}.").format(place=text(letter_number))
         )
-    if not 1 <= wanted <= len(all_of_it):
-        said = ngettext(
+    if not 1 <= letter_number <= len(all_of_it):
+        message = ngettext(
             "The text has only {count} letter; it has no letter {number}.",
             "The text has only {count} letters; it has no letter {number}.",
             len(all_of_it),
         )
-        raise BehaviourError(said.format(count=len(all_of_it), number=text(wanted)))
-    return all_of_it[int(wanted) - 1]
+        raise BehaviourError(message.format(count=len(all_of_it), number=text(letter_number)))
+    return all_of_it[int(letter_number) - 1]
 
 
-def part_of_text(of: object, first: object, last: object) -> str:
+def part_of_text(value: object, first: object, last: object) -> str:
     """Return the characters from one number to another, inclusive; the range is limited to the text."""
     begin, end = (math.floor(number(each, lazy("“letters”"))) for each in (first, last))
-    return "".join(grapheme_clusters(text(of))[max(begin, 1) - 1 : max(end, 0)])
+    return "".join(grapheme_clusters(text(value))[max(begin, 1) - 1 : max(end, 0)])
 
 
-def position_in_text(of: object, piece: object) -> int:
+def position_in_text(value: object, piece: object) -> int:
     """Return the number of the character at which a text first occurs in another text; 0 if missing."""
-    whole, wanted = text(of), text(piece)
-    found = whole.find(wanted) if wanted else -1
-    return 0 if found < 0 else len(grapheme_clusters(whole[:found])) + 1
+    full_text, substring = text(value), text(piece)
+    index = full_text.find(substring) if substring else -1
+    return 0 if index < 0 else len(grapheme_clusters(full_text[:index])) + 1
 
 
-def has_in_it(of: object, piece: object) -> bool:
+def has_in_it(value: object, piece: object) -> bool:
     """Return True if a text contains another text."""
-    return text(piece) in text(of)
+    return text(piece) in text(value)
 
 
-def starts_with(of: object, piece: object) -> bool:
+def starts_with(value: object, piece: object) -> bool:
     """Return True if a text starts with another text."""
-    return text(of).startswith(text(piece))
+    return text(value).startswith(text(piece))
 
 
-def ends_with(of: object, piece: object) -> bool:
+def ends_with(value: object, piece: object) -> bool:
     """Return True if a text ends with another text."""
-    return text(of).endswith(text(piece))
+    return text(value).endswith(text(piece))
 
 
 def same_words(one: object, other: object) -> bool:
@@ -112,16 +112,16 @@ def backwards(value: object) -> str:
     return "".join(reversed(grapheme_clusters(text(value))))
 
 
-def replaced(of: object, old: object, new: object) -> str:
+def replaced(value: object, old: object, new: object) -> str:
     """Return a text with all occurrences of a substring replaced."""
-    whole, before, after = text(of), text(old), text(new)
+    full_text, before, after = text(value), text(old), text(new)
     if not before:
-        return whole
-    if len(whole) + whole.count(before) * (len(after) - len(before)) > MAX_TEXT_LENGTH:
+        return full_text
+    if len(full_text) + full_text.count(before) * (len(after) - len(before)) > MAX_TEXT_LENGTH:
         raise BehaviourError(
             _("This text is too long. Use at most {most} characters.").format(most=MAX_TEXT_LENGTH)
         )
-    return whole.replace(before, after)
+    return full_text.replace(before, after)
 
 
 def has_number(value: object) -> bool:
@@ -133,10 +133,10 @@ def number_in(value: object) -> int | float:
     """Return the first number in a text; a number is returned unchanged."""
     if isinstance(value, (int, float)) or value is None:
         return number(value, lazy("“number in”"))
-    found = _parse_number(value)
-    if found is None:
+    parsed = _parse_number(value)
+    if parsed is None:
         raise BehaviourError(_("“{text}” has no number in it.").format(text=text(value)[:60]))
-    return found
+    return parsed
 
 
 def _parse_number(value: object) -> int | float | None:
@@ -148,8 +148,8 @@ def _parse_number(value: object) -> int | float | None:
     if _GROUPED_NUMBER.fullmatch(digits):
         digits = digits.replace(",", "")
     pieces = re.split(r"[.,]", digits)
-    found = int(pieces[0]) if len(pieces) == 1 else float(f"{pieces[0]}.{pieces[1]}")
-    return -found if minus else found
+    parsed = int(pieces[0]) if len(pieces) == 1 else float(f"{pieces[0]}.{pieces[1]}")
+    return -parsed if minus else parsed
 
 
 def _normalize(value: object) -> str:

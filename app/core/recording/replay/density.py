@@ -81,11 +81,11 @@ class Densities:
             end_ns: End of the range.
             buckets: Number of intervals.
         """
-        wanted = (start_ns, end_ns, buckets)
-        if wanted == self._wanted or buckets < 1 or end_ns <= start_ns:
+        requested = (start_ns, end_ns, buckets)
+        if requested == self._wanted or buckets < 1 or end_ns <= start_ns:
             return
-        self._wanted = wanted
-        self._worker.submit("density", lambda: _Result(density=density_of(self._recording, *wanted)))
+        self._wanted = requested
+        self._worker.submit("density", lambda: _Result(density=density_of(self._recording, *requested)))
 
     def collect_results(self) -> bool:
         """Store finished results; return True if there were any.
@@ -122,8 +122,10 @@ def density_of(recording: Recording, start_ns: int, end_ns: int, buckets: int) -
         end_ns: End of the range.
         buckets: Number of intervals.
     """
-    found = recording.densities(start_ns, end_ns, buckets)
-    return Density(start_ns, end_ns, buckets, {topic: array("L", counts) for topic, counts in found.items()})
+    counts_by_topic = recording.densities(start_ns, end_ns, buckets)
+    return Density(
+        start_ns, end_ns, buckets, {topic: array("L", counts) for topic, counts in counts_by_topic.items()}
+    )
 
 
 def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
@@ -132,14 +134,14 @@ def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
     A message that arrived late was first counted as lost. Such messages are subtracted from the newest
     earlier marks, so that the sum of all marks is the final number of lost messages.
     """
-    found: dict[str, list[LossMark]] = {}
+    marks_by_topic: dict[str, list[LossMark]] = {}
     before: dict[str, int] = {}
-    for at_ns, figures in _changing_stats(recording):
-        for topic, each in figures.items():
-            missing = _missing_count(each)
+    for at_ns, stats_by_topic in _changing_stats(recording):
+        for topic, stats in stats_by_topic.items():
+            missing = _missing_count(stats)
             grown = missing - before.get(topic, 0)
             before[topic] = missing
-            marks = found.setdefault(topic, [])
+            marks = marks_by_topic.setdefault(topic, [])
             if grown <= 0:
                 _subtract_late(marks, -grown)
             elif len(marks) < MAX_MARKS:
@@ -147,10 +149,10 @@ def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
             else:
                 marks[-1] = LossMark(marks[-1].at_ns, marks[-1].count + grown)
     if recording.is_complete:  # not all counts were read
-        before = {topic: _missing_count(each) for topic, each in recording.stats().items()}
-    for topic, marks in found.items():
+        before = {topic: _missing_count(stats) for topic, stats in recording.stats().items()}
+    for topic, marks in marks_by_topic.items():
         _subtract_late(marks, sum(mark.count for mark in marks) - before.get(topic, 0))
-    return {topic: tuple(marks) for topic, marks in found.items() if marks}
+    return {topic: tuple(marks) for topic, marks in marks_by_topic.items() if marks}
 
 
 def _subtract_late(marks: list[LossMark], count: int) -> None:
@@ -170,23 +172,27 @@ def _changing_stats(recording: Recording) -> Iterator[tuple[int, Mapping[str, To
         yield from recording.stats_over_time()
         return
     pieces = recording.stats_chunks()
-    told: dict[int, list[tuple[int, dict[str, TopicStats]]]] = {}
+    stats_by_chunk: dict[int, list[tuple[int, dict[str, TopicStats]]]] = {}
     final = {topic: _missing_count(each) for topic, each in recording.stats().items()}
     spans: list[tuple[int, int, Mapping[str, int], Mapping[str, int]]] = [(-1, len(pieces), {}, final)]
     while spans:
-        first, last, least, most = spans.pop()
-        if last - first < 2 or all(least.get(topic, 0) >= count for topic, count in most.items()):
+        first, last, lower_counts, upper_counts = spans.pop()
+        if last - first < 2 or all(
+            lower_counts.get(topic, 0) >= count for topic, count in upper_counts.items()
+        ):
             continue
         middle = (first + last) // 2
-        told[middle] = list(recording.stats_over_time((pieces[middle],)))
-        there = {
-            topic: _missing_count(each) for _at_ns, figures in told[middle] for topic, each in figures.items()
+        stats_by_chunk[middle] = list(recording.stats_over_time((pieces[middle],)))
+        counts = {
+            topic: _missing_count(each)
+            for _at_ns, stats in stats_by_chunk[middle]
+            for topic, each in stats.items()
         }
-        spans.append((first, middle, least, {**most, **there}))
-        spans.append((middle, last, {**least, **there}, most))
-    for number in sorted(told):
-        yield from told[number]
+        spans.append((first, middle, lower_counts, {**upper_counts, **counts}))
+        spans.append((middle, last, {**lower_counts, **counts}, upper_counts))
+    for number in sorted(stats_by_chunk):
+        yield from stats_by_chunk[number]
 
 
-def _missing_count(figures: TopicStats) -> int:
-    return (figures.lost or 0) + figures.unkept
+def _missing_count(stats: TopicStats) -> int:
+    return (stats.lost or 0) + stats.unkept

@@ -36,8 +36,8 @@ def open_recording(path: Path, progress: Progress, opener: RecordingOpener | Non
         opener: Opens the file; by default, in this process.
     """
 
-    def report_progress(done: int, whole: int) -> None:
-        progress(done / max(1, whole))
+    def report_progress(done: int, total: int) -> None:
+        progress(done / max(1, total))
 
     progress(0.0)
     recording = (opener or LocalOpener()).open(path, progress=report_progress)

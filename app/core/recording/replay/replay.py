@@ -206,10 +206,10 @@ class Replay:
 
     def set_speed(self, speed: float) -> None:
         """Set the playback speed, limited to the supported range."""
-        wanted = max(SPEED_MIN, min(SPEED_MAX, speed)) if speed == speed else 1.0  # noqa: PLR0124  excludes NaN
+        clamped = max(SPEED_MIN, min(SPEED_MAX, speed)) if speed == speed else 1.0  # noqa: PLR0124  excludes NaN
 
         def change(playback: Playback) -> None:
-            playback.speed = wanted
+            playback.speed = clamped
 
         self.source.queue_change("speed", change)
 
@@ -350,10 +350,10 @@ class Replay:
         if reason and not self._has_failed:
             self._has_failed = True
             title = _("{name} can't be played.").format(name=self.name)
-            sentence = f"{reason[:1].upper()}{reason[1:]}."
+            message = f"{reason[:1].upper()}{reason[1:]}."
             action = f"{SHOW_FILE_COMMAND}:{self.path}"
             self._alerts.raise_alert(
-                FAILED, "error", title, sentence, button=_("Show the file"), action=action
+                FAILED, "error", title, message, button=_("Show the file"), action=action
             )
         if len(status.corruption) > self._damaged:
             self._damaged = len(status.corruption)
@@ -395,26 +395,26 @@ class Replay:
 
     def _start_watch(self, topic: str) -> None:
         self.source.watch(topic)
-        known = self.topics.get(topic)
-        if known is not None:
-            known.is_watched = True
+        replayed = self.topics.get(topic)
+        if replayed is not None:
+            replayed.is_watched = True
 
     def _stop_watch(self, topic: str) -> None:
         self.source.unwatch(topic)
         self.topics.unwatch(topic)
 
 
-def create_graph(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicStats]) -> GraphView:
+def create_graph(topics: Mapping[str, RecordedTopic], stats: Mapping[str, TopicStats]) -> GraphView:
     """Return a graph that represents a recording: its topics, their publisher counts, and losses."""
-    found = {}
+    infos = {}
     for name, topic in topics.items():
-        known = figures.get(name)
+        topic_stats = stats.get(name)
         publishers = tuple(
             PublisherInfo(number or 0, "", (), False, topic.message_count, 0, 0, None, None, None)
             for number in topic.publishers or (None,)
         )
-        lost = known.lost if known is not None else None
-        sent = known.received + lost if known is not None and lost is not None else 0
+        lost = topic_stats.lost if topic_stats is not None else None
+        sent = topic_stats.received + lost if topic_stats is not None and lost is not None else 0
         ratio = lost / sent if lost is not None and sent else None
-        found[name] = TopicInfo(name, topic.msg_type, topic.codec, publishers, lost=lost, loss_ratio=ratio)
-    return GraphView(1, 1, topics=found)
+        infos[name] = TopicInfo(name, topic.msg_type, topic.codec, publishers, lost=lost, loss_ratio=ratio)
+    return GraphView(1, 1, topics=infos)

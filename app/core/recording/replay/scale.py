@@ -62,8 +62,8 @@ class TimeScale:
             factor: Ratio of the new to the current visible range; above 1 zooms out.
             at_ns: Fixed time.
         """
-        whole = self.last_ns - self.first_ns
-        span = max(MIN_SPAN_NS, min(whole, round(self.span_ns * factor)))
+        total_span = self.last_ns - self.first_ns
+        span = max(MIN_SPAN_NS, min(total_span, round(self.span_ns * factor)))
         return self._with_start(at_ns - round(self.relative_position(at_ns) * span), span)
 
     def moved(self, by_ns: int) -> TimeScale:
@@ -80,23 +80,25 @@ class TimeScale:
         begin_ns = max(self.first_ns, min(begin_ns, self.last_ns - span))
         return replace(self, start_ns=begin_ns, end_ns=begin_ns + span)
 
-    def mark_interval_s(self, most: int) -> float:
+    def mark_interval_s(self, max_marks: int) -> float:
         """Return the interval between ruler marks in seconds.
 
         Args:
-            most: Maximum number of marks.
+            max_marks: Maximum number of marks.
         """
-        least = self.span_ns / 1e9 / max(1, most)
-        return next((step for step in STEPS_S if step >= least), 86_400.0 * ceil(least / 86_400.0))
+        min_interval_s = self.span_ns / 1e9 / max(1, max_marks)
+        return next(
+            (step for step in STEPS_S if step >= min_interval_s), 86_400.0 * ceil(min_interval_s / 86_400.0)
+        )
 
-    def marks(self, most: int, *, by_clock: bool = False) -> Iterator[int]:
+    def marks(self, max_marks: int, *, by_clock: bool = False) -> Iterator[int]:
         """Yield the times of the ruler marks.
 
         Args:
-            most: Maximum number of marks.
+            max_marks: Maximum number of marks.
             by_clock: True to align the marks to the local time of day, False to the recording's start.
         """
-        step_ns = round(self.mark_interval_s(most) * 1e9)
+        step_ns = round(self.mark_interval_s(max_marks) * 1e9)
         origin_ns = offset_ns(self.first_ns) if by_clock else self.first_ns
         number = -((origin_ns - self.start_ns) // step_ns)
         while (at_ns := origin_ns + number * step_ns) <= self.end_ns:
@@ -122,11 +124,11 @@ def duration_text(ns: int, *, digits: int = 3) -> str:
     """
     sign, ns = ("-", -ns) if ns < 0 else ("", ns)
     unit = 10 ** (9 - digits)
-    whole, rest = divmod(ns // unit, 10**digits)
-    minutes, seconds = divmod(whole, 60)
+    total_s, rest = divmod(ns // unit, 10**digits)
+    minutes, seconds = divmod(total_s, 60)
     hours, minutes = divmod(minutes, 60)
-    words = f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
-    return f"{sign}{words}.{rest:0{digits}d}" if digits else f"{sign}{words}"
+    text = f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
+    return f"{sign}{text}.{rest:0{digits}d}" if digits else f"{sign}{text}"
 
 
 def clock_text(at_ns: int, *, digits: int = 3) -> str:
@@ -137,9 +139,9 @@ def clock_text(at_ns: int, *, digits: int = 3) -> str:
         digits: Number of decimals of the seconds.
     """
     seconds, rest = divmod(at_ns, 1_000_000_000)
-    then = time.localtime(seconds)
-    words = f"{then.tm_hour}:{then.tm_min:02d}:{then.tm_sec:02d}"
-    return f"{words}.{rest // 10 ** (9 - digits):0{digits}d}" if digits else words
+    local_time = time.localtime(seconds)
+    text = f"{local_time.tm_hour}:{local_time.tm_min:02d}:{local_time.tm_sec:02d}"
+    return f"{text}.{rest // 10 ** (9 - digits):0{digits}d}" if digits else text
 
 
 def date_text(at_ns: int) -> str:

@@ -134,9 +134,9 @@ class ReplayOutbox:
             late_s: Delay of each message in seconds.
         """
         with self._lock:
-            going = dict(self._active)
+            active = dict(self._active)
         for message, late in zip(messages, late_s, strict=True):
-            sent = going.get(message.topic)
+            sent = active.get(message.topic)
             if sent is not None and sent.is_ready and not sent.problem:
                 self._send(sent, message, late)
 
@@ -161,12 +161,12 @@ class ReplayOutbox:
         # A robot without permission may have connected just now.
         if self._gate is None or sent.node is None:
             return False
-        heard, name = publisher.subscribers, sent.route.name
-        if heard == sent.checked.get(publisher):
+        subscribers, name = publisher.subscribers, sent.route.name
+        if subscribers == sent.checked.get(publisher):
             return bool(self._gate.rejection_reason(name))
         is_refused = bool(self._gate.current_rejection_reason(sent.node, name))
         if not is_refused:
-            sent.checked[publisher] = heard
+            sent.checked[publisher] = subscribers
         return is_refused
 
     # ---- in the network thread
@@ -252,8 +252,10 @@ class ReplaySending:
             recorded: Name of the topic in the recording.
             name: Name of the topic on the live network.
         """
-        known = self._moving
-        if known is not None and (known.robots_moved_by(recorded) or known.robots_moved_by(name)):
+        known_topics = self._moving
+        if known_topics is not None and (
+            known_topics.robots_moved_by(recorded) or known_topics.robots_moved_by(name)
+        ):
             return True
         return bool(self._acting.gate.robots_moved_by(name))
 
@@ -273,14 +275,14 @@ class ReplaySending:
         if name is None:
             self.routes.pop(recorded, None)
             return ""
-        wanted = name.strip() or recorded
+        target = name.strip() or recorded
         if recorded not in self.routes and len(self.routes) >= MAX_TARGETS:
             return _("No more topics can be sent. Remove one first.")
         try:
-            check_topic(wanted)
+            check_topic(target)
         except BadTopicError as error:
             return str(error)
-        self.routes[recorded] = wanted
+        self.routes[recorded] = target
         return ""
 
     # ---- switch
@@ -298,19 +300,19 @@ class ReplaySending:
             return _("Choose a topic first.")
         if not self.is_analyzed:
             return _("Still checking which topics move robots. Try again in a moment.")
-        why_not = self._acting.arm(for_replay=True)
-        if why_not:
-            return why_not
-        wanted = [ReplayRoute(recorded, name) for recorded, name in self.routes.items()]
+        problem = self._acting.arm(for_replay=True)
+        if problem:
+            return problem
+        routes = [ReplayRoute(recorded, name) for recorded, name in self.routes.items()]
         for sent in self.outbox.active_topics:
-            if sent.route not in wanted:
+            if sent.route not in routes:
                 self._stop(sent)
                 self._acting.forbid(sent.route.target)
         self._acting.recorded_commands |= {
-            route.name for route in wanted if self.moves_robot(route.recorded, route.name)
+            route.name for route in routes if self.moves_robot(route.recorded, route.name)
         }
-        going = {sent.route for sent in self.outbox.active_topics}
-        missing = [route for route in wanted if route not in going]
+        active_routes = {sent.route for sent in self.outbox.active_topics}
+        missing = [route for route in routes if route not in active_routes]
         self._pending_routes = sorted(
             missing, key=lambda route: self._acting.needs_confirmation(route.target)
         )
@@ -356,18 +358,18 @@ class ReplaySending:
 
     def _stop(self, sent: SentTopic) -> None:
         if self.outbox.stop(sent.route.recorded) is not None:
-            words = ", ".join(filter(None, (sent.problem, sent_text(sent))))
-            self._log(sent.route, words, sent.count, is_bad=bool(sent.problem))
+            text = ", ".join(filter(None, (sent.problem, sent_text(sent))))
+            self._log(sent.route, text, sent.count, is_bad=bool(sent.problem))
             self._mark_changed()
 
     def _mark_changed(self) -> None:
         self.revision += 1
         self.on_change()
 
-    def _log(self, route: ReplayRoute, words: str, sent: int = 0, *, is_bad: bool = False) -> None:
+    def _log(self, route: ReplayRoute, text: str, sent: int = 0, *, is_bad: bool = False) -> None:
         if route.name != route.recorded:
-            words = _("{topic} of the recording, {what}").format(topic=route.recorded, what=words)
-        self._acting.log("warn" if is_bad else "info", route.target, words, sent)
+            text = _("{topic} of the recording, {what}").format(topic=route.recorded, what=text)
+        self._acting.log("warn" if is_bad else "info", route.target, text, sent)
 
     def tick(self) -> None:
         """Stop publishing topics that are no longer allowed, or that now move a different robot.
@@ -394,11 +396,11 @@ class ReplaySending:
         if self._worker is None or self._moving is not None or self._opened is None:
             return
         try:
-            taken = self._worker.pop_result("topics")
+            result = self._worker.pop_result("topics")
         except NepError:  # unreadable: every topic may move a robot
-            taken = (MovingTopics(unidentified=self._opened.recording.topics), frozenset())
-        if taken is not None:
-            self._moving, self._latched = taken
+            result = (MovingTopics(unidentified=self._opened.recording.topics), frozenset())
+        if result is not None:
+            self._moving, self._latched = result
             self.revision += 1
 
 
@@ -408,8 +410,8 @@ def _moving_and_latched_topics(recording: Recording) -> tuple[MovingTopics, froz
 
 def sent_text(sent: SentTopic) -> str:
     """Format the message counts of a topic, such as "412 sent, 3 left out, being late"."""
-    words = ngettext("{count} sent", "{count} sent", sent.count).format(count=sent.count)
-    return f"{words}, {late_text(sent.dropped_count)}" if sent.dropped_count else words
+    text = ngettext("{count} sent", "{count} sent", sent.count).format(count=sent.count)
+    return f"{text}, {late_text(sent.dropped_count)}" if sent.dropped_count else text
 
 
 def late_text(count: int) -> str:

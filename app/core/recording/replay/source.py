@@ -298,8 +298,8 @@ class ReplaySource:
             self._apply_seek(due.messages)
             self._update_status(playback)
             with self._changed:
-                deep = frozenset(self._deep)
-            self._read_history(playback, deep & self._chosen)
+                history_topics = frozenset(self._deep)
+            self._read_history(playback, history_topics & self._chosen)
         else:
             if self._sent:
                 self._forward_messages(due.messages, delays_of(due, playback.status()))
@@ -317,45 +317,45 @@ class ReplaySource:
 
     def _update_selection(self, playback: Playback) -> None:
         with self._changed:
-            wanted, deep, sent = frozenset(self._watched), frozenset(self._deep), self._sent
-        seen = wanted - self._chosen  # by a panel, from now on
-        new = seen & deep
-        newest = list(playback.select_topics(wanted | sent))
+            watched, with_history, sent = frozenset(self._watched), frozenset(self._deep), self._sent
+        newly_watched = watched - self._chosen  # by a panel, from now on
+        new = newly_watched & with_history
+        newest = list(playback.select_topics(watched | sent))
         # topics played only for the network: no panel has their newest message
-        played = (seen & self._played) - new
+        played = (newly_watched & self._played) - new
         if played and self.opened is not None:
             before = self.opened.recording.newest(playback.status().position_ns, played)
             newest += [each.message for each in before.values()]
-        self._post_messages([each for each in newest if each.topic in seen - new])
-        self._chosen, self._played = wanted, wanted | sent
+        self._post_messages([each for each in newest if each.topic in newly_watched - new])
+        self._chosen, self._played = watched, watched | sent
         self._read_history(playback, new)
 
     def _post_messages(self, messages: Sequence[Message]) -> None:
         if not messages:
             return
-        own = [_own_copy(message) for message in messages]
-        self._pictures.offer([each for each in own if each.codec == "image"])
+        copies = [_own_copy(message) for message in messages]
+        self._pictures.offer([each for each in copies if each.codec == "image"])
         with self._changed:
-            for topic, some in groupby(sorted(own, key=_topic), key=_topic):
-                self._mailbox.post(topic, list(some))
+            for topic, group in groupby(sorted(copies, key=_topic), key=_topic):
+                self._mailbox.post(topic, list(group))
 
     def _forward_messages(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
         with self._changed:
             topics, to = self._sent, self._forward
-        some = [each for each in zip(messages, late_s, strict=True) if each[0].topic in topics]
-        if some and to is not None:
-            to([message for message, _late in some], [late for _message, late in some])
+        forwarded = [each for each in zip(messages, late_s, strict=True) if each[0].topic in topics]
+        if forwarded and to is not None:
+            to([message for message, _late in forwarded], [late for _message, late in forwarded])
 
     def _apply_seek(self, messages: Sequence[Message]) -> None:
-        own = [_own_copy(message) for message in messages if message.topic in self._chosen]
-        pictures = [each for each in own if each.codec == "image"]
+        copies = [_own_copy(message) for message in messages if message.topic in self._chosen]
+        pictures = [each for each in copies if each.codec == "image"]
         self._pictures.reset([each.topic for each in pictures])
         self._pictures.offer(pictures)
         with self._changed:
             self._mailbox = Mailbox()
             for topic, room in self._deep.items():
                 self._mailbox.set_capacity(topic, room)
-            self._results = ReplayResults(seek_messages=own)
+            self._results = ReplayResults(seek_messages=copies)
 
     # -- history -----------------------------------------------------------------------------------
 
@@ -364,38 +364,44 @@ class ReplaySource:
         if not topics or self.opened is None:
             return
         recording, at_ns = self.opened.recording, playback.status().position_ns
-        found: dict[str, deque[Message]] = {topic: deque() for topic in topics}
-        until_ns, began = at_ns + 1, self._clock()
+        history: dict[str, deque[Message]] = {topic: deque() for topic in topics}
+        until_ns, start_time_s = at_ns + 1, self._clock()
         for back_s in HISTORY_S:
             from_ns = max(recording.start_ns, at_ns - round(back_s * 1e9))
             if (
-                not self._prepend_range(recording, (from_ns, until_ns), found, began)
+                not self._prepend_range(recording, (from_ns, until_ns), history, start_time_s)
                 or from_ns <= recording.start_ns
             ):
                 break
             until_ns = from_ns
-        for topic, each in recording.newest(at_ns, [topic for topic in topics if not found[topic]]).items():
-            found[topic].append(_own_copy(each.message))
+        for topic, entry in recording.newest(
+            at_ns, [topic for topic in topics if not history[topic]]
+        ).items():
+            history[topic].append(_own_copy(entry.message))
         with self._changed:
-            self._results.history.update({topic: list(messages) for topic, messages in found.items()})
+            self._results.history.update({topic: list(messages) for topic, messages in history.items()})
             for topic in topics:  # the history includes all pending messages
                 self._mailbox.discard(topic)
 
     def _prepend_range(
-        self, recording: Recording, span: tuple[int, int], found: dict[str, deque[Message]], began: float
+        self,
+        recording: Recording,
+        span: tuple[int, int],
+        history: dict[str, deque[Message]],
+        start_time_s: float,
     ) -> bool:
         # Prepends the messages of a range; returns False when the limits are reached.
-        topics = [topic for topic, each in found.items() if len(each) < MAX_HISTORY_MESSAGES]
-        came: dict[str, deque[Message]] = {
-            topic: deque(maxlen=MAX_HISTORY_MESSAGES - len(found[topic])) for topic in topics
+        topics = [topic for topic, entry in history.items() if len(entry) < MAX_HISTORY_MESSAGES]
+        earlier: dict[str, deque[Message]] = {
+            topic: deque(maxlen=MAX_HISTORY_MESSAGES - len(history[topic])) for topic in topics
         }
-        for number, each in enumerate(recording.read(span[0], span[1], topics)):
-            came[each.message.topic].append(_own_copy(each.message))
-            if number % 64 == 0 and (self._changes or self._clock() - began > HISTORY_TIMEOUT_S):
+        for number, entry in enumerate(recording.read(span[0], span[1], topics)):
+            earlier[entry.message.topic].append(_own_copy(entry.message))
+            if number % 64 == 0 and (self._changes or self._clock() - start_time_s > HISTORY_TIMEOUT_S):
                 return False  # an incomplete range would be a gap, so it is discarded
-        for topic, messages in came.items():
-            found[topic].extendleft(reversed(messages))
-        return bool(topics) and self._clock() - began <= HISTORY_TIMEOUT_S
+        for topic, messages in earlier.items():
+            history[topic].extendleft(reversed(messages))
+        return bool(topics) and self._clock() - start_time_s <= HISTORY_TIMEOUT_S
 
     # -- statistics --------------------------------------------------------------------------------
 
@@ -413,21 +419,21 @@ class ReplaySource:
     def _read_next_stats(self) -> None:
         if not self._figures or self.opened is None:
             return
-        began, recording = self._clock(), self.opened.recording
+        start_time_s, recording = self._clock(), self.opened.recording
         at_ns, topics = self._figures.pop(0)
         from_ns = max(recording.start_ns, at_ns - round(RATE_WINDOW_S * 1e9))
         passed_s = (at_ns - from_ns) / 1e9
         counts = recording.densities(from_ns, at_ns + 1, 1, topics) if passed_s > 0 else {}
         newest_ns = recording.newest_times(at_ns, topics)
-        figures = {
+        stats = {
             topic: ReplayStats(
                 counts.get(topic, (0,))[0] / passed_s if passed_s > 0 else None, newest_ns.get(topic)
             )
             for topic in topics
         }
         with self._changed:
-            self._results.stats.update(figures)
-        self._figures_s += self._clock() - began
+            self._results.stats.update(stats)
+        self._figures_s += self._clock() - start_time_s
 
 
 class _ClosingError(Exception):

@@ -74,19 +74,21 @@ class _Lane:
 
     def add(self, id: str, span: RecordedSpan) -> None:
         # The start is the earliest of all records.
-        known = self._by_id.get(id)
-        if known is None and len(self._by_id) >= MAX_SPANS:
+        existing = self._by_id.get(id)
+        if existing is None and len(self._by_id) >= MAX_SPANS:
             if len(self._left_out) < MAX_SPANS:
                 self._left_out.add(id)
             return
-        start_ns = self._clamp(span.start_ns if known is None else min(known.start_ns, span.start_ns))
+        start_ns = self._clamp(span.start_ns if existing is None else min(existing.start_ns, span.start_ns))
         end_ns = max(start_ns, self._clamp(span.end_ns))
         self._by_id[id] = replace(span, start_ns=start_ns, end_ns=end_ns)
 
     def end_span(self, id: str, at_ns: int) -> None:
-        known = self._by_id.get(id)
-        if known is not None:
-            self._by_id[id] = replace(known, end_ns=max(known.start_ns, self._clamp(at_ns)), has_ended=True)
+        existing = self._by_id.get(id)
+        if existing is not None:
+            self._by_id[id] = replace(
+                existing, end_ns=max(existing.start_ns, self._clamp(at_ns)), has_ended=True
+            )
 
     def _clamp(self, at_ns: int) -> int:
         return max(self._first_ns, min(at_ns, self._last_ns))
@@ -104,19 +106,19 @@ def spans_of(recording: Recording) -> RecordedSpans:
     return RecordedSpans(runs.sorted(), alarms.sorted(), runs.omitted_count + alarms.omitted_count)
 
 
-def _parse_span(told: Mapping[str, object], at_ns: int, last_ns: int) -> RecordedSpan:
-    since, until = told.get("since_ns"), told.get("until_ns")
+def _parse_span(entry: Mapping[str, object], at_ns: int, last_ns: int) -> RecordedSpan:
+    since, until = entry.get("since_ns"), entry.get("until_ns")
     is_over = type(until) is int
-    result = _text(told, "result")
+    result = _text(entry, "result")
     return RecordedSpan(
         since if type(since) is int and since <= at_ns else at_ns,
         until if type(until) is int else last_ns,
-        _text(told, "name"),
+        _text(entry, "name"),
         is_over,
         result if result in RESULTS else "",
-        _text(told, "words"),
-        told.get("severity") == "error",
-        _text(told, "topic"),
+        _text(entry, "words"),
+        entry.get("severity") == "error",
+        _text(entry, "topic"),
     )
 
 
@@ -124,24 +126,24 @@ def _read_alerts(recording: Recording, lane: _Lane) -> None:
     # Each change of the graph's alerts lists all of them.
     present: dict[str, str] = {}
     for at_ns, entry in recording.entries("alerts"):
-        listed = entry.get("alerts") if isinstance(entry, Mapping) else None
-        there = {
-            _text(each, "id"): each
-            for each in (listed if isinstance(listed, list) else ())[:MAX_SPANS]
-            if isinstance(each, Mapping) and _text(each, "id")
+        alert_list = entry.get("alerts") if isinstance(entry, Mapping) else None
+        alerts_by_id = {
+            _text(alert, "id"): alert
+            for alert in (alert_list if isinstance(alert_list, list) else ())[:MAX_SPANS]
+            if isinstance(alert, Mapping) and _text(alert, "id")
         }
-        for gone in [id for id in present if id not in there]:
-            lane.end_span(present.pop(gone), at_ns)
-        for id, each in there.items():
+        for ended_id in [id for id in present if id not in alerts_by_id]:
+            lane.end_span(present.pop(ended_id), at_ns)
+        for id, alert in alerts_by_id.items():
             if id not in present:
                 present[id] = f"alert-{id}-{at_ns}"
                 _kind, _colon, topic = id.partition(":")
                 lane.add(
                     present[id],
-                    RecordedSpan(at_ns, recording.end_ns, _text(each, "sentence") or id, topic=topic),
+                    RecordedSpan(at_ns, recording.end_ns, _text(alert, "sentence") or id, topic=topic),
                 )
 
 
-def _text(told: Mapping[str, object], key: str) -> str:
-    value = told.get(key)
+def _text(entry: Mapping[str, object], key: str) -> str:
+    value = entry.get(key)
     return value[:_MAX_NAME_LENGTH] if isinstance(value, str) else ""

@@ -22,8 +22,12 @@ class BridgedCommands:
 
     def update(self, view: GraphView, robots: Iterable[Robot]) -> None:
         """Apply a new graph; report robots that received commands from a bridge since the previous graph."""
-        known = view.topics.get(BRIDGES_TOPIC)
-        bridges = {publisher.node_id for publisher in known.publishers} if known is not None else set()
+        bridge_topic = view.topics.get(BRIDGES_TOPIC)
+        bridges = (
+            {publisher.node_id for publisher in bridge_topic.publishers}
+            if bridge_topic is not None
+            else set()
+        )
         counts: dict[int, int] = {}
         moved: list[str] = []
         for robot in robots if bridges else ():

@@ -61,8 +61,8 @@ class MovableRobots:
     @property
     def described_topics(self) -> frozenset[str]:
         """Description topics of the connected robots."""
-        there = {link.name for link in self._links.values() if link.is_connected}
-        return frozenset(topic for topic, name in self._names.items() if name in there)
+        connected_names = {link.name for link in self._links.values() if link.is_connected}
+        return frozenset(topic for topic, name in self._names.items() if name in connected_names)
 
     @property
     def moving_topics(self) -> MovingTopics:
@@ -72,9 +72,9 @@ class MovableRobots:
         described = self.described_topics
         key = (self.view.epoch, self.view.revision, described, now)
         if key != self._key:
-            known = [controls_of(link.robot, link.earlier_topics) for link in links]
+            controls = [controls_of(link.robot, link.earlier_topics) for link in links]
             unread = description_topics(self.view) - described
-            self._key, self._moving = key, moving_topics(self.view, known, unread)
+            self._key, self._moving = key, moving_topics(self.view, controls, unread)
         return self._moving
 
 
@@ -122,11 +122,15 @@ class MotionGate:
             msg_type: Message type; "" if unknown.
             reason: Sentence for the user about the part of Studio that wants to publish.
         """
-        known = {robot.name: robot for robot in self._robots.movable}
+        robots_by_name = {robot.name: robot for robot in self._robots.movable}
         names = self.robots_moved_by(topic, msg_type)
-        wanted = [(known[name], _action_names(known[name])) for name in names if name in known]
-        strangers = [name for name in names if name not in known]
-        is_permitted = self._permission.request_permission(wanted, go_on, strangers, reason)
+        targets = [
+            (robots_by_name[name], _action_names(robots_by_name[name]))
+            for name in names
+            if name in robots_by_name
+        ]
+        strangers = [name for name in names if name not in robots_by_name]
+        is_permitted = self._permission.request_permission(targets, go_on, strangers, reason)
         self.update()
         return is_permitted
 
@@ -135,14 +139,14 @@ class MotionGate:
         now = self._robots.moving_topics, self._permission.revision
         if now == self._followed_state:
             return
-        known = {robot.name: robot for robot in self._robots.movable}
+        robots_by_name = {robot.name: robot for robot in self._robots.movable}
         allowed = {
             name
-            for name, robot in known.items()
+            for name, robot in robots_by_name.items()
             if self._permission.is_allowed(robot) or not risky_actions(robot, _action_names(robot))
         }
         # a permission counts until the robot is identified
-        strangers = self._permission.strangers - known.keys()
+        strangers = self._permission.strangers - robots_by_name.keys()
         self._snapshot = _Snapshot(now[0], strangers | allowed, strangers, self._robots.described_topics)
         self._followed_state = now
 
@@ -151,13 +155,13 @@ class MotionGate:
 
         Thread-safe.
         """
-        known = self._snapshot
+        snapshot = self._snapshot
         return _rejection_text(
             topic,
             [
                 name
-                for name in known.moving_topics.robots_moved_by(topic, msg_type)
-                if name not in known.allowed_robots
+                for name in snapshot.moving_topics.robots_moved_by(topic, msg_type)
+                if name not in snapshot.allowed_robots
             ],
         )
 
@@ -166,17 +170,17 @@ class MotionGate:
 
         Thread-safe. Use it for the first message to subscribers that have just connected.
         """
-        refusal = self.rejection_reason(topic, msg_type)
-        if refusal:
-            return refusal
+        reason = self.rejection_reason(topic, msg_type)
+        if reason:
+            return reason
         try:
             view = node.graph(_GRAPH_TIMEOUT_S)
         except NepError:
             return ""  # no node can have joined without the master
-        known = self._snapshot
-        newcomers = moving_topics(view, (), description_topics(view) - known.described_topics)
+        snapshot = self._snapshot
+        newcomers = moving_topics(view, (), description_topics(view) - snapshot.described_topics)
         return _rejection_text(
-            topic, [name for name in newcomers.robots_on(topic) if name not in known.unknown_robots]
+            topic, [name for name in newcomers.robots_on(topic) if name not in snapshot.unknown_robots]
         )
 
 

@@ -109,7 +109,7 @@ class MotionPermission:
 
     def request_permission(
         self,
-        wanted: Iterable[tuple[Robot, Sequence[str]]],
+        requested: Iterable[tuple[Robot, Sequence[str]]],
         go_on: Callable[[], object],
         strangers: Iterable[str] = (),
         reason: str = "",
@@ -117,16 +117,18 @@ class MotionPermission:
         """Return True if the robots may move now; otherwise ask the user and return False.
 
         Args:
-            wanted: Robots and the actions that they should execute.
+            requested: Robots and the actions that they should execute.
             go_on: Called if the user allows the motion.
             strangers: Robots without a readable description, or topics of unknown robots, that would
                 move too.
             reason: Sentence about the origin of the command, or "" for a command of the user.
         """
-        asked = [
-            (robot, risky_actions(robot, actions)) for robot, actions in wanted if not self.is_allowed(robot)
+        unconfirmed = [
+            (robot, risky_actions(robot, actions))
+            for robot, actions in requested
+            if not self.is_allowed(robot)
         ]
-        open_ = [(robot, moves) for robot, moves in asked if moves]
+        open_ = [(robot, moves) for robot, moves in unconfirmed if moves]
         unknown = tuple(name for name in strangers if name not in self.strangers)
         if not open_ and not unknown:
             return True
@@ -202,8 +204,10 @@ def risky_actions(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
 
     At most `MAX_NAMED_ACTIONS` titles are returned, followed by “more” if there are others.
     """
-    found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
-    titles = [f"“{title}”" for title in dict.fromkeys(found)]
+    risky_titles = [
+        action.title for name in actions if (action := robot.action(name)) is not None and action.risk
+    ]
+    titles = [f"“{title}”" for title in dict.fromkeys(risky_titles)]
     return (
         (*titles[:MAX_NAMED_ACTIONS], pgettext("after a list", "more"))
         if len(titles) > MAX_NAMED_ACTIONS
@@ -216,13 +220,13 @@ def actions_by_robot(program: Program, robots: Iterable[Robot]) -> list[tuple[Ro
 
     If the program publishes on the topics of a robot directly, all actions of that robot are included.
     """
-    asked, moved = program.actions, program.moves
+    actions_by_name, moved = program.actions, program.moves
     return [
         (
             robot,
             [action.name for action in robot.actions]
-            if asked is None or robot.name in moved
-            else asked.get(robot.name, ()),
+            if actions_by_name is None or robot.name in moved
+            else actions_by_name.get(robot.name, ()),
         )
         for robot in robots
     ]

@@ -127,15 +127,15 @@ class StopChannel:
         """
         program = target.identity
         if self.subscriber is None or program is None:
-            is_there = self.subscriber is None or self.publisher.subscribers > 0
+            is_reachable = self.subscriber is None or self.publisher.subscribers > 0
         else:
             # By name: a hung program that was restarted may still be missing although all others are
             # connected.
             connected, missing = self.publisher.subscribers, self.publisher.missing
             is_complete = program.node not in missing or connected >= len(hearers)
-            is_there = program.node_id in hearers and connected > 0 and is_complete
-        self.was_connected |= is_there
-        return is_there
+            is_reachable = program.node_id in hearers and connected > 0 and is_complete
+        self.was_connected |= is_reachable
+        return is_reachable
 
     def close(self) -> None:
         """Close the publisher and the subscriber."""
@@ -164,7 +164,7 @@ class StopLine:
     @property
     def reply_topics(self) -> set[str]:
         """Topics of the robot's replies."""
-        return {way.reply for way in self.target.topic_sets}
+        return {topic_set.reply for topic_set in self.target.topic_sets}
 
     @property
     def is_complete(self) -> bool:
@@ -174,12 +174,12 @@ class StopLine:
     @property
     def connection_problem(self) -> str:
         """Reason why the robot can't have received a message; "" if it was connected at any time."""
-        if any(way.was_connected for way in self.channels.values()):
+        if any(channel.was_connected for channel in self.channels.values()):
             return ""
         return _("{robot} isn't connected yet").format(robot=self.name)
 
     @property
     def send_problem(self) -> str:
         """Error message stating why the Stop can't be sent to the robot."""
-        why = self.error or _("not connected yet; press Stop again")
-        return _("Stop can't be sent to {robot}: {why}").format(robot=self.name, why=why)
+        reason = self.error or _("not connected yet; press Stop again")
+        return _("Stop can't be sent to {robot}: {why}").format(robot=self.name, why=reason)

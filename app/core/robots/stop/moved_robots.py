@@ -120,9 +120,9 @@ class MovedRobots:
 
         Motions with a known sender take precedence over unfinished actions and unproven Stops.
         """
-        found = self._motions.get(name, [])
-        known = [motion for motion in found if motion.is_known] or found
-        return known[-1] if known else None
+        motions = self._motions.get(name, [])
+        candidates = [motion for motion in motions if motion.is_known] or motions
+        return candidates[-1] if candidates else None
 
     def other_programs(self, name: str, current: Identity | None) -> tuple[Identity, ...]:
         """Return other programs that received commands of a robot and may still be running.
@@ -153,26 +153,26 @@ class MovedRobots:
         """
         for name in names:
             self._count += 1
-            meant = program if program is not None else self._program_of(name)
-            motion = UnconfirmedMotion(self._count, name, by, self._clock(), meant, id)
-            found = self._motions.setdefault(name, [])
-            if not id or len(found) >= MAX_MOTIONS:  # of motions that end together only the newest is kept
+            target_program = program if program is not None else self._program_of(name)
+            motion = UnconfirmedMotion(self._count, name, by, self._clock(), target_program, id)
+            motions = self._motions.setdefault(name, [])
+            if not id or len(motions) >= MAX_MOTIONS:  # of motions that end together only the newest is kept
                 motion = replace(motion, id="")
-                found[:] = [
-                    each for each in found if each.id or (each.sender, each.program) != (by, motion.program)
+                motions[:] = [
+                    each for each in motions if each.id or (each.sender, each.program) != (by, motion.program)
                 ]
-            found.append(motion)
+            motions.append(motion)
             if program is None:
                 self._sent[name] = motion
-                self._record_others(name, by, found)
+                self._record_others(name, by, motions)
 
-    def _record_others(self, name: str, by: str, found: list[UnconfirmedMotion]) -> None:
+    def _record_others(self, name: str, by: str, motions: list[UnconfirmedMotion]) -> None:
         # Other programs of the same robot received the command too: a frozen one may execute it when it
         # resumes.
-        known = {motion.program for motion in found if not motion.id}
+        recorded_programs = {motion.program for motion in motions if not motion.id}
         for other in self._others_of(name):
-            if other not in known and len(found) < MAX_MOTIONS:
-                found.append(UnconfirmedMotion(self._count, name, by, self._clock(), other))
+            if other not in recorded_programs and len(motions) < MAX_MOTIONS:
+                motions.append(UnconfirmedMotion(self._count, name, by, self._clock(), other))
 
     def record_new_programs(self, newcomers: Mapping[str, Iterable[Identity]]) -> None:
         """Record commands that newly listed programs may have received before the graph listed them.
@@ -184,14 +184,14 @@ class MovedRobots:
             newcomers: New programs of each robot in `recently_commanded`.
         """
         for name, programs in newcomers.items():
-            sent, found = self._sent[name], self._motions.get(name, [])
-            known = {motion.program for motion in found if motion.number >= sent.number}
+            sent, motions = self._sent[name], self._motions.get(name, [])
+            recorded_programs = {motion.program for motion in motions if motion.number >= sent.number}
             for program in programs:
                 is_still = self._proven.get(program.node_id, -1) >= sent.number
-                if program not in known and not is_still and len(found) < MAX_MOTIONS:
-                    found.append(replace(sent, program=program, id=""))
-            if found:
-                self._motions[name] = found
+                if program not in recorded_programs and not is_still and len(motions) < MAX_MOTIONS:
+                    motions.append(replace(sent, program=program, id=""))
+            if motions:
+                self._motions[name] = motions
         last, self._graph_mark = self._graph_mark, self._count
         self._sent = {name: sent for name, sent in self._sent.items() if sent.number > last}
         self._proven = {node: mark for node, mark in self._proven.items() if mark > last}
@@ -274,8 +274,8 @@ class MovedRobots:
         )
 
     def _retain_motions(self, name: str, stays: Callable[[UnconfirmedMotion], bool]) -> None:
-        left = [motion for motion in self._motions.get(name, ()) if stays(motion)]
-        if left:
-            self._motions[name] = left
+        retained = [motion for motion in self._motions.get(name, ()) if stays(motion)]
+        if retained:
+            self._motions[name] = retained
         else:
             self._motions.pop(name, None)

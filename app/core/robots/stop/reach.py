@@ -34,19 +34,19 @@ def targets_of(
         moved: Record of the robots that may be moving.
         unlisted: Targets for robots that are not listed.
     """
-    here, absent = [], []
+    expected, absent = [], []
     for link in links:
         is_expected = link.is_connected or link.name in moved
         earlier = moved.other_programs(link.name, link.identity)
         target = StopTarget(link.robot, link.identity, earlier, link.earlier_topics, is_expected)
         if is_expected:
-            here.append(target)
+            expected.append(target)
         elif link.has_confirmed_stop or link.last_reply_s is not None:
             absent.append(target)
-    names = {target.robot.name for target in here}
+    names = {target.robot.name for target in expected}
     others = [target for target in unlisted if target.robot.name not in names]
     unknown = [_unknown_target(topic) for topic in moved.names if "/" in topic]
-    return (*here, *unknown, *absent[:MAX_ABSENT], *others[:MAX_UNLISTED])
+    return (*expected, *unknown, *absent[:MAX_ABSENT], *others[:MAX_UNLISTED])
 
 
 def _unknown_target(topic: str) -> StopTarget:
@@ -71,33 +71,33 @@ def unlisted_targets(
         topics: Topics of descriptions.
         is_expected: True if the replies are awaited.
     """
-    wanted = [topic for topic in topics if topic_of(_name_of(topic), "description") == topic]
-    if not wanted:
+    descriptions = [topic for topic in topics if topic_of(_name_of(topic), "description") == topic]
+    if not descriptions:
         return ()
-    heard, answered = _topics_by_node(view, _COMMAND), _topics_by_node(view, _ANSWER)
-    found = []
-    for topic in wanted:
+    subscribed_topics, published_topics = _topics_by_node(view, _COMMAND), _topics_by_node(view, _ANSWER)
+    targets = []
+    for topic in descriptions:
         name, nodes = _name_of(topic), publisher_nodes(view, topic)
         node = nodes[0] if nodes else ""
         home = topic_of(name, "command")
-        own = [each for each in heard.get(node, ()) if each != home]
-        commands = [*([home] if subscriber_nodes(view, home) else []), *own]
-        answers = answered.get(node, ())
-        answer = topic_of(name, "answer")
-        answer = answer if answer in answers or not answers else answers[0]
-        ways = [RobotTopics(topic, command, answer) for command in commands]
-        if ways:
+        extra_commands = [each for each in subscribed_topics.get(node, ()) if each != home]
+        commands = [*([home] if subscriber_nodes(view, home) else []), *extra_commands]
+        reply_topics = published_topics.get(node, ())
+        reply_topic = topic_of(name, "answer")
+        reply_topic = reply_topic if reply_topic in reply_topics or not reply_topics else reply_topics[0]
+        topic_sets = [RobotTopics(topic, command, reply_topic) for command in commands]
+        if topic_sets:
             identity = identity_of(view, node) if node else None
-            others = tuple(ways[1:])
-            found.append(
+            others = tuple(topic_sets[1:])
+            targets.append(
                 StopTarget(
-                    _placeholder_robot(name, ways[0]),
+                    _placeholder_robot(name, topic_sets[0]),
                     identity,
                     earlier_topics=others,
                     is_expected=is_expected,
                 )
             )
-    return tuple(found)
+    return tuple(targets)
 
 
 def _name_of(topic: str) -> str:
@@ -106,10 +106,10 @@ def _name_of(topic: str) -> str:
 
 def _topics_by_node(view: GraphView, msg_type: str) -> Mapping[str, list[str]]:
     # Topics of a type that each node subscribes to (commands) or publishes (replies).
-    found: dict[str, list[str]] = {}
+    topics_by_node: dict[str, list[str]] = {}
     for topic, info in view.topics.items():
         if info.msg_type == msg_type:
             nodes = subscriber_nodes(view, topic) if msg_type == _COMMAND else publisher_nodes(view, topic)
             for node in nodes:
-                found.setdefault(node, []).append(topic)
-    return found
+                topics_by_node.setdefault(node, []).append(topic)
+    return topics_by_node

@@ -62,8 +62,8 @@ class RobotStop:
     def message(self) -> str:
         """Result as a sentence, such as "Pepper stopped (41 ms)"."""
         if self.is_confirmed and self.waited_ms:
-            words = _("{robot} stopped ({elapsed} ms, including {waited} ms without a connection)")
-            return words.format(
+            template = _("{robot} stopped ({elapsed} ms, including {waited} ms without a connection)")
+            return template.format(
                 robot=self.full_name, elapsed=f"{self.elapsed_ms or 0:.0f}", waited=f"{self.waited_ms:.0f}"
             )
         if self.is_confirmed:
@@ -147,15 +147,17 @@ class StopReport:
         confirmed = (robot.name for robot in self.robots if robot.can_confirm and robot.is_confirmed)
         return tuple(dict.fromkeys(name for name in confirmed if name not in silent))
 
-    def with_unreached(self, names: Iterable[str], why: str = "") -> StopReport:
+    def with_unreached(self, names: Iterable[str], reason: str = "") -> StopReport:
         """Return the report with a result added for each of these robots that is missing in it.
 
         Args:
             names: Names of the robots that should have been stopped.
-            why: Reason why the missing robots were not reached.
+            reason: Reason why the missing robots were not reached.
         """
-        there = {robot.name for robot in self.robots}
-        missing = [unreached_result(name, why) for name in dict.fromkeys(names) if name not in there]
+        reported_names = {robot.name for robot in self.robots}
+        missing = [
+            unreached_result(name, reason) for name in dict.fromkeys(names) if name not in reported_names
+        ]
         return replace(self, robots=(*self.robots, *missing)) if missing else self
 
     def with_late_reply(self, late: RobotStop) -> StopReport:
@@ -168,15 +170,15 @@ class StopReport:
         return replace(self, robots=tuple(robots), elapsed_ms=max(self.elapsed_ms, late.elapsed_ms or 0.0))
 
 
-def unreached_result(name: str, why: str = "") -> RobotStop:
+def unreached_result(name: str, reason: str = "") -> RobotStop:
     """Return the result for a robot to which the Stop could not be sent.
 
     Args:
         name: Name of the robot.
-        why: Reason.
+        reason: Reason.
     """
-    words = _("Stop wasn't sent to {robot}: {why}") if why else _("Stop wasn't sent to {robot}")
-    return RobotStop(name, False, None, error=words.format(robot=name, why=why))
+    template = _("Stop wasn't sent to {robot}: {why}") if reason else _("Stop wasn't sent to {robot}")
+    return RobotStop(name, False, None, error=template.format(robot=name, why=reason))
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,21 +60,23 @@ class StopRequest:
         """True if all programs have confirmed that the robot has stopped."""
         return bool(self.replies) and all(each and each.is_confirmed for each in self.replies.values())
 
-    def record_sent(self, way: RobotTopics, now: float) -> None:
+    def record_sent(self, topics: RobotTopics, now: float) -> None:
         """Record that the command was sent on a topic while the robot was connected."""
-        self.delivered_topics.add(way)
+        self.delivered_topics.add(topics)
         if self.delivered_s is None:
             self.delivered_s = now
 
-    def new_replies(self, told: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
+    def new_replies(self, reported: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
         """Return new replies as pairs of node and result.
 
         Args:
-            told: Pairs of Stop id and node whose replies have already been reported.
+            reported: Pairs of Stop id and node whose replies have already been reported.
         """
-        found, waits = self.replies.items(), None in self.replies.values()
-        said = [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
-        return [(node, replace(each, is_waiting=waits)) for node, each in said]
+        replies, is_waiting = self.replies.items(), None in self.replies.values()
+        unreported = [
+            (node, each) for node, each in replies if each is not None and (self.id, node) not in reported
+        ]
+        return [(node, replace(each, is_waiting=is_waiting)) for node, each in unreported]
 
     def results(self) -> list[RobotStop]:
         """Return the result of each program. Programs without a reply are unproven."""
@@ -89,7 +91,7 @@ class StopRequest:
             for node, each in self.replies.items()
         ]
 
-    def accept(self, node: str, message: Message, now: float, words: Callable[[object], str]) -> bool:
+    def accept(self, node: str, message: Message, now: float, format_error: Callable[[object], str]) -> bool:
         """Handle a reply of a program that serves the robot; return True if its result has changed.
 
         A refusal may be followed by a confirmation; any other reply is final.
@@ -98,7 +100,7 @@ class StopRequest:
             node: Id of the node that sent the message.
             message: Message on a reply topic.
             now: Monotonic seconds.
-            words: Formats the robot's error as a sentence.
+            format_error: Formats the robot's error as a sentence.
         """
         reply = parse_reply(message)
         state = None if reply is None else reply.get("state")
@@ -112,7 +114,7 @@ class StopRequest:
             self.line.name,
             is_still,
             (now - self.sent_s) * 1000,
-            error="" if is_still else words(reply.get("error")),
+            error="" if is_still else format_error(reply.get("error")),
             has_failed=not is_still,
             program=self.program_names.get(node, ""),
             node=node,
@@ -124,10 +126,10 @@ class StopRequest:
         """Return the nodes that replied to this Stop although they do not serve the robot."""
         return [
             node
-            for node, held in self.foreign_replies.items()
+            for node, pending in self.foreign_replies.items()
             if any(
-                (told := parse_reply(each)) is not None and told.get("id") == self.id
-                for each in held.pop_all()
+                (reply := parse_reply(each)) is not None and reply.get("id") == self.id
+                for each in pending.pop_all()
             )
         ]
 

@@ -98,13 +98,17 @@ class RobotStopper:
         with self._changed:
             self._view, self._hearers = view, {}
             targets = [line.target for line in self._lines.values()]
-            self._senders.update(view, {way.reply for target in targets for way in target.topic_sets})
+            self._senders.update(
+                view, {topic_set.reply for target in targets for topic_set in target.topic_sets}
+            )
             late = [
-                reply for asked in self._asked.values() for reply in self._apply_held_replies_locked(asked)
+                reply
+                for request in self._asked.values()
+                for reply in self._apply_held_replies_locked(request)
             ]
             self._changed.notify_all()
-        for tell, reply in late:
-            tell(reply)
+        for notify, reply in late:
+            notify(reply)
 
     def set_expected(self, targets: Iterable[StopTarget]) -> None:
         """Set the robots to stop without connecting to new ones, so that this doesn't block.
@@ -121,20 +125,20 @@ class RobotStopper:
         Failed connections are listed in `problems` and retried at the next call.
         """
         targets = (each if isinstance(each, StopTarget) else StopTarget(each) for each in robots)
-        wanted = {target.robot.name: target for target in targets}
-        left: list[StopChannel] = []
+        targets_by_name = {target.robot.name: target for target in targets}
+        removed: list[StopChannel] = []
         with self._changed:
-            for name in self._lines.keys() - wanted.keys():
-                left += self._lines.pop(name).channels.values()
-            for name, target in wanted.items():
+            for name in self._lines.keys() - targets_by_name.keys():
+                removed += self._lines.pop(name).channels.values()
+            for name, target in targets_by_name.items():
                 line = self._lines.setdefault(name, StopLine(target))
-                left += [
+                removed += [
                     line.channels.pop(topics) for topics in line.channels.keys() - set(target.topic_sets)
                 ]
                 line.target = target
             lines = list(self._lines.values())
-        for way in left:
-            way.close()
+        for channel in removed:
+            channel.close()
         with self._opening_lock:
             for line in lines:
                 self._open_missing_channels(line)
@@ -154,8 +158,8 @@ class RobotStopper:
         """Return True if the robot's program is connected, so that a Stop sent now would arrive."""
         with self._changed:
             line = self._lines.get(name)
-            way = None if line is None else line.channels.get(line.target.robot.topics)
-            return line is not None and way is not None and self._is_connected_locked(line, way)
+            channel = None if line is None else line.channels.get(line.target.robot.topics)
+            return line is not None and channel is not None and self._is_connected_locked(line, channel)
 
     def deliver(self) -> None:
         """Send pending Stops to robots that have been connected since. Called at each tick.
@@ -165,18 +169,20 @@ class RobotStopper:
         with self._changed:
             now = self._clock()
             waiting = [
-                each
-                for each in self._asked.values()
-                if each.is_over and now - each.sent_s <= LATE_REPLY_TIMEOUT_S
+                request
+                for request in self._asked.values()
+                if request.is_over and now - request.sent_s <= LATE_REPLY_TIMEOUT_S
             ]
-        for each in waiting:
-            self._deliver(each)
+        for request in waiting:
+            self._deliver(request)
 
     def discard_late(self, names: Iterable[str]) -> None:
         """Discard pending Stops of robots that have stopped according to the user."""
-        known = set(names)
+        stopped_names = set(names)
         with self._changed:
-            for id in [id for id, each in self._asked.items() if each.is_over and each.line.name in known]:
+            for id in [
+                id for id, each in self._asked.items() if each.is_over and each.line.name in stopped_names
+            ]:
                 del self._asked[id]
 
     @property
@@ -225,47 +231,51 @@ class RobotStopper:
             Results of all robots.
         """
         names = None if names is None else tuple(names)
-        began = self._clock()
+        start_time_s = self._clock()
         lines = self._select_lines(names)
-        asked = [self._start_request(line, ends, on_late) for line in lines]
+        requests = [self._start_request(line, ends, on_late) for line in lines]
         if is_for_all:
             for line in self._unexpected_lines():
                 self._send(line, _new_id(), ends)
-        self._retry_missing_channels(asked)
+        self._retry_missing_channels(requests)
         if timeout_s is None:
             timeout_s = stop_timeout_s((line.target.robot for line in lines), self._longest_s)
-        if asked:
-            self._add_new_programs(asked)
-        reported = self._wait_for_replies(asked, began + timeout_s, on_answer)
-        elapsed_ms = (self._clock() - began) * 1000
-        return self._create_report(asked, reported, elapsed_ms, on_answer).with_unreached(names or ())
+        if requests:
+            self._add_new_programs(requests)
+        reported = self._wait_for_replies(requests, start_time_s + timeout_s, on_answer)
+        elapsed_ms = (self._clock() - start_time_s) * 1000
+        return self._create_report(requests, reported, elapsed_ms, on_answer).with_unreached(names or ())
 
     def _wait_for_replies(
         self,
-        asked: Sequence[StopRequest],
+        requests: Sequence[StopRequest],
         deadline_s: float,
         on_answer: Callable[[RobotStop], object] | None,
     ) -> set[tuple[str, str]]:
         # Waits until all requests are settled, or the deadline; returns the reported (request, node) pairs.
         reported: set[tuple[str, str]] = set()
         while True:
-            self._query_graph_if_needed(asked)
-            undelivered = [each for each in asked if not self._deliver(each)]
+            self._query_graph_if_needed(requests)
+            undelivered = [request for request in requests if not self._deliver(request)]
             with self._changed:
                 remaining_s = deadline_s - self._clock()
                 pause_s = (
                     min(remaining_s, GRAPH_POLL_INTERVAL_S)
-                    if any(each.unknown_replies for each in asked)
+                    if any(request.unknown_replies for request in requests)
                     else remaining_s
                 )
                 pause_s = min(pause_s, POLL_INTERVAL_S) if undelivered else pause_s
-                self._changed.wait_for(lambda: self._has_new_replies(asked, reported), max(0.0, pause_s))
-                news = [(each, node, result) for each in asked for node, result in each.new_replies(reported)]
-            for each, node, result in news:
-                reported.add((each.id, node))
+                self._changed.wait_for(lambda: self._has_new_replies(requests, reported), max(0.0, pause_s))
+                new_results = [
+                    (request, node, result)
+                    for request in requests
+                    for node, result in request.new_replies(reported)
+                ]
+            for request, node, result in new_results:
+                reported.add((request.id, node))
                 if on_answer is not None:
                     on_answer(result)
-            if all(each.is_settled for each in asked) or self._clock() >= deadline_s:
+            if all(request.is_settled for request in requests) or self._clock() >= deadline_s:
                 return reported
 
     def close(self) -> None:
@@ -283,20 +293,20 @@ class RobotStopper:
         error = ""
         for topics in line.target.topic_sets:
             with self._changed:
-                is_there = topics in line.channels or self._lines.get(line.name) is not line
-            if is_there:
+                is_open = topics in line.channels or self._lines.get(line.name) is not line
+            if is_open:
                 continue
             try:
-                way = self._connect(line.target.robot, topics)
+                channel = self._connect(line.target.robot, topics)
             except NepError as failed:
                 error = f"{failed}"
                 continue
             with self._changed:
                 is_wanted = self._lines.get(line.name) is line and topics in line.target.topic_sets
                 if is_wanted:
-                    line.channels[topics] = way
+                    line.channels[topics] = channel
             if not is_wanted:
-                way.close()
+                channel.close()
         with self._changed:
             line.error = error
 
@@ -311,25 +321,29 @@ class RobotStopper:
             publisher.close()
             raise
 
-    def _retry_missing_channels(self, asked: Sequence[StopRequest]) -> None:
+    def _retry_missing_channels(self, requests: Sequence[StopRequest]) -> None:
         # Retries failed connections in a thread, so that the Stop of other robots is not delayed.
-        missing = [each for each in asked if not each.line.is_complete]
+        missing = [request for request in requests if not request.line.is_complete]
         if not missing:
             return
 
         def open_channels() -> None:
-            for each in missing:
-                before = set(each.line.channels)
+            for request in missing:
+                before = set(request.line.channels)
                 with self._opening_lock:
-                    self._open_missing_channels(each.line)
-                new = each.line.channels.keys() - before
-                error = self._send(each.line, each.id, each.ends, new) if new else each.line.send_problem
+                    self._open_missing_channels(request.line)
+                new = request.line.channels.keys() - before
+                error = (
+                    self._send(request.line, request.id, request.ends, new)
+                    if new
+                    else request.line.send_problem
+                )
                 with self._changed:
-                    each.error = error if not before else each.error
+                    request.error = error if not before else request.error
                     self._changed.notify_all()
 
-        for each in missing:
-            each.error = "" if not each.line.channels else each.error
+        for request in missing:
+            request.error = "" if not request.line.channels else request.error
         self._openers = [thread for thread in self._openers if thread.is_alive()]
         self._openers.append(threading.Thread(target=open_channels, name="studio-stop-line", daemon=True))
         self._openers[-1].start()
@@ -343,46 +357,46 @@ class RobotStopper:
     def _start_request(
         self, line: StopLine, ends: str | None, late: Callable[[RobotStop], object] | None
     ) -> StopRequest:
-        asked = StopRequest(line, _new_id(), self._clock(), late, ends)
+        request = StopRequest(line, _new_id(), self._clock(), late, ends)
         with self._changed:
             self._evict_expired()
-            self._asked[asked.id] = asked
+            self._asked[request.id] = request
             if self._view is not None and line.target.robot.dialect != RIZE:
-                asked.replies |= self._serving_programs(asked)
-            for topics, way in line.channels.items():
-                if self._is_connected_locked(line, way):
-                    asked.record_sent(topics, asked.sent_s)
-        asked.error = self._send(line, asked.id, ends)
-        return asked
+                request.replies |= self._serving_programs(request)
+            for topics, channel in line.channels.items():
+                if self._is_connected_locked(line, channel):
+                    request.record_sent(topics, request.sent_s)
+        request.error = self._send(line, request.id, ends)
+        return request
 
     def _unexpected_lines(self) -> list[StopLine]:
         with self._changed:
             return [line for line in self._lines.values() if not line.target.is_expected]
 
-    def _is_connected_locked(self, line: StopLine, way: StopChannel) -> bool:
+    def _is_connected_locked(self, line: StopLine, channel: StopChannel) -> bool:
         # Call with `_changed` held.
-        hearers = self._hearers.get(way.topic)
+        hearers = self._hearers.get(channel.topic)
         if hearers is None:
-            hearers = frozenset(subscriber_nodes(self._view or GraphView(0, 0), way.topic))
-            self._hearers[way.topic] = hearers
-        return way.is_connected(line.target, hearers)
+            hearers = frozenset(subscriber_nodes(self._view or GraphView(0, 0), channel.topic))
+            self._hearers[channel.topic] = hearers
+        return channel.is_connected(line.target, hearers)
 
-    def _deliver(self, asked: StopRequest) -> bool:
+    def _deliver(self, request: StopRequest) -> bool:
         # Sends the command on newly connected topics; returns whether nothing is left to deliver.
         with self._changed:
-            if asked.has_all_replies or asked.line.target.robot.dialect == RIZE:
+            if request.has_all_replies or request.line.target.robot.dialect == RIZE:
                 return True
-            ways = dict(asked.line.channels)
+            channels = dict(request.line.channels)
             new = [
                 topics
-                for topics, way in ways.items()
-                if topics not in asked.delivered_topics and self._is_connected_locked(asked.line, way)
+                for topics, channel in channels.items()
+                if topics not in request.delivered_topics and self._is_connected_locked(request.line, channel)
             ]
             for topics in new:
-                asked.record_sent(topics, self._clock())
+                request.record_sent(topics, self._clock())
         if new:
-            self._send(asked.line, asked.id, asked.ends, new)
-        return bool(asked.delivered_topics or asked.error)
+            self._send(request.line, request.id, request.ends, new)
+        return bool(request.delivered_topics or request.error)
 
     def _send(
         self, line: StopLine, id: str, ends: str | None, only: Iterable[RobotTopics] | None = None
@@ -397,11 +411,13 @@ class RobotStopper:
             if ends is not None:
                 command["ends"] = ends
         with self._changed:
-            ways = [way for topics, way in line.channels.items() if only is None or topics in only]
+            channels = [
+                channel for topics, channel in line.channels.items() if only is None or topics in only
+            ]
         sent, error = False, line.send_problem
-        for way in ways:
+        for channel in channels:
             try:
-                way.publisher.publish(command)
+                channel.publisher.publish(command)
                 sent = True
             except NepError as failed:
                 error = _("Stop can't be sent to {robot}: {why}").format(robot=robot.name, why=failed)
@@ -409,61 +425,67 @@ class RobotStopper:
 
     # ---- replies
 
-    def _has_new_replies(self, asked: Sequence[StopRequest], told: set[tuple[str, str]]) -> bool:
-        if any(each.new_replies(told) for each in asked) or all(each.is_settled for each in asked):
+    def _has_new_replies(self, requests: Sequence[StopRequest], reported: set[tuple[str, str]]) -> bool:
+        if any(each.new_replies(reported) for each in requests) or all(each.is_settled for each in requests):
             return True
         return (
-            any(each.unknown_replies for each in asked)
+            any(each.unknown_replies for each in requests)
             and self._clock() - self._graph_queried_s >= GRAPH_POLL_INTERVAL_S
         )
 
-    def _query_graph_if_needed(self, asked: Sequence[StopRequest]) -> None:
+    def _query_graph_if_needed(self, requests: Sequence[StopRequest]) -> None:
         # Queries the graph while the programs of a robot or the publisher of a reply are unknown.
         with self._changed:
-            waits = self._view is None or any(each.unknown_replies for each in asked)
+            is_waiting = self._view is None or any(request.unknown_replies for request in requests)
             now = self._clock()
-            looks = waits and (self._view is None or now - self._graph_queried_s >= GRAPH_POLL_INTERVAL_S)
-            if looks:
+            is_due = is_waiting and (
+                self._view is None or now - self._graph_queried_s >= GRAPH_POLL_INTERVAL_S
+            )
+            if is_due:
                 self._graph_queried_s = now
-        if looks:
+        if is_due:
             self._refresh_view()
         with self._changed:
-            for each in asked:
-                if not each.replies:
-                    each.replies |= self._serving_programs(each)
-                    self._apply_held_replies_locked(each)  # not late: the Stop was sent just now
+            for request in requests:
+                if not request.replies:
+                    request.replies |= self._serving_programs(request)
+                    self._apply_held_replies_locked(request)  # not late: the Stop was sent just now
 
-    def _add_new_programs(self, asked: Sequence[StopRequest]) -> None:
+    def _add_new_programs(self, requests: Sequence[StopRequest]) -> None:
         # Programs newer than the last graph received the Stop too.
         self._refresh_view()
         with self._changed:
-            for each in asked:
-                known = {node: reply for node, reply in each.replies.items() if node != _UNKNOWN_PROGRAM}
-                each.replies = self._serving_programs(each) | known
+            for request in requests:
+                known_replies = {
+                    node: reply for node, reply in request.replies.items() if node != _UNKNOWN_PROGRAM
+                }
+                request.replies = self._serving_programs(request) | known_replies
 
     def _refresh_view(self) -> None:
         # Without a reply of the master the previous graph stays valid.
         with suppress(NepError):
             self.update_graph(self._node.graph(GRAPH_TIMEOUT_S))
 
-    def _serving_programs(self, asked: StopRequest) -> dict[str, RobotStop | None]:
+    def _serving_programs(self, request: StopRequest) -> dict[str, RobotStop | None]:
         # The programs that must reply, by node: the robot's own, then others that serve it. Programs that
         # receive its commands but can't reply are named.
-        target, view = asked.line.target, self._view or GraphView(0, 0)
+        target, view = request.line.target, self._view or GraphView(0, 0)
         if target.robot.dialect == RIZE:
             # RIZE never replies; a robot that could not be reached is not among them.
-            return {} if asked.error else {"": RobotStop(asked.line.name, False, None, can_confirm=False)}
+            return {} if request.error else {"": RobotStop(request.line.name, False, None, can_confirm=False)}
         identity = target.identity or first_announcer(view, target.robot.topics.description)
-        own = identity.node_id if identity is not None else _UNKNOWN_PROGRAM
-        found: dict[str, RobotStop | None] = {own: None}
-        answering = {node for way in target.topic_sets for node in publisher_nodes(view, way.reply)}
-        heard = dict.fromkeys(
-            node for way in target.topic_sets for node in subscriber_nodes(view, way.command)
+        own_node = identity.node_id if identity is not None else _UNKNOWN_PROGRAM
+        replies: dict[str, RobotStop | None] = {own_node: None}
+        answering = {
+            node for topic_set in target.topic_sets for node in publisher_nodes(view, topic_set.reply)
+        }
+        receivers = dict.fromkeys(
+            node for topic_set in target.topic_sets for node in subscriber_nodes(view, topic_set.command)
         )
-        others = [node for node in heard if node not in (own, self._node.id)]
+        others = [node for node in receivers if node not in (own_node, self._node.id)]
         for node in [node for node in others if node in answering][:MAX_SERVING_PROGRAMS]:
-            asked.program_names[node] = identity_of(view, node).node or node
-            found[node] = None
+            request.program_names[node] = identity_of(view, node).node or node
+            replies[node] = None
         listening = [node for node in others if node not in answering]
         programs = [identity_of(view, node).node or node for node in listening[:MAX_NAMED_LISTENERS]]
         if len(listening) > MAX_NAMED_LISTENERS:
@@ -471,12 +493,12 @@ class RobotStopper:
                 ngettext("{count} program", "{count} programs", len(listening)).format(count=len(listening))
             ]
         for node, program in zip(listening, programs, strict=False):
-            found[node] = RobotStop(target.robot.name, False, None, can_confirm=False, program=program)
+            replies[node] = RobotStop(target.robot.name, False, None, can_confirm=False, program=program)
         for before in target.earlier_programs:
-            if before.node_id not in found:
-                asked.program_names[before.node_id] = before.node or before.node_id
-                found[before.node_id] = None
-        return found
+            if before.node_id not in replies:
+                request.program_names[before.node_id] = before.node or before.node_id
+                replies[before.node_id] = None
+        return replies
 
     def _on_replies(self, messages: Sequence[Message]) -> None:
         # Checks the sender first: only messages of programs that must answer are decoded.
@@ -484,63 +506,67 @@ class RobotStopper:
         with self._changed:
             for message in messages:
                 node = self._senders.node_of(message)
-                for asked in self._asked.values():
-                    if message.topic in asked.line.reply_topics:
-                        late += self._apply_reply_locked(asked, node, message)
+                for request in self._asked.values():
+                    if message.topic in request.line.reply_topics:
+                        late += self._apply_reply_locked(request, node, message)
             self._changed.notify_all()
-        for tell, said in late:
-            tell(said)
+        for notify, result in late:
+            notify(result)
 
     def _apply_held_replies_locked(
-        self, asked: StopRequest
+        self, request: StopRequest
     ) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
         # Processes held replies whose publishers are known now; returns late ones with their callbacks, which
         # the caller invokes after releasing the lock. Replies that are still unknown are discarded: their
         # publisher has not registered, or the master is missing, and then nothing can be proven.
-        held = asked.unknown_replies.pop_all()
-        known = [(node, message) for message in held if (node := self._senders.node_of(message)) is not None]
-        return [late for node, message in known for late in self._apply_reply_locked(asked, node, message)]
+        pending = request.unknown_replies.pop_all()
+        attributed = [
+            (node, message) for message in pending if (node := self._senders.node_of(message)) is not None
+        ]
+        return [
+            late for node, message in attributed for late in self._apply_reply_locked(request, node, message)
+        ]
 
     def _apply_reply_locked(
-        self, asked: StopRequest, node: str | None, message: Message
+        self, request: StopRequest, node: str | None, message: Message
     ) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
         # Applies a reply of a program that must reply; returns the callback if it is late.
-        if node is None or not asked.replies:
-            asked.unknown_replies.add(message)
+        if node is None or not request.replies:
+            request.unknown_replies.add(message)
             return []
-        if node not in asked.replies:
-            if node in asked.foreign_replies or len(asked.foreign_replies) < MAX_SERVING_PROGRAMS:
-                asked.foreign_replies.setdefault(node, PendingMessages(publishers=1)).add(message)
+        if node not in request.replies:
+            if node in request.foreign_replies or len(request.foreign_replies) < MAX_SERVING_PROGRAMS:
+                request.foreign_replies.setdefault(node, PendingMessages(publishers=1)).add(message)
             return []
-        name = asked.line.name
-        is_news = asked.accept(node, message, self._clock(), partial(stop_error_text, name))
-        reply = asked.replies[node]
-        if not is_news or reply is None or not asked.is_over or asked.on_late is None:
+        name = request.line.name
+        is_news = request.accept(node, message, self._clock(), partial(stop_error_text, name))
+        reply = request.replies[node]
+        if not is_news or reply is None or not request.is_over or request.on_late is None:
             return []
-        return [(asked.on_late, reply)]
+        return [(request.on_late, reply)]
 
     def _create_report(
         self,
-        asked: Sequence[StopRequest],
-        told: set[tuple[str, str]],
+        requests: Sequence[StopRequest],
+        reported: set[tuple[str, str]],
         elapsed_ms: float,
         on_answer: Callable[[RobotStop], object] | None,
     ) -> StopReport:
         with self._changed:
-            for each in asked:
-                each.is_over = True
-            results = [result for each in asked for result in each.results()]
+            for request in requests:
+                request.is_over = True
+            results = [result for request in requests for result in request.results()]
             untold = [
                 result
-                for each in asked
-                for node, result in zip(each.replies or {"": None}, each.results(), strict=True)
-                if (each.id, node) not in told
+                for request in requests
+                for node, result in zip(request.replies or {"": None}, request.results(), strict=True)
+                if (request.id, node) not in reported
             ]
             view = self._view or GraphView(0, 0)
             strangers = [
-                (each.line.name, identity_of(view, node).node or node)
-                for each in asked
-                for node in each.impostors()
+                (request.line.name, identity_of(view, node).node or node)
+                for request in requests
+                for node in request.impostors()
             ]
         for result in untold:
             if on_answer is not None:
@@ -550,12 +576,12 @@ class RobotStopper:
     def _evict_expired(self) -> None:
         # Discards Stops whose late replies are no longer accepted.
         now = self._clock()
-        over = [id for id, each in self._asked.items() if each.is_over]
-        for place, id in enumerate(over):
+        ended_ids = [id for id, each in self._asked.items() if each.is_over]
+        for index, id in enumerate(ended_ids):
             each = self._asked[id]
             if (
                 each.is_confirmed
-                or place < len(over) - MAX_LATE_REQUESTS
+                or index < len(ended_ids) - MAX_LATE_REQUESTS
                 or now - each.sent_s > LATE_REPLY_TIMEOUT_S
             ):
                 del self._asked[id]
@@ -586,7 +612,7 @@ def stop_and_report(
         ends: See `RobotStopper.stop_all`.
         is_for_all: See `RobotStopper.stop_all`.
     """
-    why = _(NO_NETWORK)
+    reason = _(NO_NETWORK)
     if stopper is not None:
         try:
             return stopper.stop_all(
@@ -594,5 +620,5 @@ def stop_and_report(
             )
         except Exception as error:  # noqa: BLE001 - reported as unproven for these robots
             _log.exception("can't stop the robots")
-            why = error_text(error)
-    return StopReport((), 0.0).with_unreached(names, why)
+            reason = error_text(error)
+    return StopReport((), 0.0).with_unreached(names, reason)

@@ -139,9 +139,9 @@ class SessionActing:
         self.arming.arm(self.armed_s)
         self.revision += 1
         if not was_on:
-            words = _("armed for {count} min").format(count=round(self.armed_s / 60))
-            self._log_to_console("warn", words)
-            self._add_record("switch", "", words)
+            message = _("armed for {count} min").format(count=round(self.armed_s / 60))
+            self._log_to_console("warn", message)
+            self._add_record("switch", "", message)
         return ""
 
     def disarm(self) -> None:
@@ -154,11 +154,11 @@ class SessionActing:
         self.outbox.stop_all()
         if was_on:
             self.revision += 1
-            self._log_to_console("info", words := _("no longer armed"))
-            self._add_record("switch", "", words)
+            self._log_to_console("info", message := _("no longer armed"))
+            self._add_record("switch", "", message)
 
     def allow(
-        self, target: Target, then: Callable[[], object] | None = None, *, is_sure: bool = False
+        self, target: Target, on_allowed: Callable[[], object] | None = None, *, is_sure: bool = False
     ) -> str:
         """Allow sending to a target.
 
@@ -166,7 +166,7 @@ class SessionActing:
 
         Args:
             target: Topic or service.
-            then: Called when the target has been allowed.
+            on_allowed: Called when the target has been allowed.
             is_sure: True to skip the question.
 
         Returns:
@@ -175,20 +175,20 @@ class SessionActing:
         if not is_sure and self.needs_confirmation(target):
             names = tuple(name for name in self._moved_robots(target) if name != target.name)
             self.question = ArmQuestion(
-                target.name, names, partial(self._allow_confirmed, target, self.arming.turn, then)
+                target.name, names, partial(self._allow_confirmed, target, self.arming.turn, on_allowed)
             )
             self.revision += 1
             return ""
         if not self.arming.allow(target, is_confirmed=is_sure):
             return _("Sending isn't armed, or too many names are armed. Arm sending, or remove a name.")
         self.revision += 1
-        if then is not None:
-            then()
+        if on_allowed is not None:
+            on_allowed()
         return ""
 
-    def _allow_confirmed(self, target: Target, turn: int, then: Callable[[], object] | None) -> None:
+    def _allow_confirmed(self, target: Target, turn: int, on_allowed: Callable[[], object] | None) -> None:
         if turn == self.arming.turn:
-            self.allow(target, then, is_sure=True)
+            self.allow(target, on_allowed, is_sure=True)
 
     def answer(self, *, let: bool) -> None:
         """Apply the user's answer to `question`."""
@@ -200,9 +200,9 @@ class SessionActing:
     def forbid(self, target: Target) -> None:
         """Deny sending to a target."""
         self.arming.forbid(target)
-        for each in self.outbox.repeated_messages:
-            if each.order.target == target:
-                self.outbox.stop(each.order.id)
+        for repeated in self.outbox.repeated_messages:
+            if repeated.order.target == target:
+                self.outbox.stop(repeated.order.id)
         self.revision += 1
 
     def needs_confirmation(self, target: Target) -> bool:
@@ -323,9 +323,9 @@ class SessionActing:
             ``go_on`` was already called.
         """
         if not self.arming.is_on:
-            why_not = self.arm()
-            if why_not:
-                return why_not
+            problem = self.arm()
+            if problem:
+                return problem
         if not self.arming.allows(target) or self.needs_confirmation(target):
             return self.allow(target, go_on)
         turn = self.arming.turn
@@ -399,10 +399,10 @@ class SessionActing:
             self.disarm()
         if self.arming.has_expired:
             self.disarm()
-        for each in self.outbox.repeated_messages:  # a robot that this topic moves may have connected
-            target = each.order.target
+        for repeated in self.outbox.repeated_messages:  # a robot that this topic moves may have connected
+            target = repeated.order.target
             if not self.may_continue(target):
-                self.outbox.stop(each.order.id)
+                self.outbox.stop(repeated.order.id)
                 self.ready(target, _do_nothing)
         for result in self.outbox.pop_results():
             self._apply_result(result)
@@ -417,19 +417,19 @@ class SessionActing:
         if self.shelf.get(order.id) is not None:
             self.last[order.id] = result
             self.sent_at_s[order.id] = self._clock_s()
-        for known in (self.last, self.sent_at_s):
-            for gone in [id for id in known if self.shelf.get(id) is None]:
-                del known[gone]
+        for values_by_id in (self.last, self.sent_at_s):
+            for old_id in [id for id in values_by_id if self.shelf.get(id) is None]:
+                del values_by_id[old_id]
         self.revision += 1
         is_bad = result.kind == "failed"
-        words = f"{order.name}, {result_text(result)}"
-        self._log_to_console("warn" if is_bad else "info", f"{order.topic}: {words}")
+        message = f"{order.name}, {result_text(result)}"
+        self._log_to_console("warn" if is_bad else "info", f"{order.topic}: {message}")
         was_once = result.kind == "sent"
-        again = partial(self.send_order, order) if was_once or (is_bad and not result.count) else None
+        resend = partial(self.send_order, order) if was_once or (is_bad and not result.count) else None
         self._add_record(
-            order.origin, order.topic, words,
+            order.origin, order.topic, message,
             sent=1 if was_once else result.count, is_bad=is_bad, text=result.text, source=order.source,
-            again=again,
+            resend=resend,
         )  # fmt: skip
         if order.on_result is not None:
             order.on_result(result)
@@ -439,31 +439,31 @@ class SessionActing:
             "service", record.service, call_text(record),
             sent=1 if record.was_sent else 0, is_bad=record.state != "answered",
             text=record.request, source=record.request,
-            again=partial(self.call, record.service, record.request, record.timeout_s),
+            resend=partial(self.call, record.service, record.request, record.timeout_s),
         )  # fmt: skip
 
-    def log(self, level: str, target: Target, words: str, sent: int = 0) -> None:
+    def log(self, level: str, target: Target, text: str, sent: int = 0) -> None:
         """Log a result of publishing a recording, in the Console and in `sent`.
 
         Args:
             level: Log level; "warn" for an error.
             target: Topic.
-            words: Result as text.
+            text: Result as text.
             sent: Number of messages that were sent.
         """
         self.revision += 1
-        self._log_to_console(level, f"{target.name}: {words}")
-        self._add_record("replay", target.name, words, sent=sent, is_bad=level == "warn")
+        self._log_to_console(level, f"{target.name}: {text}")
+        self._add_record("replay", target.name, text, sent=sent, is_bad=level == "warn")
 
     def _add_record(
-        self, asker: SendOrigin, name: str, words: str, *, sent: int = 0, is_bad: bool = False,
+        self, asker: SendOrigin, name: str, message: str, *, sent: int = 0, is_bad: bool = False,
         text: str = "",
-        source: str = "", again: Callable[[], str] | None = None,
+        source: str = "", resend: Callable[[], str] | None = None,
     ) -> None:  # fmt: skip
-        self.sent.add(SentRecord(self._clock_s(), asker, name, words, is_bad, text, source, again), sent)
+        self.sent.add(SentRecord(self._clock_s(), asker, name, message, is_bad, text, source, resend), sent)
 
-    def _log_to_console(self, level: str, words: str) -> None:
-        self._session.console.add(level, "studio", words)
+    def _log_to_console(self, level: str, message: str) -> None:
+        self._session.console.add(level, "studio", message)
 
     def check(self) -> None:
         """Save the shelf if it has changed. Called once a second."""
@@ -493,10 +493,10 @@ class SessionActing:
         if path is None or self._is_newer or revision == self._written:
             return
         self._written = revision
-        kept = Shelf(self.shelf.messages, self.shelf.requests)
+        snapshot = Shelf(self.shelf.messages, self.shelf.requests)
 
         def write() -> bool:
-            write_atomically(path, encode_shelf(kept), durable=False, private=True)
+            write_atomically(path, encode_shelf(snapshot), durable=False, private=True)
             return True
 
         self._worker.submit(FILE_NAME, write)
@@ -507,12 +507,12 @@ class SessionActing:
             template = ngettext("{count} message can't be read", "{count} messages can't be read", unread)
             return shelf, template.format(count=unread) if unread else ""
 
-        kept = read_stored(path, parse, NewerShelfError, MAX_BYTES)
-        self._is_newer = kept.is_newer
-        if kept.problem:
+        stored = read_stored(path, parse, NewerShelfError, MAX_BYTES)
+        self._is_newer = stored.is_newer
+        if stored.problem:
             title = _("Saved messages couldn't be read.")
-            self._session.alerts.raise_alert("messages:file", "warn", title, kept.problem)
-        return kept.value if kept.value is not None else Shelf()
+            self._session.alerts.raise_alert("messages:file", "warn", title, stored.problem)
+        return stored.value if stored.value is not None else Shelf()
 
 
 def _do_nothing() -> None: ...
@@ -524,14 +524,14 @@ def result_text(result: SendResult) -> str:
         return subscribers_text(result.subscriber_count)
     if result.kind == "began":
         return _("started")
-    words = ngettext("{count} sent", "{count} sent", result.count).format(count=result.count)
+    text = ngettext("{count} sent", "{count} sent", result.count).format(count=result.count)
     if result.dropped_count:
         left_out = ngettext(
             "{count} late message skipped", "{count} late messages skipped", result.dropped_count
         )
-        words = f"{words}, {left_out.format(count=result.dropped_count)}"
-    parts = (words if result.count else "", result.message)
-    return ", ".join(filter(None, parts)) or words
+        text = f"{text}, {left_out.format(count=result.dropped_count)}"
+    parts = (text if result.count else "", result.message)
+    return ", ".join(filter(None, parts)) or text
 
 
 def subscribers_text(count: int) -> str:

@@ -113,19 +113,19 @@ class Arming:
                 self.revision += 1
             return was_on
 
-    def run_if_armed(self, turn: int, target: Target, do: Callable[[], object]) -> bool:
-        """Call ``do`` if a target is allowed; return True if it was called.
+    def run_if_armed(self, turn: int, target: Target, send: Callable[[], object]) -> bool:
+        """Call ``send`` if a target is allowed; return True if it was called.
 
-        A lock is held during the call, so ``do`` must not block.
+        A lock is held during the call, so ``send`` must not block.
 
         Args:
-            turn: Number of the arming. If sending was switched off or on again since, ``do`` is not
+            turn: Number of the arming. If sending was switched off or on again since, ``send`` is not
                 called.
             target: Topic or service.
-            do: Function that sends.
+            send: Function that sends.
         """
         with self._lock:
             if turn != self.turn or not self.allows(target):
                 return False
-            do()
+            send()
             return True

@@ -149,17 +149,17 @@ class ServiceCalls:
         """Apply results; return the calls that ended since the last tick, including cancelled ones."""
         while self._ended:
             ended = self._ended.popleft()
-            place = next((i for i, each in enumerate(self._records) if each.number == ended.number), None)
-            if place is None or self._records[place].state != "waiting":
+            index = next((i for i, each in enumerate(self._records) if each.number == ended.number), None)
+            if index is None or self._records[index].state != "waiting":
                 continue
-            self._apply(place, ended)
+            self._apply(index, ended)
         waiting, now = self.in_flight, self._in_flight
         has_begun = now is None or now.future is not None  # from then on, the client measures the timeout
         if waiting is not None and not has_begun and self.elapsed_s > waiting.timeout_s:
             error = _("no master was found within {time} s").format(time=number(waiting.timeout_s))
             self._cancel("failed", error)
-        done, self._done = self._done, []
-        return done
+        finished, self._done = self._done, []
+        return finished
 
     def clear(self) -> None:
         """Remove all past calls."""
@@ -178,14 +178,14 @@ class ServiceCalls:
 
     def _add_record(self, record: CallRecord) -> None:
         self._records.append(record)
-        for place in range(len(self._records) - MAX_REPLIES):
-            if self._records[place].is_retained:
-                self._records[place] = replace(self._records[place], reply=None, text="", is_retained=False)
+        for index in range(len(self._records) - MAX_REPLIES):
+            if self._records[index].is_retained:
+                self._records[index] = replace(self._records[index], reply=None, text="", is_retained=False)
         self.revision += 1
 
-    def _apply(self, place: int, ended: _CallResult) -> None:
+    def _apply(self, index: int, ended: _CallResult) -> None:
         updated = replace(
-            self._records[place],
+            self._records[index],
             state=ended.state,
             duration_s=ended.duration_s,
             error=ended.error,
@@ -194,12 +194,12 @@ class ServiceCalls:
             is_truncated=ended.is_truncated,
             was_sent=self._in_flight is not None and self._in_flight.future is not None,
         )
-        self._records[place] = updated
+        self._records[index] = updated
         self._done.append(updated)
         self._in_flight = None
         self.revision += 1
 
-    def _cancel(self, state: State, sentence: str) -> None:
+    def _cancel(self, state: State, error: str) -> None:
         now, waiting = self._in_flight, self.in_flight
         if now is None or waiting is None:
             return
@@ -208,7 +208,7 @@ class ServiceCalls:
             future = now.future
         if future is not None:
             future.cancel()
-        self._apply(len(self._records) - 1, _CallResult(now.number, state, self.elapsed_s, sentence))
+        self._apply(len(self._records) - 1, _CallResult(now.number, state, self.elapsed_s, error))
 
     def _start(self, node: Node, now: _CallInFlight, record: CallRecord, request: object) -> None:
         # Runs in the network thread.
@@ -233,19 +233,19 @@ class ServiceCalls:
             now.future.add_done_callback(lambda future: self._on_reply(record, began_s, future))
 
     def _open_client(self, node: Node, service: str) -> Client:
-        known = self._clients.get(service)
-        if known is None or known.is_closed:
+        client = self._clients.get(service)
+        if client is None or client.is_closed:
             if len(self._clients) >= MAX_CLIENTS:
                 self._clients.pop(next(iter(self._clients))).close()
-            known = self._clients[service] = node.new_client(service)
-        return known
+            client = self._clients[service] = node.new_client(service)
+        return client
 
     def _on_reply(self, record: CallRecord, began_s: float, future: Future[object]) -> None:
         # Runs in the client's thread.
         took_s = time.monotonic() - began_s
         try:
-            answer = future.result()
-            text = format_json(answer)
+            reply = future.result()
+            text = format_json(reply)
         except CancelledError:
             return
         except Exception as error:  # noqa: BLE001 - the server's callback may raise anything
@@ -254,13 +254,13 @@ class ServiceCalls:
             )
             return
         is_cut = len(text) > MAX_REPLY_LENGTH
-        kept = None if is_cut else answer
+        retained_reply = None if is_cut else reply
         self._ended.append(
             _CallResult(
                 record.number,
                 "answered",
                 took_s,
-                reply=kept,
+                reply=retained_reply,
                 text=text[:MAX_REPLY_LENGTH],
                 is_truncated=is_cut,
             )

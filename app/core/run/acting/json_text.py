@@ -47,9 +47,9 @@ class JsonText:
             reason = _("the text has more than {count} characters; send it with nep topic pub")
             self.fault = JsonFault(1, 1, reason.format(count=MAX_LENGTH))
             return
-        for found in _PLACEHOLDER.finditer(text):
-            if found["name"] is not None:
-                self._spans.append((found.start(), found.end(), found["name"]))
+        for match in _PLACEHOLDER.finditer(text):
+            if match["name"] is not None:
+                self._spans.append((match.start(), match.end(), match["name"]))
         self.places = tuple(dict.fromkeys(name for _start, _end, name in self._spans))
         # replaced by strings of the same length, so that every character stays in its position
         parts, after = [], 0
@@ -86,11 +86,11 @@ class JsonText:
             value = AUTOMATIC_PLACEHOLDERS[name]() if name in AUTOMATIC_PLACEHOLDERS else values[name]
             parts += [self.text[after:start], json.dumps(value, ensure_ascii=False, allow_nan=False)]
             after = end
-        whole = "".join([*parts, self.text[after:]])
-        fault = find_json_fault(whole)
+        filled = "".join([*parts, self.text[after:]])
+        fault = find_json_fault(filled)
         if fault is not None:  # a number as a field name
             raise NepError(fault.message)
-        parsed: object = json.loads(whole)
+        parsed: object = json.loads(filled)
         return parsed
 
 

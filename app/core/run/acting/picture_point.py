@@ -51,11 +51,11 @@ class PicturePoint:
             msg_type: One of `MESSAGE_TYPES`.
         """
         stamp = Time.from_ns(self.stamp_ns) if self.stamp_ns is not None else None
-        place = asdict(Point(float(self.x), float(self.y), 0.0))
+        point = asdict(Point(float(self.x), float(self.y), 0.0))
         if msg_type == Point.MSG_TYPE:
-            return place
+            return point
         if msg_type == "geometry_msgs/PointStamped":
-            return {"header": asdict(Header(stamp or Time())), "point": place}
+            return {"header": asdict(Header(stamp or Time())), "point": point}
         return {
             "x": self.x,
             "y": self.y,

@@ -130,10 +130,10 @@ class Outbox:
 
     def pop_results(self) -> list[SendResult]:
         """Return and clear the results."""
-        taken = []
+        results = []
         while self._results:
-            taken.append(self._results.popleft())
-        return taken
+            results.append(self._results.popleft())
+        return results
 
     def repeated(self, order_id: str) -> RepeatedMessage | None:
         """Return the state of a message that is sent repeatedly; None if the message isn't being sent."""
@@ -226,8 +226,8 @@ class Outbox:
         with self._changed:
             self._starting.clear()
             ids = list(self._repeated)
-        for each in ids:
-            self.stop(each)
+        for message_id in ids:
+            self.stop(message_id)
         if self._publishers and not self._is_closed:
             self._submit("", lambda _node: self._close_unused())
 
@@ -259,33 +259,33 @@ class Outbox:
         # Raises `NepError` if it would move a robot without permission, which may have connected meanwhile.
         if self._gate is None:
             return
-        heard = publisher.subscribers
-        if heard == self._last_subscriber_counts.get(publisher):
-            refusal = self._gate.rejection_reason(order.topic)
+        subscriber_count = publisher.subscribers
+        if subscriber_count == self._last_subscriber_counts.get(publisher):
+            reason = self._gate.rejection_reason(order.topic)
         else:
-            refusal = self._gate.current_rejection_reason(node, order.topic)
-        if refusal:
-            raise NepError(_("not sent: {reason}").format(reason=refusal))
-        self._last_subscriber_counts[publisher] = heard
+            reason = self._gate.current_rejection_reason(node, order.topic)
+        if reason:
+            raise NepError(_("not sent: {reason}").format(reason=reason))
+        self._last_subscriber_counts[publisher] = subscriber_count
 
     def _open_publisher(self, node: Node, order: SendOrder) -> Publisher:
         key = (order.topic, order.msg_type)
         with self._changed:
-            used = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}
-        known = self._publishers.get(key)
-        if known is None or known.is_closed:
-            unused = [each for each in self._publishers if each not in used]
+            used_keys = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}
+        publisher = self._publishers.get(key)
+        if publisher is None or publisher.is_closed:
+            unused = [each for each in self._publishers if each not in used_keys]
             if len(self._publishers) >= MAX_PUBLISHERS and unused:
                 self._close_publisher(unused[0])
-            known = self._publishers[key] = node.new_pub(order.topic, order.msg_type)
-        return known
+            publisher = self._publishers[key] = node.new_pub(order.topic, order.msg_type)
+        return publisher
 
     def _close_unused(self) -> None:
         with self._changed:
-            used = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}
+            used_keys = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}
         if self._arming.is_on:
             return  # armed again meanwhile
-        for key in [each for each in self._publishers if each not in used]:
+        for key in [each for each in self._publishers if each not in used_keys]:
             self._close_publisher(key)
 
     def _close_publisher(self, key: tuple[str, str]) -> None:
@@ -296,13 +296,13 @@ class Outbox:
     def _add_result(self, result: SendResult) -> None:
         self._results.append(result)
 
-    def _report_end(self, ended: RepeatedMessage, sentence: str = "") -> None:
+    def _report_end(self, ended: RepeatedMessage, problem: str = "") -> None:
         if not ended.end_event.is_set():
             ended.end_event.set()
-            kind = "failed" if sentence else "ended"
+            kind = "failed" if problem else "ended"
             self._add_result(
                 SendResult(
-                    ended.order, kind, sentence, ended.subscriber_count, ended.count, ended.dropped_count
+                    ended.order, kind, problem, ended.subscriber_count, ended.count, ended.dropped_count
                 )
             )
 
@@ -314,45 +314,45 @@ class Outbox:
                 if self._is_closed:
                     return
                 now = time.monotonic()
-                due = [each for each in self._repeated.values() if each.due_s <= now]
+                due = [repeated for repeated in self._repeated.values() if repeated.due_s <= now]
                 if not due:
-                    next_s = min((each.due_s for each in self._repeated.values()), default=None)
+                    next_s = min((repeated.due_s for repeated in self._repeated.values()), default=None)
                     self._changed.wait(None if next_s is None else max(0.0, next_s - now))
                     continue
-            for each in due:
-                self._send_repeated(each)
+            for repeated in due:
+                self._send_repeated(repeated)
 
-    def _send_repeated(self, each: RepeatedMessage) -> None:
+    def _send_repeated(self, repeated: RepeatedMessage) -> None:
         problem = ""
         try:
-            payload = codec_for(each.order.msg_type).encode(each.order.create_payload())
-            self._check(each.node, each.order, each.publisher)
+            payload = codec_for(repeated.order.msg_type).encode(repeated.order.create_payload())
+            self._check(repeated.node, repeated.order, repeated.publisher)
             is_done = self._arming.run_if_armed(
-                each.turn, each.order.target, lambda: self._publish(each, payload)
+                repeated.turn, repeated.order.target, lambda: self._publish(repeated, payload)
             )
         except Exception as error:  # noqa: BLE001 - the other messages continue
             is_done, problem = False, str(error) if isinstance(error, NepError) else error_text(error)
         if is_done:
-            each.subscriber_count = each.publisher.subscribers
-            each.dropped_count += self._schedule_next(each)
+            repeated.subscriber_count = repeated.publisher.subscribers
+            repeated.dropped_count += self._schedule_next(repeated)
             return
         with self._changed:
-            if self._repeated.get(each.order.id) is each:
-                del self._repeated[each.order.id]
-        self._report_end(each, problem)
+            if self._repeated.get(repeated.order.id) is repeated:
+                del self._repeated[repeated.order.id]
+        self._report_end(repeated, problem)
 
-    def _publish(self, each: RepeatedMessage, made: object) -> None:
+    def _publish(self, repeated: RepeatedMessage, payload: object) -> None:
         with self._changed:  # an ended message is not sent once more
-            if self._repeated.get(each.order.id) is each:
-                each.publisher.publish(made)
-                each.count += 1
+            if self._repeated.get(repeated.order.id) is repeated:
+                repeated.publisher.publish(payload)
+                repeated.count += 1
 
     @staticmethod
-    def _schedule_next(each: RepeatedMessage) -> int:
+    def _schedule_next(repeated: RepeatedMessage) -> int:
         # Sets the next due time; returns the number of messages omitted because they are late.
-        period_s = 1 / each.rate_hz
-        late = max(0, int((time.monotonic() - each.due_s) / period_s))
-        each.due_s += (1 + late) * period_s
+        period_s = 1 / repeated.rate_hz
+        late = max(0, int((time.monotonic() - repeated.due_s) / period_s))
+        repeated.due_s += (1 + late) * period_s
         return late
 
 

@@ -50,8 +50,8 @@ class SentRecord:
 
     def is_like(self, other: SentRecord) -> bool:
         """Return True if both entries describe the same operation with the same result."""
-        facts = (self.origin, self.name, self.result_text, self.is_error, self.source)
-        return facts == (other.origin, other.name, other.result_text, other.is_error, other.source)
+        key = (self.origin, self.name, self.result_text, self.is_error, self.source)
+        return key == (other.origin, other.name, other.result_text, other.is_error, other.source)
 
 
 class SentLog:

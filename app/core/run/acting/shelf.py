@@ -97,45 +97,45 @@ class Shelf:
 
     def set_message(self, message: SavedMessage) -> bool:
         """Add a message, or replace the message with the same id; return False if the shelf is full."""
-        place = self._index(message.id)
-        if place is None:
+        index = self._index(message.id)
+        if index is None:
             if len(self._messages) >= MAX_MESSAGES:
                 return False
             self._messages.append(message)
-        elif self._messages[place] == message:
+        elif self._messages[index] == message:
             return True
         else:
-            self._messages[place] = message
+            self._messages[index] = message
         self.revision += 1
         return True
 
     def copy(self, id: str) -> SavedMessage | None:
         """Insert and return a copy of a message after it; None if there is no such message or no room."""
-        place = self._index(id)
-        if place is None or len(self._messages) >= MAX_MESSAGES:
+        index = self._index(id)
+        if index is None or len(self._messages) >= MAX_MESSAGES:
             return None
-        old = self._messages[place]
+        old = self._messages[index]
         copied = replace(old, id=new_message_id(), name=self.free_name(old.name))
-        self._messages.insert(place + 1, copied)
+        self._messages.insert(index + 1, copied)
         self.revision += 1
         return copied
 
-    def free_name(self, wanted: str) -> str:
-        """Return an unused name: ``wanted``, or ``wanted`` with a number, as in "Stand still 2"."""
-        taken = {each.name for each in self._messages}
-        number, name = 2, wanted[:MAX_NAME_LENGTH]
-        while name in taken:
-            name = f"{wanted[: MAX_NAME_LENGTH - 5]} {number}"
+    def free_name(self, preferred: str) -> str:
+        """Return an unused name: ``preferred``, or ``preferred`` with a number, as in "Stand still 2"."""
+        used_names = {each.name for each in self._messages}
+        number, name = 2, preferred[:MAX_NAME_LENGTH]
+        while name in used_names:
+            name = f"{preferred[: MAX_NAME_LENGTH - 5]} {number}"
             number += 1
         return name
 
     def remove(self, id: str) -> SavedMessage | None:
         """Remove a message and return it; None if the id is unknown. Undo with `restore`."""
-        place = self._index(id)
-        if place is None:
+        index = self._index(id)
+        if index is None:
             return None
-        removed = self._messages.pop(place)
-        self._removed = (removed, place)
+        removed = self._messages.pop(index)
+        self._removed = (removed, index)
         self.revision += 1
         return removed
 
@@ -143,8 +143,8 @@ class Shelf:
         """Restore the last removed message at its previous position and return it; None if there is none."""
         if self._removed is None or len(self._messages) >= MAX_MESSAGES:
             return None
-        (message, place), self._removed = self._removed, None
-        self._messages.insert(place, message)
+        (message, index), self._removed = self._removed, None
+        self._messages.insert(index, message)
         self.revision += 1
         return message
 
@@ -158,7 +158,7 @@ class Shelf:
             self.revision += 1
 
     def _index(self, id: str) -> int | None:
-        return next((place for place, each in enumerate(self._messages) if each.id == id), None)
+        return next((index for index, each in enumerate(self._messages) if each.id == id), None)
 
 
 # ---- file
@@ -199,31 +199,31 @@ def parse_shelf(data: bytes) -> tuple[Shelf, int]:
         value = json.loads(data.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise NepError(_("the file isn't valid JSON")) from error
-    listed = value.get("messages") if isinstance(value, dict) else None
-    if not isinstance(value, dict) or not isinstance(listed, list):
+    message_list = value.get("messages") if isinstance(value, dict) else None
+    if not isinstance(value, dict) or not isinstance(message_list, list):
         raise NepError(_("the file has no list of messages"))
     if isinstance(number := value.get("format"), int) and number > FORMAT_VERSION:
         raise NewerShelfError(_("the file was saved by a newer version of Studio"))
-    messages = [_parse_message(each) for each in listed[:MAX_MESSAGES]]
-    good = {each.id: each for each in messages if each is not None}
+    messages = [_parse_message(each) for each in message_list[:MAX_MESSAGES]]
+    valid = {each.id: each for each in messages if each is not None}
     requests = value.get("requests")
-    asked = {
+    request_texts = {
         name: text
         for name, text in (requests.items() if isinstance(requests, dict) else ())
         if isinstance(text, str) and len(text) <= MAX_LENGTH
     }
-    return Shelf(good.values(), asked), len(listed) - len(good)
+    return Shelf(valid.values(), request_texts), len(message_list) - len(valid)
 
 
-def _parse_message(told: object) -> SavedMessage | None:
-    if not isinstance(told, dict):
+def _parse_message(entry: object) -> SavedMessage | None:
+    if not isinstance(entry, dict):
         return None
-    id, name, topic, kind, text = (told.get(key) for key in ("id", "name", "topic", "type", "text"))
+    id, name, topic, kind, text = (entry.get(key) for key in ("id", "name", "topic", "type", "text"))
     if not (isinstance(id, str) and id and isinstance(name, str) and isinstance(topic, str)):
         return None
     if not (isinstance(kind, str) and isinstance(text, str)) or len(text) > MAX_LENGTH + 1:
         return None
-    values, rate_hz = told.get("values"), told.get("rate_hz")
+    values, rate_hz = entry.get("values"), entry.get("rate_hz")
     typed = tuple(
         (name, each[:MAX_VALUE_LENGTH])
         for name, each in (values.items() if isinstance(values, dict) else ())

@@ -40,7 +40,7 @@ def state_chip(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, s
     Returns:
         Text, status and icon. An icon of None stands for the default icon of the status.
     """
-    seen = current_value_text(rule.condition, state.value)
+    value_text = current_value_text(rule.condition, state.value)
     match state.phase:
         case "faulty":
             problem = problem_of(rule)
@@ -53,16 +53,16 @@ def state_chip(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, s
             return _("waits for {name}").format(name=rule.condition.name), "off", None
     if rule.is_snoozed(now_s):
         until = clock_text(local_datetime(rule.snoozed_until_s))
-        words = _("{seen}, snoozed until {clock}") if seen else _("snoozed until {clock}")
-        return words.format(seen=seen, clock=until), "warn", "bell-off"
+        text = _("{seen}, snoozed until {clock}") if value_text else _("snoozed until {clock}")
+        return text.format(seen=value_text, clock=until), "warn", "bell-off"
     if state.phase == "on":
         lasts = _("active for {time}").format(time=seconds_text(state.on_duration_s))
-        is_told = bool(seen) and rule.condition.kind != "silent"
-        words = _("{state}, {seen}").format(state=lasts, seen=seen) if is_told else lasts
-        return words, severity_of(rule.condition), None
+        is_told = bool(value_text) and rule.condition.kind != "silent"
+        text = _("{state}, {seen}").format(state=lasts, seen=value_text) if is_told else lasts
+        return text, severity_of(rule.condition), None
     if state.phase == "pending":
-        return seen or _("pending"), "warn", None
-    return seen or _("OK"), "ok", None
+        return value_text or _("pending"), "warn", None
+    return value_text or _("OK"), "ok", None
 
 
 def note_text(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: dt.datetime) -> str:
@@ -95,8 +95,8 @@ def note_text(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: dt
     return ", ".join(parts)
 
 
-def _lower_first(words: str) -> str:
-    return words[:1].lower() + words[1:]
+def _lower_first(text: str) -> str:
+    return text[:1].lower() + text[1:]
 
 
 def history_columns(
@@ -110,10 +110,10 @@ def history_columns(
     """
 
     def when_cell(record: AlarmRecord) -> Cell:
-        then = local_datetime(record.at_s)
-        today = then.date() == now().date()
-        words = then.strftime("%H:%M:%S").lstrip("0") if today else date_time_text(then, now())
-        return Cell(words, role="textSecondary", mono=today)
+        recorded_at = local_datetime(record.at_s)
+        today = recorded_at.date() == now().date()
+        text = recorded_at.strftime("%H:%M:%S").lstrip("0") if today else date_time_text(recorded_at, now())
+        return Cell(text, role="textSecondary", mono=today)
 
     def alarm_cell(record: AlarmRecord) -> Cell:
         icon = "check"
@@ -153,8 +153,8 @@ def csv_text(records: Iterable[AlarmRecord]) -> str:
     rows.writerow(("at", "alarm", "lasted_s", "times", "did"))
     for record in records:
         lasted = "" if record.duration_s is None else f"{record.duration_s:.3f}"
-        words = [_escape_formula(text) for text in (record.cause, actions_text(record))]
-        rows.writerow((local_datetime(record.at_s).isoformat(), words[0], lasted, record.count, words[1]))
+        cells = [_escape_formula(text) for text in (record.cause, actions_text(record))]
+        rows.writerow((local_datetime(record.at_s).isoformat(), cells[0], lasted, record.count, cells[1]))
     return out.getvalue()
 
 

@@ -127,45 +127,45 @@ class AlarmsPanel(PanelWidget):
         self._clear.triggered.connect(self.alarms.history.clear)
 
     def _arrange(self) -> None:
-        head = QHBoxLayout()
-        head.setContentsMargins(12, 6, 8, 4)
-        head.setSpacing(8)
-        head.addWidget(self.history_title)
-        head.addWidget(self.history_count)
-        head.addStretch(1)
-        head.addWidget(self.filter)
-        head.addWidget(self.export)
-        foot = QHBoxLayout()
-        foot.setContentsMargins(12, 3, 12, 4)
-        foot.setSpacing(6)
+        header = QHBoxLayout()
+        header.setContentsMargins(12, 6, 8, 4)
+        header.setSpacing(8)
+        header.addWidget(self.history_title)
+        header.addWidget(self.history_count)
+        header.addStretch(1)
+        header.addWidget(self.filter)
+        header.addWidget(self.export)
+        footer = QHBoxLayout()
+        footer.setContentsMargins(12, 3, 12, 4)
+        footer.setSpacing(6)
         hint = ElidedLabel("small", "textTertiary")
         hint.setText(_("Right-click a value, topic or node to create an alarm"))
         self.line = LinkButton(self.theme, _("nep watch"))
         self.line.setToolTip(plain.tip(_("Copies the command that monitors these alarms without a window")))
         self.line.setAccessibleName(_("Copy the command for a terminal: nep watch"))
         self.line.clicked.connect(self._copy_command)
-        foot.addWidget(hint, 1)
-        foot.addWidget(label(_("also without a window:"), "small", role="textTertiary"))
-        foot.addWidget(self.line)
-        inside = QWidget()
-        column = QVBoxLayout(inside)
+        footer.addWidget(hint, 1)
+        footer.addWidget(label(_("also without a window:"), "small", role="textTertiary"))
+        footer.addWidget(self.line)
+        content = QWidget()
+        column = QVBoxLayout(content)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addWidget(self.list, 5)
         column.addWidget(Separator(self.theme))
-        column.addLayout(head)
+        column.addLayout(header)
         column.addWidget(self.table, 3)
         column.addWidget(Separator(self.theme))
-        column.addLayout(foot)
-        self.pages: QStackedWidget = self.make_page_stack(self.empty, inside)
+        column.addLayout(footer)
+        self.pages: QStackedWidget = self.make_page_stack(self.empty, content)
 
     # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         self._ticks += 1
-        facts = (self.alarms.alarms.revision, self.session.live.topics.revision)
-        if facts != self._seen:
-            self._seen = facts
+        revisions = (self.alarms.alarms.revision, self.session.live.topics.revision)
+        if revisions != self._seen:
+            self._seen = revisions
             self._show_rules()
             self._show_states()
         elif self._ticks % STATE_UPDATE_TICKS == 0:
@@ -180,16 +180,18 @@ class AlarmsPanel(PanelWidget):
             )
 
     def _show_rules(self) -> None:
-        known = {row.rule_id: row for row in self.rows}
+        rows_by_id = {row.rule_id: row for row in self.rows}
         rules = self.alarms.rules
-        self.rows = [known.pop(rule.id) if rule.id in known else self._new_row(rule.id) for rule in rules]
-        for row in known.values():
+        self.rows = [
+            rows_by_id.pop(rule.id) if rule.id in rows_by_id else self._new_row(rule.id) for rule in rules
+        ]
+        for row in rows_by_id.values():
             self.column.removeWidget(row)
             row.hide()
             row.deleteLater()
-        for place, (row, rule) in enumerate(zip(self.rows, rules, strict=True)):
-            if self.column.indexOf(row) != place:
-                self.column.insertWidget(place, row)
+        for index, (row, rule) in enumerate(zip(self.rows, rules, strict=True)):
+            if self.column.indexOf(row) != index:
+                self.column.insertWidget(index, row)
             row.show_rule(rule, self._icon(rule), snoozed=rule.is_snoozed(self.now_s()))
         any_history = len(self.alarms.history) > 0
         self.pages.setCurrentIndex(1 if rules or any_history else 0)
@@ -216,8 +218,8 @@ class AlarmsPanel(PanelWidget):
             row.show_state(*state_chip(rule, state, now_s), note_text(rule, state, self.alarms, now))
             row.snooze.setVisible(rule.is_enabled)
         count = len(self.rows)
-        words = ngettext("{count} alarm", "{count} alarms", count).format(count=count)
-        self.count.setText(words if count else "")
+        count_text = ngettext("{count} alarm", "{count} alarms", count).format(count=count)
+        self.count.setText(count_text if count else "")
         self.chip.set(
             ngettext("{count} active", "{count} active", on).format(count=on) if on else "", "error"
         )
@@ -225,8 +227,8 @@ class AlarmsPanel(PanelWidget):
     def _show_history(self) -> None:
         history = self.alarms.history
         self._history_seen = history.revision
-        words = self.filter.text().casefold().split()
-        rows = [each for each in history if all(word in each.cause.casefold() for word in words)]
+        keywords = self.filter.text().casefold().split()
+        rows = [each for each in history if all(keyword in each.cause.casefold() for keyword in keywords)]
         self.model.set_rows(self.table.order.sort(rows))
         self.table.refresh_visible()
         midnight = local_datetime(self.now_s()).replace(hour=0, minute=0, second=0, microsecond=0)
@@ -234,8 +236,8 @@ class AlarmsPanel(PanelWidget):
         today = sum(each.at_s >= midnight.timestamp() for each in history)
         before = sum(yesterday <= each.at_s < midnight.timestamp() for each in history)
         words_today = _("today {today}, yesterday {yesterday}") if before else _("today {today}")
-        said = words_today.format(today=today, yesterday=before)
-        self.history_count.setText(said if len(history) else _("no events yet"))
+        summary = words_today.format(today=today, yesterday=before)
+        self.history_count.setText(summary if len(history) else _("no events yet"))
         for widget in (self.filter, self.export):
             widget.setVisible(len(history) > 0)
         if len(history) and not self.rows:
@@ -270,10 +272,10 @@ class AlarmsPanel(PanelWidget):
             return
         row.show()
         self.list.ensureWidgetVisible(row)
-        found = row.slots.get(slot) or row.slots["kind"]
-        found.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        slot_widget = row.slots.get(slot) or row.slots["kind"]
+        slot_widget.setFocus(Qt.FocusReason.ShortcutFocusReason)
         if slot:
-            self._open_slot(row, found.part)
+            self._open_slot(row, slot_widget.part)
 
     def _rule(self, rule_id: str) -> AlarmRule | None:
         return self.alarms.alarms.rule(rule_id)
@@ -322,14 +324,14 @@ class AlarmsPanel(PanelWidget):
         rule = self._rule(row.rule_id)
         if rule is None:
             return True
-        made = with_slot_text(rule, part, text)
-        if made is None:
+        changed_rule = with_slot_text(rule, part, text)
+        if changed_rule is None:
             return False
         if part.role == "limit" and self._fresh == rule.id:
             # a new alarm stays disabled until its limit is entered
-            made, self._fresh = replace(made, is_enabled=True), ""
-        if made != rule:
-            self._save_rule(made)
+            changed_rule, self._fresh = replace(changed_rule, is_enabled=True), ""
+        if changed_rule != rule:
+            self._save_rule(changed_rule)
         return True
 
     def _field_closed(self) -> None:
@@ -390,8 +392,8 @@ class AlarmsPanel(PanelWidget):
         for group in KIND_MENU:
             if menu.actions():
                 menu.addSeparator()
-            for kind, words in group:
-                action = menu.addAction(_(words))
+            for kind, kind_label in group:
+                action = menu.addAction(_(kind_label))
                 action.setCheckable(True)
                 action.setChecked(kind == rule.condition.kind)
                 action.triggered.connect(partial(self._set_kind, row, kind))
@@ -400,9 +402,9 @@ class AlarmsPanel(PanelWidget):
         rule = self._rule(row.rule_id)
         if rule is None:
             return
-        made = with_kind(rule, kind)
-        self._save_rule(made)
-        condition = made.condition
+        changed_rule = with_kind(rule, kind)
+        self._save_rule(changed_rule)
+        condition = changed_rule.condition
         missing = (
             "subject"
             if not condition.name
@@ -418,24 +420,24 @@ class AlarmsPanel(PanelWidget):
         if rule is None:
             return
         is_new = part.role == "add"
-        place = len(rule.actions) if is_new else part.action_index
-        there = {action.kind for action in rule.actions}
+        index = len(rule.actions) if is_new else part.action_index
+        existing_kinds = {action.kind for action in rule.actions}
         for action in NEW_ACTIONS:
-            if action.kind in there and action.kind not in {"run", "call", "send"}:
+            if action.kind in existing_kinds and action.kind not in {"run", "call", "send"}:
                 continue
             entry = menu.addAction(self.theme.icon(ACTION_ICONS[action.kind]), _(ACTION_MENU[action.kind]))
-            entry.triggered.connect(partial(self._set_action, row, place, action))
+            entry.triggered.connect(partial(self._set_action, row, index, action))
         if not is_new:
             menu.addSeparator()
             entry = menu.addAction(self.theme.icon("trash-2"), _("Remove this action"))
             entry.triggered.connect(partial(self._remove_action, row.rule_id, part))
 
-    def _set_action(self, row: AlarmRow, place: int, action: object, _on: bool = False) -> None:
+    def _set_action(self, row: AlarmRow, index: int, action: object, _on: bool = False) -> None:
         rule = self._rule(row.rule_id)
         if rule is None:
             return
-        self._save_rule(with_action(rule, place, action))  # type: ignore[arg-type]
-        name = row.slots.get(f"name:{place}")
+        self._save_rule(with_action(rule, index, action))  # type: ignore[arg-type]
+        name = row.slots.get(f"name:{index}")
         if name is not None:
             self._open_slot(row, name.part)
 
@@ -465,19 +467,19 @@ class AlarmsPanel(PanelWidget):
         if rule.is_snoozed(self.now_s()):
             menu.addAction(self.theme.icon("bell"), _("Stop snoozing"), partial(self._snooze, rule.id, 0.0))
         else:
-            for words, seconds in (
+            for text, seconds in (
                 (_("Snooze for 10 min"), SNOOZE_S),
                 (_("Snooze for 1 h"), 3600.0),
                 (_("Snooze until tomorrow"), self._until_tomorrow()),
             ):
-                menu.addAction(self.theme.icon("bell-off"), words, partial(self._snooze, rule.id, seconds))
+                menu.addAction(self.theme.icon("bell-off"), text, partial(self._snooze, rule.id, seconds))
         menu.addSeparator()
         group = QActionGroup(menu)
         for calm_s in CALM_CHOICES_S:
-            said = _("Stay active until the condition has been false for {time}").format(
+            label_text = _("Stay active until the condition has been false for {time}").format(
                 time=duration_text(calm_s)
             )
-            action = menu.addAction(said)
+            action = menu.addAction(label_text)
             action.setCheckable(True)
             action.setChecked(rule.calm_s == calm_s)
             action.triggered.connect(partial(self._set_calm, rule.id, calm_s))
@@ -495,15 +497,15 @@ class AlarmsPanel(PanelWidget):
     def _duplicate(self, rule_id: str) -> None:
         rule = self._rule(rule_id)
         if rule is not None:
-            made = replace(rule, id=new_id(), snoozed_until_s=0.0)
-            self._save_rule(made)
-            self.edit(made.id, "")
+            duplicate = replace(rule, id=new_id(), snoozed_until_s=0.0)
+            self._save_rule(duplicate)
+            self.edit(duplicate.id, "")
 
     def _delete(self, rule_id: str) -> None:
         rule = self.alarms.remove(rule_id)
         if rule is not None:
-            said = _("Deleted the alarm “{condition}”").format(condition=condition_text(rule.condition))
-            self.context.show_toast(said, _("Undo"), self.alarms.restore)
+            message = _("Deleted the alarm “{condition}”").format(condition=condition_text(rule.condition))
+            self.context.show_toast(message, _("Undo"), self.alarms.restore)
             self.refresh()
             self.new.setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -515,9 +517,9 @@ class AlarmsPanel(PanelWidget):
         if row is not None:
             self.list.ensureWidgetVisible(row)
 
-    def _show_record_menu(self, key: str, at: QPoint) -> None:
+    def _show_record_menu(self, key: str, position: QPoint) -> None:
         record = next((each for each in self.alarms.history if self.model.key_of(each) == key), None)
-        kept = (
+        file_names = (
             [saved_file_name(deed.text) for deed in record.action_results if deed.kind == "keep"]
             if record
             else []
@@ -525,11 +527,11 @@ class AlarmsPanel(PanelWidget):
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addAction(self.theme.icon("bell"), _("Show the alarm"), partial(self._open_record, key))
-        for name in filter(None, kept):
+        for name in filter(None, file_names):
             path = self.session.recordings.folder / name
             run = partial(self.context.run, f"recording.open:{path}")
             menu.addAction(self.theme.icon("history"), _("Open the recording"), run)
-        menu.popup(at)
+        menu.popup(position)
 
     def _save(self) -> None:
         suggestion = Path.home() / _("alarms.csv")
@@ -539,9 +541,9 @@ class AlarmsPanel(PanelWidget):
         try:
             write_atomically(path, csv_text(self.alarms.history.records).encode("utf-8"))
         except OSError as error:
-            said = _("Can't write {file}: {reason}.")
+            template = _("Can't write {file}: {reason}.")
             self.session.alerts.raise_alert(
-                "alarms:csv", "warn", said.format(file=path.name, reason=error.strerror or error)
+                "alarms:csv", "warn", template.format(file=path.name, reason=error.strerror or error)
             )
         else:
             self.session.alerts.resolve("alarms:csv")
@@ -549,9 +551,9 @@ class AlarmsPanel(PanelWidget):
 
     def _copy_command(self) -> None:
         path = self.alarms.path
-        said = f'nep watch "{path}"' if path is not None else "nep watch"
-        QGuiApplication.clipboard().setText(said)
-        self.context.show_toast(_("Copied {line}").format(line=said))
+        command = f'nep watch "{path}"' if path is not None else "nep watch"
+        QGuiApplication.clipboard().setText(command)
+        self.context.show_toast(_("Copied {line}").format(line=command))
 
     # -- overrides ----------------------------------------------------------------------------------------
 

@@ -162,15 +162,15 @@ def parts_of(rule: AlarmRule, icon: str = "braces") -> list[PhrasePart]:
     """
     condition = rule.condition
     parts: list[PhrasePart] = []
-    for words, hole, _spec, _conversion in Formatter().parse(_(_TEMPLATES[condition.kind])):
-        if words.strip():
-            parts.append(PhrasePart(f"word:{len(parts)}", words.strip(), "word"))
+    for text, hole, _spec, _conversion in Formatter().parse(_(_TEMPLATES[condition.kind])):
+        if text.strip():
+            parts.append(PhrasePart(f"word:{len(parts)}", text.strip(), "word"))
         if hole:
             parts.append(_slot(hole, condition, icon))
-    for place, action in enumerate(rule.actions):
-        joint = "," if place == 0 else _("and") if place == len(rule.actions) - 1 else ","
+    for index, action in enumerate(rule.actions):
+        joint = "," if index == 0 else _("and") if index == len(rule.actions) - 1 else ","
         parts.append(PhrasePart(f"word:{len(parts)}", joint, "word"))
-        parts += _action_parts(place, action)
+        parts += _action_parts(index, action)
     parts.append(PhrasePart("add", "", "dashed", "plus"))
     return parts
 
@@ -200,26 +200,26 @@ def _icon(condition: AlarmCondition, icon: str) -> str:
     return "network" if condition.is_about_node else "list" if condition.kind == "appears" else icon
 
 
-def _action_parts(place: int, action: AlarmAction) -> list[PhrasePart]:
+def _action_parts(index: int, action: AlarmAction) -> list[PhrasePart]:
     verb = _VERBS.get(action.kind)
     if verb is None:
         icon = "square" if action.kind == "stop" else None
-        return [PhrasePart(f"action:{place}", action_text(action), icon=icon)]
-    named = quotable(action.name) or _("choose")
+        return [PhrasePart(f"action:{index}", action_text(action), icon=icon)]
+    name = quotable(action.name) or _("choose")
     parts = [
-        PhrasePart(f"action:{place}", _(verb)),
-        PhrasePart(f"name:{place}", named, "slot" if action.name else "dashed", mono=action.kind != "run"),
+        PhrasePart(f"action:{index}", _(verb)),
+        PhrasePart(f"name:{index}", name, "slot" if action.name else "dashed", mono=action.kind != "run"),
     ]
     if action.kind in {"call", "send"}:
         text = payload_text(action.payload)
-        shown = text if len(text) <= 24 else f"{text[:23]}…"
-        is_there = action.payload not in ({}, None)
+        payload_label = text if len(text) <= 24 else f"{text[:23]}…"
+        has_payload = action.payload not in ({}, None)
         parts.append(
             PhrasePart(
-                f"payload:{place}",
-                shown if is_there else _("with…"),
-                "slot" if is_there else "dashed",
-                mono=is_there,
+                f"payload:{index}",
+                payload_label if has_payload else _("with…"),
+                "slot" if has_payload else "dashed",
+                mono=has_payload,
             )
         )
     return parts
@@ -297,11 +297,11 @@ def parse_limit(condition: AlarmCondition, text: str) -> object:
         The limit, or `_INVALID` if a number is required and the text is not a number.
     """
     if condition.kind in NUMBER_KINDS:
-        figures, *words = text.replace("%", " ").split() or [""]
-        if any(each[0].isdigit() for each in words):
+        digits, *suffix = text.replace("%", " ").split() or [""]
+        if any(each[0].isdigit() for each in suffix):
             return _INVALID  # "1 234"
         try:
-            number = parse_number(figures)
+            number = parse_number(digits)
         except TypedNumberError:
             return _INVALID
         return int(number) if number.is_integer() and abs(number) < 2**53 else number
@@ -331,16 +331,16 @@ def parse_time(text: str) -> float | None:
     return None
 
 
-def with_action(rule: AlarmRule, place: int, action: AlarmAction | None) -> AlarmRule:
+def with_action(rule: AlarmRule, index: int, action: AlarmAction | None) -> AlarmRule:
     """Return a copy of the rule in which one action is replaced, added or removed.
 
     Args:
         rule: Rule to copy.
-        place: Index of the action; the index after the last action adds an action.
+        index: Index of the action; the index after the last action adds an action.
         action: New action; None removes the action.
     """
     actions = [*rule.actions]
-    actions[place : place + 1] = [] if action is None else [action]
+    actions[index : index + 1] = [] if action is None else [action]
     return replace(rule, actions=tuple(actions))
 
 
@@ -359,12 +359,12 @@ def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
         keeps = kind not in NUMBER_KINDS or not math.isnan(condition.number)
         limit = condition.limit if keeps and condition.kind in KINDS_WITH_LIMIT else limit
         for_s = condition.for_s
-    made = AlarmCondition(kind, limit=limit, for_s=for_s)
-    if made.is_about_node is condition.is_about_node:
-        made = replace(made, name=condition.name)
-    if made.is_about_value:
-        made = replace(made, path=condition.path)
-    return replace(rule, condition=made)
+    new_condition = AlarmCondition(kind, limit=limit, for_s=for_s)
+    if new_condition.is_about_node is condition.is_about_node:
+        new_condition = replace(new_condition, name=condition.name)
+    if new_condition.is_about_value:
+        new_condition = replace(new_condition, path=condition.path)
+    return replace(rule, condition=new_condition)
 
 
 def rejection_text(part: PhrasePart, rule: AlarmRule) -> str:

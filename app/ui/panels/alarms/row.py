@@ -59,16 +59,16 @@ class AlarmRow(QWidget):
         below.setSpacing(10)
         below.addWidget(self.chip)
         below.addWidget(self.note, 1)
-        words = QVBoxLayout()
-        words.setContentsMargins(0, 0, 0, 0)
-        words.setSpacing(5)
-        words.addWidget(self.sentence)
-        words.addLayout(below)
+        text_column = QVBoxLayout()
+        text_column.setContentsMargins(0, 0, 0, 0)
+        text_column.setSpacing(5)
+        text_column.addWidget(self.sentence)
+        text_column.addLayout(below)
         row = QHBoxLayout()
         row.setContentsMargins(12, 8, 8, 7)
         row.setSpacing(8)
         row.addWidget(self.switch, 0, Qt.AlignmentFlag.AlignTop)
-        row.addLayout(words, 1)
+        row.addLayout(text_column, 1)
         row.addWidget(self.snooze, 0, Qt.AlignmentFlag.AlignTop)
         row.addWidget(self.more, 0, Qt.AlignmentFlag.AlignTop)
         column = QVBoxLayout(self)
@@ -85,9 +85,9 @@ class AlarmRow(QWidget):
             icon: Name of the icon for the message type of the rule's topic.
             snoozed: True while the alarm is snoozed.
         """
-        said = condition_text(rule.condition)
-        self.setAccessibleName(said)
-        self.switch.setAccessibleName(_("Enable: {condition}").format(condition=said))
+        text = condition_text(rule.condition)
+        self.setAccessibleName(text)
+        self.switch.setAccessibleName(_("Enable: {condition}").format(condition=text))
         self.switch.setChecked(rule.is_enabled)
         self.snooze.set_icon("bell" if snoozed else "bell-off")
         self.snooze.set_name(_("Stop snoozing") if snoozed else _("Snooze for 10 min"))
@@ -99,16 +99,18 @@ class AlarmRow(QWidget):
     def _rebuild(self, parts: list[PhrasePart]) -> None:
         while self._flow.takeAt(0) is not None:
             continue
-        for word in self._words:
-            word.deleteLater()
+        for word_label in self._words:
+            word_label.deleteLater()
         self._words = []
-        gone = {key: slot for key, slot in self.slots.items() if key not in {part.key for part in parts}}
+        stale_slots = {
+            key: slot for key, slot in self.slots.items() if key not in {part.key for part in parts}
+        }
         for part in parts:
             if part.kind == "word":
-                word = label(part.text, "body", role="textSecondary")
-                self._words.append(word)
-                self._flow.addWidget(word)
-                word.show()
+                word_label = label(part.text, "body", role="textSecondary")
+                self._words.append(word_label)
+                self._flow.addWidget(word_label)
+                word_label.show()
                 continue
             slot = self.slots.get(part.key)
             if slot is None:
@@ -116,7 +118,7 @@ class AlarmRow(QWidget):
             slot.show_part(part)
             self._flow.addWidget(slot)
             slot.show()
-        for key, slot in gone.items():
+        for key, slot in stale_slots.items():
             if slot.hasFocus():
                 self.slots["add"].setFocus(Qt.FocusReason.OtherFocusReason)
             del self.slots[key]
@@ -137,15 +139,15 @@ class AlarmRow(QWidget):
         slot.removed.connect(lambda: self.action_removed.emit(slot.part))
         return slot
 
-    def show_state(self, words: str, status: str, icon: str | None, note: str) -> None:
+    def show_state(self, text: str, status: str, icon: str | None, note: str) -> None:
         """Update the state chip and the note next to it.
 
         Args:
-            words: Text of the chip.
+            text: Text of the chip.
             status: Status of the chip, such as "ok", "warn" or "error".
             icon: Name of the chip's icon; None for the default icon of the status.
             note: Text of the note.
         """
-        self.chip.set(words, status, icon)
+        self.chip.set(text, status, icon)
         if self.note.text() != note:
             self.note.setText(note)

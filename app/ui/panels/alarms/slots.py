@@ -79,17 +79,17 @@ class AlarmSlot(PaintedButton):
             painter.drawRoundedRect(rect.adjusted(0.5, 0.5, -0.5, -0.5), radius, radius)
         else:
             paint.box(painter, rect, radius, theme.colour(fill or "panel"), edge)
-        ink = theme.colour("textSecondary" if dashed else "text")
+        colour = theme.colour("textSecondary" if dashed else "text")
         left = rect.left() + PADDING
         if self.part.icon:
             side = theme.scaled(ICON)
-            square = QRectF(left, rect.center().y() - side / 2, side, side)
+            icon_rect = QRectF(left, rect.center().y() - side / 2, side, side)
             if not self.text():
-                square.moveCenter(rect.center())
-            paint_icon(painter, square, self.part.icon, ink, filled=self.part.icon == "square")
+                icon_rect.moveCenter(rect.center())
+            paint_icon(painter, icon_rect, self.part.icon, colour, filled=self.part.icon == "square")
             left += side + GAP
         paint.text_line(
-            painter, rect.adjusted(left - rect.left(), 0, 2 - PADDING, 0), self.text(), self._font(), ink
+            painter, rect.adjusted(left - rect.left(), 0, 2 - PADDING, 0), self.text(), self._font(), colour
         )
 
 
@@ -103,7 +103,7 @@ class SlotField(QLineEdit):
         slot: Slot to edit.
         text: Initial text.
         example: Placeholder text.
-        take: Receives the text and returns False if it is invalid. The field then stays open with a red
+        apply: Receives the text and returns False if it is invalid. The field then stays open with a red
             outline and shows `rejection`.
         rejection: Message that explains the valid values.
     """
@@ -117,12 +117,12 @@ class SlotField(QLineEdit):
         slot: AlarmSlot,
         text: str,
         example: str,
-        take: Callable[[str], bool],
+        apply: Callable[[str], bool],
         *,
         rejection: str = "",
     ) -> None:
         super().__init__(text, row)
-        self.slot, self._take, self._is_over = slot, take, False
+        self.slot, self._take, self._is_over = slot, apply, False
         self._rejection = rejection
         self.setAccessibleName(slot.accessibleName())
         self.setPlaceholderText(example)
@@ -139,7 +139,7 @@ class SlotField(QLineEdit):
             popup.setProperty("offers", "true")
             popup.setItemDelegate(QStyledItemDelegate(popup))  # lets the style sheet set the padding of items
         self.setCompleter(completer)
-        self.textEdited.connect(lambda _text: self._set_invalid(wrong=False))
+        self.textEdited.connect(lambda _text: self._set_invalid(is_invalid=False))
         self._position_over_slot(theme, row)
         self.selectAll()
         self.show()
@@ -150,17 +150,17 @@ class SlotField(QLineEdit):
         rect.setWidth(max(rect.width() + 24, round(theme.scaled(FIELD_WIDTH))))
         if rect.right() > row.width() - 4:
             rect.moveRight(max(rect.width(), row.width() - 4))
-        middle, high = rect.center().y(), max(rect.height() + 4, self.sizeHint().height())
-        rect.setHeight(high)
-        rect.moveTop(middle - high // 2)
+        middle, height = rect.center().y(), max(rect.height() + 4, self.sizeHint().height())
+        rect.setHeight(height)
+        rect.moveTop(middle - height // 2)
         self.setGeometry(rect)
 
-    def set_completions(self, words: Sequence[str]) -> None:
+    def set_completions(self, completions: Sequence[str]) -> None:
         """Set the completions."""
-        if list(words) == self._offered.stringList():
+        if list(completions) == self._offered.stringList():
             return
-        self._offered.setStringList(list(words))
-        if self.hasFocus() and words and self.text() == "":
+        self._offered.setStringList(list(completions))
+        if self.hasFocus() and completions and self.text() == "":
             self._show_all_completions()
 
     def _show_all_completions(self) -> None:
@@ -202,19 +202,19 @@ class SlotField(QLineEdit):
             self.dismiss(keeps_focus=False)
 
     def _commit(self) -> bool:
-        well = self._take(self.text())
-        self._set_invalid(wrong=not well)
-        return well
+        is_valid = self._take(self.text())
+        self._set_invalid(is_invalid=not is_valid)
+        return is_valid
 
-    def _set_invalid(self, *, wrong: bool) -> None:
-        if self.property("wrong") != ("true" if wrong else ""):
-            self.setProperty("wrong", "true" if wrong else "")
+    def _set_invalid(self, *, is_invalid: bool) -> None:
+        if self.property("wrong") != ("true" if is_invalid else ""):
+            self.setProperty("wrong", "true" if is_invalid else "")
             self.style().unpolish(self)
             self.style().polish(self)
-            self.setToolTip(plain.tip(self._rejection) if wrong else "")
-            if wrong and self.hasFocus():
+            self.setToolTip(plain.tip(self._rejection) if is_invalid else "")
+            if is_invalid and self.hasFocus():
                 QToolTip.showText(self.mapToGlobal(self.rect().bottomLeft()), self.toolTip(), self)
-            elif not wrong:
+            elif not is_invalid:
                 QToolTip.hideText()
 
     def dismiss(self, *, keeps_focus: bool = True) -> None:

@@ -59,45 +59,47 @@ class BackpackController:
             self._shown = self._backpack.revision
             self._editor.set_backpack([item.to_json() for item in self._backpack.items])
 
-    def _handle_request(self, what: str) -> None:
+    def _handle_request(self, request_json: str) -> None:
         try:
-            asked = deep_json.loads(what)
+            request = deep_json.loads(request_json)
         except (ValueError, RecursionError):
             return
-        if not isinstance(asked, Mapping):
+        if not isinstance(request, Mapping):
             return
-        if asked.get("do") == "look":
+        if request.get("do") == "look":
             self.reload_if_changed()
-        elif asked.get("do") == "put":
-            blocks, count = asked.get("blocks"), asked.get("count")
+        elif request.get("do") == "put":
+            blocks, count = request.get("blocks"), request.get("count")
             if isinstance(blocks, list) and isinstance(count, int):
-                self._add(blocks, count, left=bool(asked.get("notes")))
-        elif asked.get("do") == "remove":
-            self._remove(lambda: self._backpack.remove([bounded_str(asked.get("id"))]), emptied=False)
-        elif asked.get("do") == "empty":
+                self._add(blocks, count, has_notes=bool(request.get("notes")))
+        elif request.get("do") == "remove":
+            self._remove(lambda: self._backpack.remove([bounded_str(request.get("id"))]), emptied=False)
+        elif request.get("do") == "empty":
             self._remove(self._backpack.empty, emptied=True)
 
-    def _add(self, blocks: Sequence[Mapping[str, object]], count: int, *, left: bool) -> None:
+    def _add(self, blocks: Sequence[Mapping[str, object]], count: int, *, has_notes: bool) -> None:
         # `left` is True if the selection contained notes, which the backpack doesn't store.
-        made: list[BackpackStack] = []
-        if blocks and self._apply_change(lambda: made.extend(self._backpack.add(blocks))):
-            words = ngettext(
+        added: list[BackpackStack] = []
+        if blocks and self._apply_change(lambda: added.extend(self._backpack.add(blocks))):
+            template = ngettext(
                 "Added {count} block to the backpack", "Added {count} blocks to the backpack", count
             )
-            ids = [item.id for item in made]
-            said = words.format(count=count)
-            if left:
-                said = _("{what}. Notes weren't added: the backpack can only hold blocks.").format(what=said)
+            ids = [item.id for item in added]
+            message = template.format(count=count)
+            if has_notes:
+                message = _("{what}. Notes weren't added: the backpack can only hold blocks.").format(
+                    what=message
+                )
             self._context.show_toast(
-                said, _("Undo"), lambda: self._apply_change(lambda: self._backpack.remove(ids))
+                message, _("Undo"), lambda: self._apply_change(lambda: self._backpack.remove(ids))
             )
 
-    def _remove(self, take: Callable[[], list[BackpackStack]], *, emptied: bool) -> None:
-        gone: list[BackpackStack] = []
-        if self._apply_change(lambda: gone.extend(take())) and gone:
-            words = _("Emptied the backpack") if emptied else _("Removed from the backpack")
+    def _remove(self, remove: Callable[[], list[BackpackStack]], *, emptied: bool) -> None:
+        removed: list[BackpackStack] = []
+        if self._apply_change(lambda: removed.extend(remove())) and removed:
+            message = _("Emptied the backpack") if emptied else _("Removed from the backpack")
             self._context.show_toast(
-                words, _("Undo"), lambda: self._apply_change(lambda: self._backpack.restore(gone))
+                message, _("Undo"), lambda: self._apply_change(lambda: self._backpack.restore(removed))
             )
 
     def _apply_change(self, change: Callable[[], object]) -> bool:
@@ -111,5 +113,5 @@ class BackpackController:
         return True
 
 
-def _capitalize_first(words: str) -> str:
-    return words[:1].upper() + words[1:]
+def _capitalize_first(text: str) -> str:
+    return text[:1].upper() + text[1:]

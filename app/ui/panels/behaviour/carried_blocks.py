@@ -65,16 +65,16 @@ class DragImage(QWidget):
         self.resize(picture.deviceIndependentSize().toSize())
         self.move_to(self._place)
 
-    def move_to(self, place: QPoint | None) -> None:
+    def move_to(self, position: QPoint | None) -> None:
         """Move the image to a position on the screen; None ends the drag."""
-        self._place = place
-        if place is None:
+        self._place = position
+        if position is None:
             self._picture = QPixmap()
         window = self.parentWidget()
-        if place is None or window is None or self._picture.isNull():
+        if position is None or window is None or self._picture.isNull():
             self.hide()
             return
-        self.move(window.mapFromGlobal(place) + POINTER_OFFSET)
+        self.move(window.mapFromGlobal(position) + POINTER_OFFSET)
         if not self.isVisible():
             self.show()
             self.raise_()
@@ -125,35 +125,35 @@ class BlockDrag:
         editor.blocks_dropped_outside.connect(self._on_dropped)
         editor.blocks_transferred.connect(self._on_transferred)
 
-    def _target(self, place: QPoint) -> str:
-        found = self._tabs.target_at(place)
-        return found if found != self._home else ""
+    def _target(self, position: QPoint) -> str:
+        target = self._tabs.target_at(position)
+        return target if target != self._home else ""
 
-    def _drag_moved(self, place: QPoint | None, home: str) -> None:
-        self._held_at = place
-        if place is not None:  # None after the drop: the visible tab may already be another one
+    def _drag_moved(self, position: QPoint | None, home: str) -> None:
+        self._held_at = position
+        if position is not None:  # None after the drop: the visible tab may already be another one
             self._home = home
-        self._move_image(place)
-        self._update_target(place)
-        if place is None:
+        self._move_image(position)
+        self._update_target(position)
+        if position is None:
             self._scrolling.stop()
         elif not self._scrolling.isActive():
             self._scrolling.start()
 
     def _scroll(self) -> None:
-        place = self._held_at
-        if place is not None and self._tabs.scroll_at(place):
-            self._update_target(place)
+        position = self._held_at
+        if position is not None and self._tabs.scroll_at(position):
+            self._update_target(position)
         else:
             self._scrolling.stop()  # the next mouse move starts it again
 
-    def _update_target(self, place: QPoint | None) -> None:
-        self._tabs.highlight_target(self._target(place) if place is not None else "")
-        found = self._tabs.target_at(place) if place is not None else ""
-        if found == self._aimed:
+    def _update_target(self, position: QPoint | None) -> None:
+        self._tabs.highlight_target(self._target(position) if position is not None else "")
+        target = self._tabs.target_at(position) if position is not None else ""
+        if target == self._aimed:
             return
-        self._aimed = found
-        if found in {"", NEW_TAB, self._session.document.key}:
+        self._aimed = target
+        if target in {"", NEW_TAB, self._session.document.key}:
             self._opening.stop()
         else:
             self._opening.start()
@@ -167,17 +167,17 @@ class BlockDrag:
         if self._picture is not None:
             self._picture.set_picture(data, ratio)
 
-    def _move_image(self, place: QPoint | None) -> None:
+    def _move_image(self, position: QPoint | None) -> None:
         window = self._tabs.window()
-        if place is not None and (self._picture is None or self._picture.parentWidget() is not window):
+        if position is not None and (self._picture is None or self._picture.parentWidget() is not window):
             if self._picture is not None:
                 self._picture.deleteLater()
             self._picture = DragImage(window)
         if self._picture is not None:
-            self._picture.move_to(place)
+            self._picture.move_to(position)
 
-    def _on_dropped(self, place: QPoint) -> None:
-        target = self._target(place)
+    def _on_dropped(self, position: QPoint) -> None:
+        target = self._target(position)
         self._held_at = None
         self._scrolling.stop()
         self._move_image(None)
@@ -198,13 +198,13 @@ class BlockDrag:
 
     def _on_transferred(self, count: int, how: str, home: str) -> None:
         document = self._session.document
-        words = transfer_text(count, how, self._session.documents.title(document))
+        message = transfer_text(count, how, self._session.documents.title(document))
 
         def undo() -> None:
             self._context.run(f"tab:{home}")
             self._editor.undo_block_move()
 
-        self._context.show_toast(words, _("Undo"), undo)
+        self._context.show_toast(message, _("Undo"), undo)
 
 
 def transfer_text(count: int, how: str, name: str) -> str:
@@ -216,11 +216,11 @@ def transfer_text(count: int, how: str, name: str) -> str:
         name: Name of the target behaviour.
     """
     if not count:
-        words = _("Moved the note to {name}") if how == "moved" else _("Copied the note to {name}")
+        template = _("Moved the note to {name}") if how == "moved" else _("Copied the note to {name}")
     elif how == "moved":
-        words = ngettext("Moved {count} block to {name}", "Moved {count} blocks to {name}", count)
+        template = ngettext("Moved {count} block to {name}", "Moved {count} blocks to {name}", count)
     elif how == "copied":
-        words = ngettext("Copied {count} block to {name}", "Copied {count} blocks to {name}", count)
+        template = ngettext("Copied {count} block to {name}", "Copied {count} blocks to {name}", count)
     else:
-        words = ngettext("Added {count} block to {name}", "Added {count} blocks to {name}", count)
-    return words.format(count=count, name=name)
+        template = ngettext("Added {count} block to {name}", "Added {count} blocks to {name}", count)
+    return template.format(count=count, name=name)

@@ -42,18 +42,18 @@ def sensor_texts(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tupl
         ``<robot>/<sensor>/<field>``. Values are stale while the robot is silent; a disconnected robot has
         no values.
     """
-    words: dict[str, str] = {}
+    texts: dict[str, str] = {}
     old: set[str] = set()
     for robot, name in sensors:
         link = fleet.link(robot)
         sensor = link.robot.sensor(name) if link is not None else None
         if link is None or sensor is None or not link.is_connected:
             continue
-        told = _value_texts(f"{robot}/{name}", sensor, link.values.get(name))
-        words |= told
+        sensor_values = _value_texts(f"{robot}/{name}", sensor, link.values.get(name))
+        texts |= sensor_values
         if link.state == SILENT_TEXT:
-            old |= told.keys()
-    return words, old
+            old |= sensor_values.keys()
+    return texts, old
 
 
 def _value_texts(key: str, sensor: Sensor, value: object) -> dict[str, str]:

@@ -77,13 +77,13 @@ class Editor(Protocol):
     def close_tab(self, key: str) -> None: ...
     def load(self, workspace: Json) -> None: ...
     def apply_edit(self, workspace: Json) -> None: ...
-    def flush(self, done: Callable[[WorkspaceJson], None]) -> None: ...
+    def flush(self, callback: Callable[[WorkspaceJson], None]) -> None: ...
     def set_theme(self, tokens: Json, dark: bool) -> None: ...
     def highlight(self, ids: Sequence[str]) -> None: ...
     def mark_stopped(self, ids: Sequence[str]) -> None: ...
     def set_errors(self, errors: Mapping[str, str]) -> None: ...
     def set_warnings(self, warnings: Mapping[str, str]) -> None: ...
-    def show_value(self, id: str, words: str) -> None: ...
+    def show_value(self, id: str, text: str) -> None: ...
     def set_absent(self, ids: Sequence[str]) -> None: ...
     def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None: ...
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None: ...
@@ -91,16 +91,16 @@ class Editor(Protocol):
     def edit_variable(self, edit: Json) -> None: ...
     def set_backpack(self, items: Sequence[Json]) -> None: ...
     def set_first_step(self, first: str, robot: bool) -> None: ...
-    def point_at(self, block: str, name: str = "", then: str = "") -> None: ...
+    def point_at(self, block: str, name: str = "", placement_hint: str = "") -> None: ...
     def undo(self) -> None: ...
-    def edit(self, what: str) -> None: ...
-    def edit_from_menu(self, what: str) -> None: ...
+    def edit(self, command: str) -> None: ...
+    def edit_from_menu(self, command: str) -> None: ...
     def undo_deletion(self) -> None: ...
     def move_dragged_blocks(self) -> None: ...
     def undo_block_move(self) -> None: ...
-    def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None: ...
+    def picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None: ...
     def render_pdf(
-        self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]
+        self, title: str, date: str, layout: QPageLayout, callback: Callable[[bytes], None]
     ) -> None: ...
     def open_find(self) -> None: ...
     def open_search(self) -> None: ...
@@ -215,24 +215,24 @@ class BehaviourPanel(PanelWidget):
     def _show_blocks(self, editor: Editor) -> None:
         document = self.session.document
         now = (document.revision, document.fixes)
-        known = self._given.get(document.key)
+        previous = self._given.get(document.key)
         if self._has_changed("tab", document.key):
             editor.show_tab(document.key, document.workspace)
-            for what in ("facts", "blocks"):
-                self._shown.pop(what, None)
-        if known is not None and known[0] != now[0]:
+            for name in ("facts", "blocks"):
+                self._shown.pop(name, None)
+        if previous is not None and previous[0] != now[0]:
             editor.load(document.workspace)
-        elif known is not None and known[1] != now[1]:
+        elif previous is not None and previous[1] != now[1]:
             editor.apply_edit(document.workspace)
         self._given[document.key] = now
         for key in self._given.keys() - {each.key for each in self.session.documents}:
             del self._given[key]
             editor.close_tab(key)
 
-    def _has_changed(self, what: str, now: object) -> bool:
-        if self._shown.get(what) == now and what in self._shown:
+    def _has_changed(self, name: str, now: object) -> bool:
+        if self._shown.get(name) == now and name in self._shown:
             return False
-        self._shown[what] = now
+        self._shown[name] = now
         return True
 
     def _open_editor(self) -> Editor | None:
@@ -331,15 +331,15 @@ class BehaviourPanel(PanelWidget):
             self.session.settings.set(PINNED_SETTING, keeps)
 
     def _blocks_deleted(self, editor: Editor, count: int) -> None:
-        words = ngettext("Deleted {count} block", "Deleted {count} blocks", count).format(count=count)
-        self.context.show_toast(words, _("Undo"), editor.undo_deletion)
+        message = ngettext("Deleted {count} block", "Deleted {count} blocks", count).format(count=count)
+        self.context.show_toast(message, _("Undo"), editor.undo_deletion)
 
     def _show_live_values(self) -> None:
         sensors = dict.fromkeys((*self._sensors, *self._offered))
         self._watch_robots({robot for robot, _name in sensors})
         if self.editor is not None:
-            words, old = sensor_texts(self.session.fleet, sensors)
-            self.editor.set_live_values(words, old)
+            texts, old = sensor_texts(self.session.fleet, sensors)
+            self.editor.set_live_values(texts, old)
 
     def theme_changed(self) -> None:
         if self.editor is not None:
@@ -360,15 +360,15 @@ class BehaviourPanel(PanelWidget):
         QGuiApplication.clipboard().setText(self.program.toPlainText())
         self.context.show_toast(_("Copied the program"))
 
-    def flush(self, done: Callable[[], None]) -> None:
-        """Fetch pending edits, which the editor debounces by 150 ms, then call `done`."""
+    def flush(self, callback: Callable[[], None]) -> None:
+        """Fetch pending edits, which the editor debounces by 150 ms, then call `callback`."""
         if self.editor is None:
-            done()
+            callback()
             return
 
         # Pending edits arrive before the reply. The reply itself is ignored: an unedited behaviour keeps the
         # JSON of its file, which Blockly would serialize differently.
-        self.editor.flush(lambda _workspace: done())
+        self.editor.flush(lambda _workspace: callback())
 
     def undo(self) -> None:
         """Undo the last edit of the blocks."""
@@ -380,42 +380,44 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None:
             self.editor.redo()
 
-    def edit_blocks(self, what: str) -> None:
+    def edit_blocks(self, command: str) -> None:
         """Run "copy", "cut", "paste" or "duplicate" on the selected blocks if the blocks view is active."""
         if self.editor is not None and self.mode == "blocks":
-            self.editor.edit(what)
+            self.editor.edit(command)
 
-    def edit_from_menu(self, what: str) -> None:
+    def edit_from_menu(self, command: str) -> None:
         """Run "cut", "copy", "paste" or "selectAll" on the page's focused text field, else on the blocks."""
         if self.editor is not None and self.mode == "blocks":
-            self.editor.edit_from_menu(what)
+            self.editor.edit_from_menu(command)
 
-    def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+    def picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
         """Render all blocks of the active behaviour as an image.
 
         Args:
             kind: "png" or "svg".
             white: True for a white background, False for a transparent one.
-            done: Receives the image data; b"" if there are no blocks.
+            callback: Receives the image data; b"" if there are no blocks.
         """
         if self.editor is None:
-            done(b"")
+            callback(b"")
         else:
-            self.editor.picture(kind, white, done)
+            self.editor.picture(kind, white, callback)
 
-    def render_pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+    def render_pdf(
+        self, title: str, date: str, layout: QPageLayout, callback: Callable[[bytes], None]
+    ) -> None:
         """Render all blocks of the active behaviour as a PDF document.
 
         Args:
             title: Title on the page.
             date: Date on the page.
             layout: Size, orientation and margins of the page.
-            done: Receives the PDF data; b"" if there are no blocks.
+            callback: Receives the PDF data; b"" if there are no blocks.
         """
         if self.editor is None:
-            done(b"")
+            callback(b"")
         else:
-            self.editor.render_pdf(title, date, layout, done)
+            self.editor.render_pdf(title, date, layout, callback)
 
     def find_blocks(self, *, to_add: bool) -> None:
         """Open the search in the toolbox if `to_add` is True, else the search in the behaviour."""
@@ -437,12 +439,12 @@ class BehaviourPanel(PanelWidget):
             return
         self.set_mode("blocks")
         help_of = self.session.documents.definitions().get("help")
-        found = help_of.get(block) if isinstance(help_of, Mapping) else None
-        title = str(found.get("title", "")) if isinstance(found, Mapping) else ""
+        definition = help_of.get(block) if isinstance(help_of, Mapping) else None
+        title = str(definition.get("title", "")) if isinstance(definition, Mapping) else ""
         name = " ".join(_PLACEHOLDER.sub(" ", title).split())
         begins = block.startswith("events_") or "_when_" in block
-        then = _("Drag it onto the page") if begins else _("Drag it below the other blocks")
-        self.editor.point_at(block, name, then)
+        hint = _("Drag it onto the page") if begins else _("Drag it below the other blocks")
+        self.editor.point_at(block, name, hint)
 
     def show_block(self, block: str) -> None:
         """Switch to the blocks view and scroll to a block.
@@ -496,17 +498,17 @@ class LoadingMessage:
     The delay prevents flicker when loading is fast.
 
     Args:
-        place: Widget to cover.
+        parent: Widget to cover.
         clock: Returns the time in s.
     """
 
-    def __init__(self, place: QWidget, clock: Callable[[], float] = time.monotonic) -> None:
-        self._place, self._clock = place, clock
+    def __init__(self, parent: QWidget, clock: Callable[[], float] = time.monotonic) -> None:
+        self._place, self._clock = parent, clock
         self._since: float | None = None
         self.words = label(_(LOADING_TEXT), "bodyLarge", role="textSecondary", wrap=True)
         self.words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.words.setParent(place)
+        self.words.setParent(parent)
         self.words.hide()
 
     def set_ready(self, *, ready: bool) -> None:
@@ -546,23 +548,25 @@ def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
 
 def tab_states(documents: Iterable[Document], runs: Runs) -> list[TabState]:
     """Return the data of the tabs of all open behaviours."""
-    shown = list(documents)
-    found = []
-    for document, title in zip(shown, unique_titles([(each.name, each.path) for each in shown]), strict=True):
+    open_documents = list(documents)
+    states = []
+    for document, title in zip(
+        open_documents, unique_titles([(each.name, each.path) for each in open_documents]), strict=True
+    ):
         running = runs.active and runs.document is document
-        where = str(document.path) if document.path is not None else _("Not saved to a file yet")
-        found.append(
+        location = str(document.path) if document.path is not None else _("Not saved to a file yet")
+        states.append(
             TabState(
                 document.key,
                 title,
                 document.dirty,
                 running,
-                f"{title}\n{where}",
+                f"{title}\n{location}",
                 document.name,
                 document.path is not None,
             )
         )
-    return found
+    return states
 
 
 PANEL = Panel("behaviour", lazy("Behaviour"), "blocks", (), BehaviourPanel)

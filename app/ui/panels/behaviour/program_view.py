@@ -28,15 +28,15 @@ class _Highlighter(QSyntaxHighlighter):
     def __init__(self, document: QTextDocument, theme: Theme) -> None:
         super().__init__(document)
         self._theme = theme
-        together = "|".join(f"(?P<r{place}>{rule})" for place, (_role, rule) in enumerate(_HIGHLIGHT_RULES))
+        together = "|".join(f"(?P<r{index}>{rule})" for index, (_role, rule) in enumerate(_HIGHLIGHT_RULES))
         self._rules = re.compile(together)
 
     def highlightBlock(self, text: str) -> None:
-        for found in self._rules.finditer(text):
-            role = _HIGHLIGHT_RULES[int((found.lastgroup or "r0")[1:])][0]
-            shown = QTextCharFormat()
-            shown.setForeground(self._theme.colour(role))
-            self.setFormat(found.start(), found.end() - found.start(), shown)
+        for match in self._rules.finditer(text):
+            role = _HIGHLIGHT_RULES[int((match.lastgroup or "r0")[1:])][0]
+            text_format = QTextCharFormat()
+            text_format.setForeground(self._theme.colour(role))
+            self.setFormat(match.start(), match.end() - match.start(), text_format)
 
 
 class ProgramView(QPlainTextEdit):
@@ -66,11 +66,11 @@ class ProgramView(QPlainTextEdit):
         """Show the program and keep the scroll position."""
         if source != self.toPlainText():
             bar = self.verticalScrollBar()
-            place = bar.value()
+            scroll_position = bar.value()
             self.setPlainText(source)
-            bar.setValue(place)
+            bar.setValue(scroll_position)
 
-    def line_containing(self, words: str) -> int:
-        """Return the number (from 1) of the first line that contains `words`, or 0 if there is none."""
-        found = self.document().find(QRegularExpression(QRegularExpression.escape(words)))
-        return found.blockNumber() + 1 if not found.isNull() else 0
+    def line_containing(self, text: str) -> int:
+        """Return the number (from 1) of the first line that contains `text`, or 0 if there is none."""
+        cursor = self.document().find(QRegularExpression(QRegularExpression.escape(text)))
+        return cursor.blockNumber() + 1 if not cursor.isNull() else 0

@@ -73,25 +73,27 @@ class BehaviourTab(PaintedButton):
         self._over_close = self._close_down = False
         self.setMouseTracking(True)
 
-    def show_state(self, facts: TabState, current: bool) -> bool:
+    def show_state(self, state: TabState, current: bool) -> bool:
         """Update the tab. Return True if its width changed."""
-        if facts == self.facts and current == self.isChecked():
+        if state == self.facts and current == self.isChecked():
             return False
         wider = (
-            facts.name != self.facts.name
+            state.name != self.facts.name
             or current != self.isChecked()
-            or facts.is_running != self.facts.is_running
+            or state.is_running != self.facts.is_running
         )
-        self.facts = facts
+        self.facts = state
         self.setChecked(current)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus if current else Qt.FocusPolicy.ClickFocus)
         states = [
-            word for word, so in ((_("not saved"), facts.is_dirty), (_("running"), facts.is_running)) if so
+            label_text
+            for label_text, so in ((_("not saved"), state.is_dirty), (_("running"), state.is_running))
+            if so
         ]
-        self.set_text(facts.name, ", ".join([facts.name, *states]))
-        said = _("The active behaviour") if current else _("Another open behaviour")
-        self.setAccessibleDescription(said)
-        self.setToolTip(plain.tip(facts.tip or self.accessibleName()))
+        self.set_text(state.name, ", ".join([state.name, *states]))
+        description = _("The active behaviour") if current else _("Another open behaviour")
+        self.setAccessibleDescription(description)
+        self.setToolTip(plain.tip(state.tip or self.accessibleName()))
         self.update()
         return wider
 
@@ -120,24 +122,24 @@ class BehaviourTab(PaintedButton):
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        current, over = self.isChecked(), self.is_hovered or self._from is not None
-        if current or over:
+        current, is_highlighted = self.isChecked(), self.is_hovered or self._from is not None
+        if current or is_highlighted:
             role = "selected" if current else "hover"
             paint.box(painter, rect, theme.radius("small"), theme.colour(role))
-        ink = theme.colour("selectedText" if current else "textSecondary")
+        colour = theme.colour("selectedText" if current else "textSecondary")
         left = float(PADDING)
         if self._has_icon():
             side = self._icon_size()
             self._paint_mark(painter, QRectF(left, rect.center().y() - side / 2, side, side))
             left += side + 8
-        words = rect.adjusted(left, 0, -SLOT_WIDTH - 2, 0)
-        paint.text_line(painter, words, self.facts.name, self._font(current=current), ink)
-        self._paint_slot(painter, over or self.hasFocus())
+        text_rect = rect.adjusted(left, 0, -SLOT_WIDTH - 2, 0)
+        paint.text_line(painter, text_rect, self.facts.name, self._font(current=current), colour)
+        self._paint_slot(painter, is_highlighted or self.hasFocus())
 
-    def _paint_mark(self, painter: QPainter, square: QRectF) -> None:
+    def _paint_mark(self, painter: QPainter, icon_rect: QRectF) -> None:
         theme = self._theme
         if not self.facts.is_running:
-            paint_icon(painter, square, "blocks", theme.colour("selectedText"))
+            paint_icon(painter, icon_rect, "blocks", theme.colour("selectedText"))
             return
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)
@@ -145,19 +147,19 @@ class BehaviourTab(PaintedButton):
         halo.setAlphaF(0.3)
         for colour, radius in ((halo, 7.0), (theme.colour("running"), 4.5)):
             painter.setBrush(colour)
-            painter.drawEllipse(square.center(), radius, radius)
+            painter.drawEllipse(icon_rect.center(), radius, radius)
 
-    def _paint_slot(self, painter: QPainter, over: bool) -> None:
+    def _paint_slot(self, painter: QPainter, is_highlighted: bool) -> None:
         theme, slot = self._theme, self.close_rect()
-        ink = theme.colour("selectedText" if self.isChecked() else "textSecondary")
-        if over:
+        colour = theme.colour("selectedText" if self.isChecked() else "textSecondary")
+        if is_highlighted:
             if self._over_close:
                 paint.box(painter, slot, theme.radius("key"), theme.colour("pressed"))
-            paint_icon(painter, slot.adjusted(2, 2, -2, -2), "x", ink)
+            paint_icon(painter, slot.adjusted(2, 2, -2, -2), "x", colour)
         elif self.facts.is_dirty:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(ink)
+            painter.setBrush(colour)
             painter.drawEllipse(slot.center(), 3.5, 3.5)
 
     # -- mouse and keyboard -------------------------------------------------------------------------------
@@ -179,19 +181,19 @@ class BehaviourTab(PaintedButton):
             self.mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        over = self.close_rect().contains(event.position())
-        if over != self._over_close:
-            self._over_close = over
+        is_over_close = self.close_rect().contains(event.position())
+        if is_over_close != self._over_close:
+            self._over_close = is_over_close
             self.update()
         if self._from is not None:
-            far = abs(event.position().x() - self._from.x()) >= QApplication.startDragDistance()
-            if far:
+            is_dragging = abs(event.position().x() - self._from.x()) >= QApplication.startDragDistance()
+            if is_dragging:
                 self.dragged.emit(round(self.mapToParent(event.position()).x()))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        inside = QRectF(self.rect()).contains(event.position())
+        is_inside = QRectF(self.rect()).contains(event.position())
         pressed, self._close_down, self._from = self._close_down, False, None
-        if (event.button() == Qt.MouseButton.MiddleButton and inside) or (
+        if (event.button() == Qt.MouseButton.MiddleButton and is_inside) or (
             pressed and self.close_rect().contains(event.position())
         ):
             self.close_pressed.emit()
@@ -226,7 +228,7 @@ class NameField(QLineEdit):
 
     Args:
         name: Current name.
-        why_not: Returns the reason why a name is invalid, or "".
+        validate: Returns the reason why a name is invalid, or "".
 
     Signals:
         committed: New name.
@@ -236,9 +238,9 @@ class NameField(QLineEdit):
     committed = Signal(str)
     exited = Signal()
 
-    def __init__(self, theme: Theme, name: str, why_not: Callable[[str], str], parent: QWidget) -> None:
+    def __init__(self, theme: Theme, name: str, validate: Callable[[str], str], parent: QWidget) -> None:
         super().__init__(name, parent)
-        self._theme, self._why_not, self._ended = theme, why_not, False
+        self._theme, self._why_not, self._ended = theme, validate, False
         self.setAccessibleName(_("Behaviour name"))
         self.setProperty("focusRadius", theme.radius("small"))
         self.setMaxLength(MAX_NAME_LENGTH)
@@ -282,9 +284,9 @@ class NameField(QLineEdit):
             self.exited.emit()
 
     def _show_problem(self, problem: str) -> None:
-        wrong = "true" if problem else ""
-        if self.property("wrong") != wrong:
-            self.setProperty("wrong", wrong)
+        property_value = "true" if problem else ""
+        if self.property("wrong") != property_value:
+            self.setProperty("wrong", property_value)
             self.style().unpolish(self)
             self.style().polish(self)
         self.setAccessibleDescription(problem)

@@ -56,34 +56,34 @@ class BehaviourTabs(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self._restyle)
 
-    def show_tabs(self, facts: Sequence[TabState], current: str) -> None:
+    def show_tabs(self, states: Sequence[TabState], current: str) -> None:
         """Replace the tabs.
 
         Args:
-            facts: Data of the tabs, from left to right.
+            states: Data of the tabs, from left to right.
             current: Key of the active tab.
         """
-        wanted = tuple(facts)
-        if (wanted, current) == (self._facts, self._current):
+        requested = tuple(states)
+        if (requested, current) == (self._facts, self._current):
             return
         had_focus = any(tab.hasFocus() for tab in self.tabs.values())
-        for key in self.tabs.keys() - {each.key for each in wanted}:
-            gone = self.tabs.pop(key)
+        for key in self.tabs.keys() - {each.key for each in requested}:
+            removed_tab = self.tabs.pop(key)
             if self.field is not None and key == self._edited:
                 self._end_edit()
-            gone.hide()
-            gone.deleteLater()
+            removed_tab.hide()
+            removed_tab.deleteLater()
         moved = current != self._current
-        self._facts, self._current = wanted, current
-        changed = [self._make_tab(each).show_state(each, each.key == current) for each in wanted]
+        self._facts, self._current = requested, current
+        changed = [self._make_tab(each).show_state(each, each.key == current) for each in requested]
         if had_focus and moved and current in self.tabs:
             self.tabs[current].setFocus(Qt.FocusReason.OtherFocusReason)
         self._update_layout(bring=moved)
         if any(changed):
             self.updateGeometry()
 
-    def _make_tab(self, facts: TabState) -> BehaviourTab:
-        key = facts.key
+    def _make_tab(self, state: TabState) -> BehaviourTab:
+        key = state.key
         if key not in self.tabs:
             tab = self.tabs[key] = BehaviourTab(self._theme, self._room)
             tab.selected.connect(lambda: self.selected.emit(key))
@@ -97,48 +97,48 @@ class BehaviourTabs(QWidget):
     def _show_tab_list(self) -> None:
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        for each in self._facts:
-            entry = menu.addAction(plain.escape_menu_text(each.name))
+        for state in self._facts:
+            entry = menu.addAction(plain.escape_menu_text(state.name))
             entry.setCheckable(True)
-            entry.setChecked(each.key == self._current)
-            entry.triggered.connect(lambda _on=False, key=each.key: self.selected.emit(key))
+            entry.setChecked(state.key == self._current)
+            entry.triggered.connect(lambda _on=False, key=state.key: self.selected.emit(key))
         open_below(menu, self.list)
 
     # -- drops of blocks ----------------------------------------------------------------------------------
 
-    def target_at(self, place: QPoint) -> str:
+    def target_at(self, position: QPoint) -> str:
         """Return the drop target at a screen position: the key of a tab, `NEW_TAB` for "+", or ""."""
         if not self.isVisible():
             return ""
-        here = self.mapFromGlobal(place)
-        if self.add.isVisible() and self.add.geometry().contains(here):
+        local_position = self.mapFromGlobal(position)
+        if self.add.isVisible() and self.add.geometry().contains(local_position):
             return NEW_TAB
-        if not self._room.geometry().contains(here):
+        if not self._room.geometry().contains(local_position):
             return ""
-        return next((key for key, tab in self.tabs.items() if tab.geometry().contains(here)), "")
+        return next((key for key, tab in self.tabs.items() if tab.geometry().contains(local_position)), "")
 
-    def scroll_at(self, place: QPoint) -> bool:
+    def scroll_at(self, position: QPoint) -> bool:
         """Scroll the tabs if a position is near an end of the bar. Return True if the tabs moved.
 
         Args:
-            place: Screen position of the drag.
+            position: Screen position of the drag.
         """
-        here, room = self.mapFromGlobal(place), self._room.geometry()
-        if not self.isVisible() or not room.contains(here):
+        local_position, room = self.mapFromGlobal(position), self._room.geometry()
+        if not self.isVisible() or not room.contains(local_position):
             return False
-        near = min(round(self._theme.scaled(SCROLL_MARGIN)), room.width() // 3)
+        margin = min(round(self._theme.scaled(SCROLL_MARGIN)), room.width() // 3)
         before = self._left
-        if here.x() < room.left() + near:
+        if local_position.x() < room.left() + margin:
             self._left -= SCROLL_STEP
-        elif here.x() > room.right() - near:
+        elif local_position.x() > room.right() - margin:
             self._left += SCROLL_STEP
         self._update_layout()
         return self._left != before
 
     def highlight_target(self, key: str) -> None:
         """Highlight a drop target: the key of a tab, `NEW_TAB` for "+", or "" for none."""
-        for each, tab in self.tabs.items():
-            tab.set_drop_target(each == key)
+        for tab_key, tab in self.tabs.items():
+            tab.set_drop_target(tab_key == key)
         self.add.set_drop_target(key == NEW_TAB)
 
     # -- renaming -----------------------------------------------------------------------------------------
@@ -148,8 +148,8 @@ class BehaviourTabs(QWidget):
         if key not in self.tabs:
             return
         self._end_edit()
-        facts = self.tabs[key].facts
-        name = facts.plain_name or facts.name
+        state = self.tabs[key].facts
+        name = state.plain_name or state.name
         self._edited = key
         self.field = NameField(self._theme, name, lambda name: self.why_not(key, name), self._room)
         self.field.committed.connect(lambda name: self.renamed.emit(key, name))
@@ -186,9 +186,9 @@ class BehaviourTabs(QWidget):
 
     def _drag(self, key: str, x: int) -> None:
         keys = [each.key for each in self._facts]
-        place = keys.index(key)
+        index = keys.index(key)
         for step in (-1, 1):
-            other = place + step
+            other = index + step
             if 0 <= other < len(keys):
                 middle = self.tabs[keys[other]].geometry().center().x()
                 if (x < middle) if step < 0 else (x > middle):
@@ -203,24 +203,24 @@ class BehaviourTabs(QWidget):
 
     def _widths(self) -> list[int]:
         # The active tab keeps its full width up to the available room; the others shrink down to MIN_LENGTH.
-        wanted = [self.tabs[each.key].sizeHint().width() for each in self._facts]
-        room = self._available_width(scrolls=False) - GAP * len(wanted)
-        least = round(self._theme.scaled(MIN_TAB_WIDTH))
+        full_widths = [self.tabs[each.key].sizeHint().width() for each in self._facts]
+        room = self._available_width(scrolls=False) - GAP * len(full_widths)
+        min_width = round(self._theme.scaled(MIN_TAB_WIDTH))
         keys = [each.key for each in self._facts]
-        alone = max(least, self._available_width(scrolls=len(keys) > 1))
+        alone = max(min_width, self._available_width(scrolls=len(keys) > 1))
 
-        def cut(most: int) -> list[int]:
-            pairs = zip(keys, wanted, strict=True)
-            return [min(width, alone if key == self._current else most) for key, width in pairs]
+        def cut(limit: int) -> list[int]:
+            pairs = zip(keys, full_widths, strict=True)
+            return [min(width, alone if key == self._current else limit) for key, width in pairs]
 
-        most = max(wanted, default=least)
-        while most > least and sum(cut(most)) > room:
-            most -= 4
-        return cut(max(most, least))
+        max_width = max(full_widths, default=min_width)
+        while max_width > min_width and sum(cut(max_width)) > room:
+            max_width -= 4
+        return cut(max(max_width, min_width))
 
     def _available_width(self, *, scrolls: bool) -> int:
-        taken = self.add.sizeHint().width() + GAP
-        return self.width() - taken - (self.list.sizeHint().width() + GAP if scrolls else 0)
+        reserved = self.add.sizeHint().width() + GAP
+        return self.width() - reserved - (self.list.sizeHint().width() + GAP if scrolls else 0)
 
     def _update_layout(self, *, bring: bool = False) -> None:
         widths = self._widths()
@@ -232,8 +232,8 @@ class BehaviourTabs(QWidget):
         self._left = max(0.0, min(self._left, float(total - room)))
         self._room.setGeometry(0, 0, max(0, room), self.height())
         x = -self._left
-        for each, width in zip(self._facts, widths, strict=True):
-            tab = self.tabs[each.key]
+        for state, width in zip(self._facts, widths, strict=True):
+            tab = self.tabs[state.key]
             height = tab.sizeHint().height()
             tab.setGeometry(round(x), (self.height() - height) // 2, width, height)
             x += width + GAP
@@ -247,8 +247,8 @@ class BehaviourTabs(QWidget):
 
     def _offset_for_current(self, widths: list[int], room: int) -> float:
         x = 0.0
-        for each, width in zip(self._facts, widths, strict=True):
-            if each.key == self._current:
+        for state, width in zip(self._facts, widths, strict=True):
+            if state.key == self._current:
                 return min(max(self._left, x + width - room), x)
             x += width + GAP
         return self._left
@@ -275,10 +275,10 @@ class BehaviourTabs(QWidget):
         event.accept()
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
-        found = next((key for key, tab in self.tabs.items() if tab.geometry().contains(event.pos())), None)
-        if found is None:
+        tab_key = next((key for key, tab in self.tabs.items() if tab.geometry().contains(event.pos())), None)
+        if tab_key is None:
             return
-        self.menu_of(found).popup(event.globalPos())
+        self.menu_of(tab_key).popup(event.globalPos())
         event.accept()
 
     def menu_of(self, key: str) -> Menu:
@@ -287,7 +287,7 @@ class BehaviourTabs(QWidget):
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         rename = menu.addAction(self._theme.icon("pencil"), f"{_('Rename')}\tF2")
         rename.triggered.connect(lambda: self.edit(key))
-        for words, icon, command in (
+        for text, icon, command in (
             (_("Duplicate"), "copy", "tab.duplicate"),
             (_("Save"), "save", "tab.save"),
             (_("Save as"), "", "tab.save_as"),
@@ -299,7 +299,7 @@ class BehaviourTabs(QWidget):
             if not command:
                 menu.addSeparator()
                 continue
-            action = menu.addAction(words)
+            action = menu.addAction(text)
             if icon:
                 action.setIcon(self._theme.icon(icon))
             action.triggered.connect(

@@ -68,10 +68,10 @@ def format_line(record: ConsoleRecord, level: str = "") -> str:
 
 def tooltip_text(record: ConsoleRecord) -> str:
     """Return the tooltip of a record: the full text, time, level, origin, and location of the log call."""
-    where = "  ".join(part for part in (record.logger, record.location) if part)
+    source = "  ".join(part for part in (record.logger, record.location) if part)
     clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
-    said = f"{record.text}\n{clock} {_level_name(record)}"
-    return f"{said}  {record.origin}\n{where}" if where else f"{said}  {record.origin}"
+    text = f"{record.text}\n{clock} {_level_name(record)}"
+    return f"{text}  {record.origin}\n{source}" if source else f"{text}  {record.origin}"
 
 
 def first_line(text: str) -> str:
@@ -80,8 +80,8 @@ def first_line(text: str) -> str:
     if not rest:
         return first
     more = rest.count("\n") + 1
-    said = ngettext("{text} (and {count} more line)", "{text} (and {count} more lines)", more)
-    return said.format(text=first, count=more)
+    template = ngettext("{text} (and {count} more line)", "{text} (and {count} more lines)", more)
+    return template.format(text=first, count=more)
 
 
 def _level_name(record: ConsoleRecord) -> str:
@@ -94,19 +94,19 @@ class RecordFilter:
     Args:
         levels: Accepted levels.
         node: Accepted origin; "" for all nodes.
-        words: Words that a record must contain, separated by spaces; case is ignored.
+        text: Words that a record must contain, separated by spaces; case is ignored.
     """
 
-    def __init__(self, levels: frozenset[str], node: str, words: str) -> None:
-        self._levels, self._node, self._words = levels, node, words.casefold().split()
+    def __init__(self, levels: frozenset[str], node: str, text: str) -> None:
+        self._levels, self._node, self._words = levels, node, text.casefold().split()
 
     def __call__(self, record: ConsoleRecord) -> bool:
         if record.level not in self._levels or (self._node and record.origin != self._node):
             return False
         if not self._words:
             return True
-        said = f"{record.origin} {record.logger} {record.text}".casefold()
-        return all(word in said for word in self._words)
+        searchable = f"{record.origin} {record.logger} {record.text}".casefold()
+        return all(keyword in searchable for keyword in self._words)
 
 
 class ConsoleModel(QAbstractListModel):
@@ -131,58 +131,58 @@ class ConsoleModel(QAbstractListModel):
         return plain.tip(tooltip_text(record)) if role == Qt.ItemDataRole.ToolTipRole else None
 
     def reset_records(
-        self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]
+        self, records: Sequence[ConsoleRecord], accepts: Callable[[ConsoleRecord], bool]
     ) -> None:
         """Replace all rows.
 
         Args:
             records: Records, oldest first.
-            wanted: Returns True for records to show.
+            accepts: Returns True for records to show.
         """
         self.beginResetModel()
-        self._records = deque(record for record in records if wanted(record))
+        self._records = deque(record for record in records if accepts(record))
         self._newest = records[-1].number if records else 0
         self.endResetModel()
 
     def update_records(
-        self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]
+        self, records: Sequence[ConsoleRecord], accepts: Callable[[ConsoleRecord], bool]
     ) -> int:
         """Add rows for new records and remove the rows of evicted ones.
 
         Args:
             records: Stored records, oldest first.
-            wanted: Returns True for records to show.
+            accepts: Returns True for records to show.
 
         Returns:
             The number of rows added.
         """
         if not records or records[-1].number < self._newest or records[0].number > self._newest + 1:
-            self.reset_records(records, wanted)
+            self.reset_records(records, accepts)
             return len(self._records)
         self._evict_older_than(records[0].number)
-        came: list[ConsoleRecord] = []
+        added: list[ConsoleRecord] = []
         for record in reversed(records):
             if record.number <= self._newest:
                 break
-            if wanted(record):
-                came.append(record)
+            if accepts(record):
+                added.append(record)
         self._newest = records[-1].number
-        if came:
-            self.beginInsertRows(_ROOT, 0, len(came) - 1)
-            self._records.extend(reversed(came))
+        if added:
+            self.beginInsertRows(_ROOT, 0, len(added) - 1)
+            self._records.extend(reversed(added))
             self.endInsertRows()
-        return len(came)
+        return len(added)
 
     def _evict_older_than(self, oldest: int) -> None:
-        gone = 0
+        evicted_count = 0
         for record in self._records:
             if record.number >= oldest:
                 break
-            gone += 1
-        if gone:
+            evicted_count += 1
+        if evicted_count:
             rows = len(self._records)
-            self.beginRemoveRows(_ROOT, rows - gone, rows - 1)
-            for _each in range(gone):
+            self.beginRemoveRows(_ROOT, rows - evicted_count, rows - 1)
+            for _each in range(evicted_count):
                 self._records.popleft()
             self.endRemoveRows()
 
@@ -214,23 +214,23 @@ class LineDelegate(QStyledItemDelegate):
             painter.fillRect(box, theme.colour("selected"))
         rect = QRectF(box).adjusted(10, 0, -8, 0)
         small = theme.font("code")
-        shown = self.columns(record, rect.width())
-        if "time" in shown:
+        widths = self.columns(record, rect.width())
+        if "time" in widths:
             clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
             paint.text_line(painter, rect, clock, small, theme.colour("textTertiary"))
-            rect.setLeft(rect.left() + shown["time"])
+            rect.setLeft(rect.left() + widths["time"])
         icon, role = LEVEL_STYLES.get(record.level, LEVEL_STYLES["info"])
-        square = QRectF(rect.left(), rect.center().y() - ICON_SIZE / 2, ICON_SIZE, ICON_SIZE)
-        paint_icon(painter, square, icon, theme.colour(role))
-        rect.setLeft(rect.left() + shown["icon"])
-        if "level" in shown:
+        icon_rect = QRectF(rect.left(), rect.center().y() - ICON_SIZE / 2, ICON_SIZE, ICON_SIZE)
+        paint_icon(painter, icon_rect, icon, theme.colour(role))
+        rect.setLeft(rect.left() + widths["icon"])
+        if "level" in widths:
             level = _(LEVEL_NAMES.get(record.level, record.level))
             paint.text_line(painter, rect, level, font, theme.colour(role))
-            rect.setLeft(rect.left() + shown["level"])
-        for words, colour, most in self._parts(record, logger="logger" in shown):
+            rect.setLeft(rect.left() + widths["level"])
+        for text, colour, max_share in self._parts(record, logger="logger" in widths):
             part = QRectF(rect)
-            part.setWidth(min(paint.width_of(font, words) + 1, rect.width() * most))
-            paint.text_line(painter, part, words, font, theme.colour(colour))
+            part.setWidth(min(paint.width_of(font, text) + 1, rect.width() * max_share))
+            paint.text_line(painter, part, text, font, theme.colour(colour))
             rect.setLeft(part.right() + 7)
 
     def columns(self, record: ConsoleRecord, width: float) -> dict[str, float]:
@@ -241,18 +241,18 @@ class LineDelegate(QStyledItemDelegate):
         """
         font = self._font()
         text = MIN_TEXT_CHARS * paint.width_of(font, "n")
-        shown = {
+        widths = {
             "time": paint.width_of(self._theme.font("code"), "00:00:00") + 14,
             "icon": float(ICON_SIZE + 4),
-            "level": max(paint.width_of(font, _(word)) for word in LEVEL_NAMES.values()) + 10,
+            "level": max(paint.width_of(font, _(level_name)) for level_name in LEVEL_NAMES.values()) + 10,
             "origin": min(paint.width_of(font, record.origin), 0.3 * width) + 7,
             "logger": paint.width_of(font, record.logger.rpartition(".")[2]),
         }
         for name in ("logger", "level", "time"):
-            if width - sum(shown.values()) >= text:
+            if width - sum(widths.values()) >= text:
                 break
-            del shown[name]
-        return shown
+            del widths[name]
+        return widths
 
     @staticmethod
     def _parts(record: ConsoleRecord, *, logger: bool) -> list[tuple[str, str, float]]:

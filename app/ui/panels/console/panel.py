@@ -83,25 +83,25 @@ class ConsolePanel(PanelWidget):
         column.addWidget(self.pages)
 
     def _make_list(self) -> LineList:
-        made = LineList()
-        made.setModel(self.model)
+        line_list = LineList()
+        line_list.setModel(self.model)
         self._delegate = LineDelegate(self.theme, lambda: self.density, self.text_font)
-        made.setItemDelegate(self._delegate)
-        made.find_requested.connect(self.focus_filter)
-        made.resized.connect(self._position_newer_button)
-        self._copy = QAction(_("Copy"), made)
+        line_list.setItemDelegate(self._delegate)
+        line_list.find_requested.connect(self.focus_filter)
+        line_list.resized.connect(self._position_newer_button)
+        self._copy = QAction(_("Copy"), line_list)
         self._copy.setShortcut(QKeySequence(QKeySequence.StandardKey.Copy))
         self._copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
         self._copy.triggered.connect(self.copy)
-        made.addAction(self._copy)
-        made.customContextMenuRequested.connect(self._show_actions)
+        line_list.addAction(self._copy)
+        line_list.customContextMenuRequested.connect(self._show_actions)
         self._copy_all = QAction(_("Copy all lines"), self)
         self._copy_all.triggered.connect(self._copy_everything)
         self._clear = QAction(_("Clear"), self)
         self._clear.triggered.connect(self.clear)
         self._find = QAction(_("Find text"), self)
         self._find.triggered.connect(self.focus_filter)
-        return made
+        return line_list
 
     # display
 
@@ -114,9 +114,9 @@ class ConsolePanel(PanelWidget):
         choice = (self.level, self.node, self.words.text())
         if (console.revision, choice) == (self._seen, self._choice):
             return
-        records, wanted = console.records, self._current_filter()
+        records, record_filter = console.records, self._current_filter()
         if choice != self._choice:
-            self.model.reset_records(records, wanted)
+            self.model.reset_records(records, record_filter)
             self.list.scrollToTop()
         else:
             self._update_records(records)
@@ -128,13 +128,13 @@ class ConsolePanel(PanelWidget):
         # Keeps the visible lines in place when the user has scrolled down.
         bar = self.list.verticalScrollBar()
         before = bar.value()
-        came = self.model.update_records(records, self._current_filter())
-        if before > 0 and came:
+        added_count = self.model.update_records(records, self._current_filter())
+        if before > 0 and added_count:
             self.list.doItemsLayout()
-            bar.setValue(before + came * self._delegate.row_height())
-            self._unseen += came
+            bar.setValue(before + added_count * self._delegate.row_height())
+            self._unseen += added_count
             self._update_newer_button()
-        elif came:
+        elif added_count:
             self.list.scrollToTop()
 
     def _current_filter(self) -> RecordFilter:
@@ -146,13 +146,13 @@ class ConsolePanel(PanelWidget):
         self._update_newer_button()
 
     def _update_newer_button(self) -> None:
-        away = self.list.verticalScrollBar().value() > 0
+        is_scrolled = self.list.verticalScrollBar().value() > 0
         if self._unseen:
-            said = ngettext("{count} new", "{count} new", self._unseen)
-            self.newer.set_label(said.format(count=group_digits(self._unseen)), "arrow-up")
+            template = ngettext("{count} new", "{count} new", self._unseen)
+            self.newer.set_label(template.format(count=group_digits(self._unseen)), "arrow-up")
         else:
             self.newer.set_label(_("Jump to newest"), "arrow-up")
-        self.newer.setVisible(away)
+        self.newer.setVisible(is_scrolled)
         self.newer.adjustSize()
         self._position_newer_button()
 
@@ -161,26 +161,26 @@ class ConsolePanel(PanelWidget):
         self.newer.move(port.width() - self.newer.width() - 12, 8)
 
     def _update_empty_state(self) -> None:
-        chosen = self.level in {"warn", "error"} or self.node or self.words.text()
-        if not chosen:
+        is_filtered = self.level in {"warn", "error"} or self.node or self.words.text()
+        if not is_filtered:
             self.empty.set_texts(_("No events yet"), _("Log messages of programs and robots appear here."))
             self.empty.set_actions([self.doctor_action()])
         elif self.node or self.words.text():
             self.empty.set_texts(_("No matching lines"), _("Show all lines, or wait for a matching one."))
             self.empty.set_actions([EmptyAction(_("Show all lines"), self.clear_filters, "x")])
         else:
-            said = _("Choose “{everything}” to see all lines.").format(everything=_(LEVEL_LABELS["all"]))
-            self.empty.set_texts(_("No problems reported"), said)
+            hint = _("Choose “{everything}” to see all lines.").format(everything=_(LEVEL_LABELS["all"]))
+            self.empty.set_texts(_("No problems reported"), hint)
             self.empty.set_actions([])
 
     def blockers(self) -> list[Blocker]:
-        chosen = [
+        active_filters = [
             self.words.text(),
             self.node,
             _(LEVEL_LABELS[self.level]) if self.level in {"warn", "error"} else "",
         ]
-        words = ", ".join(filter(None, chosen))
-        return [filter_blocker(self.title(), words, self.clear_filters)] if words else []
+        text = ", ".join(filter(None, active_filters))
+        return [filter_blocker(self.title(), text, self.clear_filters)] if text else []
 
     # filters
 
@@ -208,15 +208,15 @@ class ConsolePanel(PanelWidget):
         self.refresh()
 
     def _update_filter_button(self) -> None:
-        said = _("Showing: {level} of {node}") if self.node else _("Showing: {level}")
-        self.filter.set_name(said.format(level=_(LEVEL_LABELS[self.level]), node=self.node))
+        template = _("Showing: {level} of {node}") if self.node else _("Showing: {level}")
+        self.filter.set_name(template.format(level=_(LEVEL_LABELS[self.level]), node=self.node))
         self.filter.setProperty("chosen", self.level != "all" or bool(self.node))
         self.refresh()
 
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
-        for level, words in LEVEL_LABELS.items():
-            self._add_choice(menu, _(words), level == self.level, partial(self.set_level, level))
+        for level, text in LEVEL_LABELS.items():
+            self._add_choice(menu, _(text), level == self.level, partial(self.set_level, level))
         nodes = sorted(
             {record.origin for record in self.session.displayed_console.records} | {self.node} - {""}
         )
@@ -232,17 +232,17 @@ class ConsolePanel(PanelWidget):
         open_below(menu, self.filter)
 
     @staticmethod
-    def _add_choice(menu: Menu, words: str, is_chosen: bool, choose: partial[None]) -> None:
-        action = menu.addAction(plain.escape_menu_text(words))
+    def _add_choice(menu: Menu, text: str, is_chosen: bool, choose: partial[None]) -> None:
+        action = menu.addAction(plain.escape_menu_text(text))
         action.setCheckable(True)
         action.setChecked(is_chosen)
         action.triggered.connect(lambda _on=False: choose())
 
-    def _show_actions(self, at: QPoint) -> None:
+    def _show_actions(self, position: QPoint) -> None:
         menu = Menu(self.theme, self)
         menu.addActions([self._copy, self._copy_all, self._find, self._clear])
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.popup(self.list.viewport().mapToGlobal(at))
+        menu.popup(self.list.viewport().mapToGlobal(position))
 
     def more_actions(self) -> Sequence[QAction]:
         return (self._find, self._copy_all, self._clear)
@@ -269,8 +269,8 @@ class ConsolePanel(PanelWidget):
         if rows:
             records = [self.model.index(row, 0).data(RECORD_ROLE) for row in rows]
             QGuiApplication.clipboard().setText("\n".join(format_line(record) for record in records))
-            said = ngettext("Copied {count} line", "Copied {count} lines", len(rows))
-            self.context.show_toast(said.format(count=group_digits(len(rows))))
+            template = ngettext("Copied {count} line", "Copied {count} lines", len(rows))
+            self.context.show_toast(template.format(count=group_digits(len(rows))))
 
     # appearance and saved state
 

@@ -59,8 +59,8 @@ class _StepMark(QWidget):
             fill = theme.colour("accent") if following else None
             edge = theme.colour("accent" if following else "controlBorder")
             paint.box(painter, rect, rect.height() / 2, fill, edge, 1.25)
-            ink = theme.colour("onAccent" if following else "textSecondary")
-            paint.text_line(painter, rect, str(self._number), theme.font("caption"), ink, paint.CENTRE)
+            colour = theme.colour("onAccent" if following else "textSecondary")
+            paint.text_line(painter, rect, str(self._number), theme.font("caption"), colour, paint.CENTRE)
         painter.end()
 
 
@@ -84,8 +84,8 @@ class StepRow(QWidget):
         first = step.id == "robot"
         self.button = Button(theme, with_block_names(step.text) if first else _("Show me"), size="small")
         self.button.clicked.connect(lambda: show_me(step))
-        for words in (self.words, self.hint):
-            words.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        for text_label in (self.words, self.hint):
+            text_label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         help_row = QHBoxLayout()
         help_row.setSpacing(8)
         help_row.addWidget(self.hint, 1)
@@ -106,8 +106,8 @@ class StepRow(QWidget):
         paint.show_when(self.hint, state == "next")
         paint.show_when(self.button, state == "next")
         set_role(self.words, "textSecondary" if state == "done" else "text")
-        said = {"done": _("{step}: done"), "next": _("{step}: the next step"), "later": "{step}"}[state]
-        self.setAccessibleName(said.format(step=self.words.text()))
+        template = {"done": _("{step}: done"), "next": _("{step}: the next step"), "later": "{step}"}[state]
+        self.setAccessibleName(template.format(step=self.words.text()))
         self.update()
         self.mark.update()
 
@@ -143,9 +143,9 @@ class FirstStepsPanel(PanelWidget):
     def __init__(self, context: PanelContext, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(context, _("First steps"))
         self._clock = clock
-        kept: object = self.session.settings.get(PROGRESS_SETTING, [])
-        known = {step.id for step in STEPS}
-        self.done: frozenset[str] = frozenset(kept if isinstance(kept, list) else ()) & known
+        saved: object = self.session.settings.get(PROGRESS_SETTING, [])
+        step_ids = {step.id for step in STEPS}
+        self.done: frozenset[str] = frozenset(saved if isinstance(saved, list) else ()) & step_ids
         self._waits_since: tuple[str, float] | None = None
         self._pointed_for = ""
         self._edits: object = None
@@ -154,8 +154,8 @@ class FirstStepsPanel(PanelWidget):
             StepRow(self.theme, number, step, self.show_me) for number, step in enumerate(STEPS, start=1)
         ]
         steps = ScrollColumn(_("First steps"), margins=(8, 8, 8, 8), gap=2)
-        for place, row in enumerate(self.rows):
-            steps.column.insertWidget(place, row)
+        for index, row in enumerate(self.rows):
+            steps.column.insertWidget(index, row)
         self.end = EmptyState(
             self.theme,
             "circle-check",
@@ -185,9 +185,9 @@ class FirstStepsPanel(PanelWidget):
     def refresh(self) -> None:
         if self.next_step() is None:
             return
-        done = completed_steps(self._current_state(), self.done)
-        if done != self.done:
-            self.done = done
+        completed = completed_steps(self._current_state(), self.done)
+        if completed != self.done:
+            self.done = completed
             self._save_progress()
             self._show()
             if self.next_step() is None:
@@ -217,13 +217,13 @@ class FirstStepsPanel(PanelWidget):
     def _show_delayed_hint(self) -> None:
         # Shown once per step.
         step, now = self.next_step(), self._clock()
-        seen = (self.session.document.edits, self.session.runs.active)
+        activity = (self.session.document.edits, self.session.runs.active)
         if step is None:
             return
-        if self._waits_since is None or self._waits_since[0] != step.id or seen != self._edits:
+        if self._waits_since is None or self._waits_since[0] != step.id or activity != self._edits:
             if self._waits_since is not None and self._waits_since[0] != step.id and self._pointed_for:
                 self._clear_highlight()
-            self._waits_since, self._edits = (step.id, now), seen
+            self._waits_since, self._edits = (step.id, now), activity
         elif now - self._waits_since[1] >= HINT_DELAY_S and self._pointed_for != step.id:
             if step.id != "robot" and not self.session.runs.active:
                 self.show_me(step)
@@ -231,7 +231,7 @@ class FirstStepsPanel(PanelWidget):
 
     def _show(self) -> None:
         step = self.next_step()
-        held = any(row.button.hasFocus() for row in self.rows)
+        had_focus = any(row.button.hasFocus() for row in self.rows)
         for row in self.rows:
             state = "done" if row.step.id in self.done else "next" if row.step is step else "later"
             row.show_state(state)
@@ -241,13 +241,13 @@ class FirstStepsPanel(PanelWidget):
         )
         self.pages.setCurrentIndex(0 if step is not None else 1)
         button = next((row.button for row in self.rows if row.step is step), None)
-        if held and button is not None:  # keeps the focus for keyboard users
+        if had_focus and button is not None:  # keeps the focus for keyboard users
             button.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _save_progress(self) -> None:
-        kept = [step.id for step in STEPS if step.id in self.done]
+        completed = [step.id for step in STEPS if step.id in self.done]
         try:
-            self.session.settings.set(PROGRESS_SETTING, kept)
+            self.session.settings.set(PROGRESS_SETTING, completed)
         except SettingsError as error:
             self.session.console.add("warn", "studio", str(error))
 

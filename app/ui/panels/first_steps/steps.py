@@ -111,8 +111,8 @@ def find_tutorial_blocks(workspace: Mapping[str, object], others: Collection[str
     loose: list[Script] = []
     is_started = False
     for top in _top_blocks(workspace):
-        own = tuple((kind, id) for kind, id in _iter_blocks(top) if id not in others)
-        (started if top.get("type") == START_BLOCK else loose).append(own)
+        own_blocks = tuple((kind, id) for kind, id in _iter_blocks(top) if id not in others)
+        (started if top.get("type") == START_BLOCK else loose).append(own_blocks)
         is_started |= top.get("type") == START_BLOCK and top.get("id") not in others
     below = {end for end in (SAY, TURN) if _contains_type(started, end)}
     return TutorialBlocks(
@@ -127,29 +127,29 @@ def _contains_type(scripts: Sequence[Script], end: str) -> bool:
     return any(kind.endswith(end) for script in scripts for kind, _id in script)
 
 
-def completed_steps(now: TutorialState, done: Collection[str]) -> frozenset[str]:
+def completed_steps(now: TutorialState, completed: Collection[str]) -> frozenset[str]:
     """Return the ids of the completed steps.
 
     The last step, Stop, counts only after a run with a turn, so that it can't be completed by chance.
 
     Args:
         now: Current state of the behaviour and its run.
-        done: Ids of steps completed before, which stay completed.
+        completed: Ids of steps completed before, which stay completed.
     """
-    found = set(done)
+    step_ids = set(completed)
     if now.can_speak:
-        found.add("robot")
+        step_ids.add("robot")
     if now.blocks.started:
-        found.add("start")
+        step_ids.add("start")
     if now.blocks.say_ids:
-        found.add("say")
+        step_ids.add("say")
     if now.blocks.say_ids & set(now.executed_ids):
-        found.add("run")
+        step_ids.add("run")
     if now.blocks.has_turn:
-        found.add("turn")
-    if now.was_stopped and now.blocks.has_turn and {"run", "turn"} <= found:
-        found.add("stop")
-    return frozenset(found)
+        step_ids.add("turn")
+    if now.was_stopped and now.blocks.has_turn and {"run", "turn"} <= step_ids:
+        step_ids.add("stop")
+    return frozenset(step_ids)
 
 
 def _top_blocks(workspace: Mapping[str, object]) -> list[Mapping[str, object]]:
@@ -167,5 +167,7 @@ def _iter_blocks(block: Mapping[str, object]) -> Iterator[tuple[str, str]]:
             continue
         yield str(each.get("type", "")), str(each.get("id", ""))
         inputs = each.get("inputs")
-        held = inputs.values() if isinstance(inputs, Mapping) else ()
-        waiting += [link.get("block") for link in (*held, each.get("next")) if isinstance(link, Mapping)]
+        input_links = inputs.values() if isinstance(inputs, Mapping) else ()
+        waiting += [
+            link.get("block") for link in (*input_links, each.get("next")) if isinstance(link, Mapping)
+        ]

@@ -134,14 +134,14 @@ class GraphCanvas(QWidget):
         if self.scene is not None:
             self._waiting = self.scene.items_in(self.visible_rect())
 
-    def update_stats(self, figures: StatsGetter) -> int:
+    def update_stats(self, stats_of: StatsGetter) -> int:
         """Update the rates and counts of the next visible items, at most `MAX_UPDATES_PER_TICK`.
 
         This is called on every tick; the work is divided, because each call must be short. Only changed
         areas are repainted.
 
         Args:
-            figures: Returns label, width and losses of a line.
+            stats_of: Returns label, width and losses of a line.
 
         Returns:
             The number of changed areas.
@@ -154,9 +154,9 @@ class GraphCanvas(QWidget):
             return 0
         now, self._waiting = self._waiting[:MAX_UPDATES_PER_TICK], self._waiting[MAX_UPDATES_PER_TICK:]
         has_words = scene.has_small_text(self.scale)
-        changed = [scene.update_stats(item, figures, with_words=has_words) for item in now]
-        seen = self.visible_rect()
-        areas = [area for area in changed if area is not None and area.intersects(seen)]
+        changed = [scene.update_stats(item, stats_of, with_words=has_words) for item in now]
+        visible_area = self.visible_rect()
+        areas = [area for area in changed if area is not None and area.intersects(visible_area)]
         if len(areas) > MAX_DIRTY_RECTS:
             self.update()
         else:
@@ -175,11 +175,11 @@ class GraphCanvas(QWidget):
         if choice == self.choice:
             return
         self.choice = choice
-        said = self._describe(choice)
-        self.setAccessibleDescription(said)
+        description = self._describe(choice)
+        self.setAccessibleDescription(description)
         if by_key:
             self._scroll_to_selection()
-            paint.announce(self, said)
+            paint.announce(self, description)
         self.update()
         self.selected.emit(choice)
 
@@ -198,22 +198,22 @@ class GraphCanvas(QWidget):
         self._shows_all = True
         if self.scene is None or self.scene.bounds.isEmpty():
             return
-        whole = self.scene.bounds.adjusted(-MARGIN, -MARGIN, MARGIN, MARGIN)
-        fits = min(self.width() / whole.width(), self.height() / whole.height(), 1.0)
-        self.scale = max(MIN_SCALE, fits)
-        self._offset = QPointF(self.width() / 2, self.height() / 2) - whole.center() * self.scale
+        bounds = self.scene.bounds.adjusted(-MARGIN, -MARGIN, MARGIN, MARGIN)
+        fit_scale = min(self.width() / bounds.width(), self.height() / bounds.height(), 1.0)
+        self.scale = max(MIN_SCALE, fit_scale)
+        self._offset = QPointF(self.width() / 2, self.height() / 2) - bounds.center() * self.scale
         self.update()
         self.viewport_changed.emit()
 
-    def zoom_by(self, factor: float, at: QPointF | None = None) -> None:
+    def zoom_by(self, factor: float, position: QPointF | None = None) -> None:
         """Zoom by a factor around a point of the widget, by default its centre."""
-        self.zoom_to(self.scale * factor, at)
+        self.zoom_to(self.scale * factor, position)
 
-    def zoom_to(self, scale: float, at: QPointF | None = None) -> None:
+    def zoom_to(self, scale: float, position: QPointF | None = None) -> None:
         """Zoom to a scale (1.0 is 100 %) around a point of the widget, by default its centre."""
-        at = at if at is not None else QPointF(self.width() / 2, self.height() / 2)
+        position = position if position is not None else QPointF(self.width() / 2, self.height() / 2)
         scale = min(MAX_SCALE, max(MIN_SCALE, scale))
-        self._offset = at - (at - self._offset) * (scale / self.scale)
+        self._offset = position - (position - self._offset) * (scale / self.scale)
         self.scale = scale
         self._shows_all = False
         self.update()
@@ -226,10 +226,10 @@ class GraphCanvas(QWidget):
         self.update()
         self.viewport_changed.emit()
 
-    def center_on(self, at: QPointF) -> None:
+    def center_on(self, point: QPointF) -> None:
         """Centre the view on a point of the scene."""
         middle = self.visible_rect().center()
-        self.move_by((middle.x() - at.x()) * self.scale, (middle.y() - at.y()) * self.scale)
+        self.move_by((middle.x() - point.x()) * self.scale, (middle.y() - point.y()) * self.scale)
 
     def _scroll_to_selection(self) -> None:
         rect = self._rect_of(self.choice)
@@ -255,8 +255,8 @@ class GraphCanvas(QWidget):
             area.height() * self.scale,
         )
 
-    def _to_scene(self, at: QPointF) -> QPointF:
-        return (at - self._offset) / self.scale
+    def _to_scene(self, position: QPointF) -> QPointF:
+        return (position - self._offset) / self.scale
 
     # -- Qt events ----------------------------------------------------------------------------------------
 
@@ -271,13 +271,13 @@ class GraphCanvas(QWidget):
             painter.scale(self.scale, self.scale)
             clip = QRectF(event.rect())
             corner = self._to_scene(clip.topLeft())
-            seen = QRectF(corner, clip.size() / self.scale)
+            visible_area = QRectF(corner, clip.size() / self.scale)
             rings = self.hasFocus() and is_keyboard_navigation()
-            paint_scene(self.scene, painter, seen, self.scale, self.choice, rings=rings)
+            paint_scene(self.scene, painter, visible_area, self.scale, self.choice, rings=rings)
             painter.resetTransform()
         if self.hasFocus() and is_keyboard_navigation() and self.choice is None:
-            whole = QRectF(self.rect()).adjusted(2, 2, -2, -2)
-            paint.box(painter, whole, theme.radius("small"), None, theme.colour("focus"), 2.0)
+            focus_rect = QRectF(self.rect()).adjusted(2, 2, -2, -2)
+            paint.box(painter, focus_rect, theme.radius("small"), None, theme.colour("focus"), 2.0)
         painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -306,16 +306,16 @@ class GraphCanvas(QWidget):
         return super().event(event)
 
     def _show_tip(self, event: QHelpEvent) -> None:
-        said = ""
-        at = self._to_scene(QPointF(event.pos()))
+        text = ""
+        position = self._to_scene(QPointF(event.pos()))
         if self.scene is not None:
-            node = self.scene.node_at(at)
-            item = self.scene.line_at(at, self.scale) if node is None else None
+            node = self.scene.node_at(position)
+            item = self.scene.line_at(position, self.scale) if node is None else None
             if node is not None:
-                said = self._describe(GraphSelection("node", node.key))
+                text = self._describe(GraphSelection("node", node.key))
             elif item is not None:
-                said = "\n".join(self._tip(topic) for topic in item.line.topics[:12])
-        QToolTip.showText(event.globalPos(), plain.tip(said), self)
+                text = "\n".join(self._tip(topic) for topic in item.line.topics[:12])
+        QToolTip.showText(event.globalPos(), plain.tip(text), self)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         if event.modifiers() & Qt.KeyboardModifier.ShiftModifier or not event.pixelDelta().isNull():
@@ -354,45 +354,45 @@ class GraphCanvas(QWidget):
             self._press(event.position())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        meant = self._item_at(event.position())
-        if isinstance(meant, GraphSelection) and meant.kind == "topic":
-            self.opened.emit(meant.key)
+        target = self._item_at(event.position())
+        if isinstance(target, GraphSelection) and target.kind == "topic":
+            self.opened.emit(target.key)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         # Selects the item under the mouse first, so that its card fits the menu.
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
-            choice, place = self.choice, self._to_screen(self._rect_of(self.choice)).center()
+            choice, position = self.choice, self._to_screen(self._rect_of(self.choice)).center()
         else:
-            meant, place = self._item_at(QPointF(event.pos())), QPointF(event.pos())
-            choice = meant if isinstance(meant, GraphSelection) else None
+            target, position = self._item_at(QPointF(event.pos())), QPointF(event.pos())
+            choice = target if isinstance(target, GraphSelection) else None
             if choice is not None:
                 self.select(choice)
         if choice is not None:
-            self.menu_requested.emit(choice, self.mapToGlobal(place.toPoint()))
+            self.menu_requested.emit(choice, self.mapToGlobal(position.toPoint()))
 
-    def _press(self, at: QPointF) -> None:
-        meant = self._item_at(at)
-        if isinstance(meant, tuple):
-            group, is_head = meant
+    def _press(self, position: QPointF) -> None:
+        target = self._item_at(position)
+        if isinstance(target, tuple):
+            group, is_head = target
             (self.toggled if is_head else self.quiet_nodes_requested).emit(group)
             return
-        if meant is not None and meant.kind == "node" and self.expand_group(meant.key):
+        if target is not None and target.kind == "node" and self.expand_group(target.key):
             return
-        self.select(meant)
+        self.select(target)
 
-    def _item_at(self, at: QPointF) -> GraphSelection | tuple[str, bool] | None:
+    def _item_at(self, position: QPointF) -> GraphSelection | tuple[str, bool] | None:
         # The bool of a group is True for its title, False for its number of quiet nodes.
         scene = self.scene
         if scene is None:
             return None
-        here = self._to_scene(at)
-        node = scene.node_at(here)
+        scene_position = self._to_scene(position)
+        node = scene.node_at(scene_position)
         if node is not None:
             return GraphSelection("node", node.key)
-        item = scene.line_at(here, self.scale)
+        item = scene.line_at(scene_position, self.scale)
         if item is not None:
             return GraphSelection("topic", item.line.topics[0], item.line.sources[0])
-        group = scene.group_at(here)
+        group = scene.group_at(scene_position)
         return (group[0].key, group[1]) if group is not None else None
 
     def expand_group(self, key: str) -> bool:
@@ -418,8 +418,8 @@ class GraphCanvas(QWidget):
         key = event.key()
         arrow = _ARROW_KEYS.get(key)
         if arrow is not None and event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
-            across, down = _PAN_DIRECTIONS[arrow]
-            self.move_by(across * PAN_STEP, down * PAN_STEP)
+            dx, dy = _PAN_DIRECTIONS[arrow]
+            self.move_by(dx * PAN_STEP, dy * PAN_STEP)
         elif arrow is not None and has_no_modifiers(event):
             self._select_neighbour(arrow)
         elif key in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and has_no_modifiers(event):
@@ -430,9 +430,11 @@ class GraphCanvas(QWidget):
             super().keyPressEvent(event)
 
     def _zoom_key(self, event: QKeyEvent) -> bool:
-        held = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier)
+        modifiers = event.modifiers() & ~(
+            Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier
+        )
         key = event.key()
-        if held:
+        if modifiers:
             return False
         if key in PANEL_KEYS:
             self.key_pressed.emit(PANEL_KEYS[Qt.Key(key)])
@@ -448,9 +450,9 @@ class GraphCanvas(QWidget):
 
     def _select_neighbour(self, arrow: Arrow) -> None:
         if self.scene is not None:
-            found = move_selection(self.scene.graph, self.scene.layout, self.choice, arrow)
-            if found is not None:
-                self.select(found, by_key=True)
+            neighbour = move_selection(self.scene.graph, self.scene.layout, self.choice, arrow)
+            if neighbour is not None:
+                self.select(neighbour, by_key=True)
 
     def _activate(self) -> None:
         choice = self.choice
@@ -477,14 +479,14 @@ class GraphOverview(QWidget):
     def _update_position(self) -> None:
         # Visible while part of the graph is out of view and there is room for it.
         canvas, scene = self._canvas, self._canvas.scene
-        wanted = (
+        is_needed = (
             scene is not None
             and not canvas.visible_rect().contains(scene.bounds)
             and canvas.width() > 3 * self.width()
             and canvas.height() > 3 * self.height()
         )
         self.move(canvas.width() - self.width() - 12, canvas.height() - self.height() - 12)
-        self.setVisible(wanted)
+        self.setVisible(is_needed)
         self.update()
 
     def _fit_transform(self, scene: GraphScene) -> tuple[float, QPointF]:
@@ -509,8 +511,8 @@ class GraphOverview(QWidget):
                 is_chosen = choice is not None and choice.key == key
                 painter.fillRect(item.rect, theme.colour("accent" if is_chosen else "controlBorder"))
             painter.restore()
-            seen = self._canvas.visible_rect()
-            frame = QRectF(seen.topLeft() * scale + offset, seen.size() * scale)
+            visible_area = self._canvas.visible_rect()
+            frame = QRectF(visible_area.topLeft() * scale + offset, visible_area.size() * scale)
             paint.box(
                 painter, frame.intersected(rect.adjusted(2, 2, -2, -2)), 3, None, theme.colour("accent"), 1.5
             )

@@ -127,7 +127,7 @@ class GraphCard(QWidget):
         super().__init__()
         self._theme = theme
         self.content: CardContent | None = None
-        self.title = ElidedLabel("code", "text", least=60)
+        self.title = ElidedLabel("code", "text", min_width=60)
         self.kind = label("", "small", role="textTertiary")
         self.close_button = IconButton(theme, "x", _("Close"), size=24)
         self.close_button.clicked.connect(self.closed)
@@ -174,13 +174,13 @@ class GraphCard(QWidget):
         self.steps.setSizePolicy(policy)
 
     def _header_row(self) -> QHBoxLayout:
-        head = QHBoxLayout()
-        head.setContentsMargins(14, 8, 8, 4)
-        head.setSpacing(8)
-        head.addWidget(self.title)
-        head.addWidget(self.kind, 1)
-        head.addWidget(self.close_button)
-        return head
+        header = QHBoxLayout()
+        header.setContentsMargins(14, 8, 8, 4)
+        header.setSpacing(8)
+        header.addWidget(self.title)
+        header.addWidget(self.kind, 1)
+        header.addWidget(self.close_button)
+        return header
 
     def first_focus_widget(self) -> QWidget:
         """Return the first widget of the tab order: a row, else *Inspect*, else the close button."""
@@ -224,10 +224,10 @@ class GraphCard(QWidget):
         self._line.setVisible(bool(content.footer))
         if before is None or _structure_key(before) != _structure_key(content):
             self._rebuild(content)
-        for box, figure in zip(self._figures, content.stats, strict=True):
-            box.set_stat(figure)
-        for made, table in zip(self._tables, content.tables, strict=True):
-            made.set_table(table)
+        for box, stat in zip(self._figures, content.stats, strict=True):
+            box.set_stat(stat)
+        for table_widget, table in zip(self._tables, content.tables, strict=True):
+            table_widget.set_table(table)
         self.show()
 
     def _rebuild(self, content: CardContent) -> None:
@@ -242,16 +242,16 @@ class GraphCard(QWidget):
             grid.setContentsMargins(12, 8, 12, 8)
             grid.setHorizontalSpacing(12)
             grid.setVerticalSpacing(8)
-            for place, box in enumerate(self._figures):
-                grid.addWidget(box, place // 2, place % 2, Qt.AlignmentFlag.AlignTop)
+            for index, box in enumerate(self._figures):
+                grid.addWidget(box, index // 2, index % 2, Qt.AlignmentFlag.AlignTop)
             grid.setColumnStretch(0, 1)
             grid.setColumnStretch(1, 1)
             self._column.addWidget(card)
-        for fact in content.lines:
-            self._column.addWidget(label(fact, "body", role="textSecondary", wrap=True))
+        for line in content.lines:
+            self._column.addWidget(label(line, "body", role="textSecondary", wrap=True))
         self._tables = [_Table(self._theme, table, self.select_requested.emit) for table in content.tables]
-        for made in self._tables:
-            self._column.addWidget(made)
+        for table_widget in self._tables:
+            self._column.addWidget(table_widget)
         self._column.addStretch(1)
 
 
@@ -281,19 +281,19 @@ class _StatBox(QWidget):
         column.addLayout(row)
         column.addWidget(self._note)
 
-    def set_stat(self, figure: CardStat) -> None:
-        self._title.setText(figure.title)
-        if self._value.text() != figure.value:
-            self._value.setText(figure.value)
-        self._note.setText(figure.note)
-        self._curve.set_values(figure.curve)
-        self._curve.setVisible(len(figure.curve) > 1)
-        role = "warn" if figure.is_problem else "text"
+    def set_stat(self, stat: CardStat) -> None:
+        self._title.setText(stat.title)
+        if self._value.text() != stat.value:
+            self._value.setText(stat.value)
+        self._note.setText(stat.note)
+        self._curve.set_values(stat.curve)
+        self._curve.setVisible(len(stat.curve) > 1)
+        role = "warn" if stat.is_problem else "text"
         if self._value.property("role") != role:
             self._value.setProperty("role", role)
             self._value.style().unpolish(self._value)
             self._value.style().polish(self._value)
-        self.setAccessibleName(f"{figure.title}: {figure.value}")
+        self.setAccessibleName(f"{stat.title}: {stat.value}")
 
 
 @dataclass(slots=True)
@@ -313,27 +313,29 @@ class _Table(QWidget):
         grid.setVerticalSpacing(2)
         grid.setColumnStretch(0, 1)
         grid.addWidget(label(table.title, "title"), 0, 0)
-        for place, words in enumerate(table.columns, 1):
-            grid.addWidget(label(words, "small", role="textTertiary"), 0, place, Qt.AlignmentFlag.AlignRight)
+        for column, heading in enumerate(table.columns, 1):
+            grid.addWidget(
+                label(heading, "small", role="textTertiary"), 0, column, Qt.AlignmentFlag.AlignRight
+            )
         grid.addWidget(Separator(theme), 1, 0, 1, len(table.columns) + 1)
         self.rows: list[_TableRow] = []
-        for number_, (key, name, figures) in enumerate(table.rows, 2):
+        for number_, (key, name, values) in enumerate(table.rows, 2):
             button = LinkButton(theme, name)
             button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
             button.setEnabled(bool(key))
             button.clicked.connect(lambda _on=False, key=key, kind=table.item_kind: chose(kind, key))
             grid.addWidget(button, number_, 0)
-            shown: list[QWidget] = []
-            for place, _words in enumerate(figures, 1):
-                shown.append(label("", "body"))
-                grid.addWidget(shown[-1], number_, place, Qt.AlignmentFlag.AlignRight)
-            self.rows.append(_TableRow(button, shown))
+            value_labels: list[QWidget] = []
+            for column, _words in enumerate(values, 1):
+                value_labels.append(label("", "body"))
+                grid.addWidget(value_labels[-1], number_, column, Qt.AlignmentFlag.AlignRight)
+            self.rows.append(_TableRow(button, value_labels))
 
     def set_table(self, table: CardTable) -> None:
-        for row, (_key, _name, figures) in zip(self.rows, table.rows, strict=True):
-            for shown, words in zip(row.value_labels, figures, strict=True):
-                if shown.text() != words:  # type: ignore[attr-defined]
-                    shown.setText(words)  # type: ignore[attr-defined]
+        for row, (_key, _name, values) in zip(self.rows, table.rows, strict=True):
+            for value_label, text in zip(row.value_labels, values, strict=True):
+                if value_label.text() != text:  # type: ignore[attr-defined]
+                    value_label.setText(text)  # type: ignore[attr-defined]
 
 
 # -- contents ---------------------------------------------------------------------------------------------
@@ -362,22 +364,22 @@ class CardSources:
     now_ns: Callable[[], int] = time.time_ns
 
 
-def topic_card(key: str, facts: CardSources) -> CardContent | None:
+def topic_card(key: str, sources: CardSources) -> CardContent | None:
     """Return the contents of the card for a topic or service, or None if the key is unknown."""
-    topic = facts.topic_of(key)
+    topic = sources.topic_of(key)
     if topic is not None:
-        return _topic_content(topic, facts)
-    service = facts.view.services.get(key) if facts.view is not None else None
-    return _service_content(service, facts) if service is not None else None
+        return _topic_content(topic, sources)
+    service = sources.view.services.get(key) if sources.view is not None else None
+    return _service_content(service, sources) if service is not None else None
 
 
-def _topic_content(topic: Topic, facts: CardSources) -> CardContent:
+def _topic_content(topic: Topic, sources: CardSources) -> CardContent:
     rate, sent = finite_or_none(topic.rate_hz), finite_or_none(topic.bandwidth_Bps)
     size = sent / rate if sent and rate else None
     rates = tuple(topic.rates)
-    least = _("recent minimum {rate}").format(rate=rate_text(min(rates))) if len(rates) > 1 else ""
-    figures = (
-        CardStat(_("Rate"), f"{rate_text(rate)} /s" if rate is not None else "", least, rates),
+    minimum = _("recent minimum {rate}").format(rate=rate_text(min(rates))) if len(rates) > 1 else ""
+    stats = (
+        CardStat(_("Rate"), f"{rate_text(rate)} /s" if rate is not None else "", minimum, rates),
         CardStat(
             _("Bandwidth"),
             bandwidth_text(sent),
@@ -389,14 +391,14 @@ def _topic_content(topic: Topic, facts: CardSources) -> CardContent:
     info = topic.info
     publishers = tuple(
         _row(
-            facts,
+            sources,
             key_of(topic.network, each.node_id),
             (rate_text(finite_or_none(each.rate_hz)), group_digits(each.last_seq)),
         )
         for each in (info.publishers if info is not None else ())[:MAX_ROWS]
     )
     subscribers = tuple(
-        _row(facts, key_of(topic.network, each.node_id), _received_texts(each.received, each.lost))
+        _row(sources, key_of(topic.network, each.node_id), _received_texts(each.received, each.lost))
         for each in (info.subscribers if info is not None else ())[:MAX_ROWS]
     )
     more = max(0, topic.publishers - MAX_ROWS) + max(0, topic.subscribers - MAX_ROWS)
@@ -407,10 +409,10 @@ def _topic_content(topic: Topic, facts: CardSources) -> CardContent:
     return CardContent(
         topic.name,
         topic.msg_type,
-        figures,
+        stats,
         (_more_text(more),) if more else (),
         tuple(table for table in tables if table.rows),
-        clock_offset_text(facts.view) if not topic.network else "",
+        clock_offset_text(sources.view) if not topic.network else "",
         topic.key,
         topic.codec != "image",
         "" if topic.network else f"alarm.topic:{topic.name}",  # alarms work on Studio's own network only
@@ -445,42 +447,40 @@ def _latency_stat(topic: Topic) -> CardStat:
     return CardStat(_("Latency"), latency_text(latency), _("of the newest message"))
 
 
-def _service_content(service: ServiceInfo, facts: CardSources) -> CardContent:
-    rate = facts.call_rates_hz.get(service.name)
-    figures = (
+def _service_content(service: ServiceInfo, sources: CardSources) -> CardContent:
+    rate = sources.call_rates_hz.get(service.name)
+    stats = (
         CardStat(_("Calls"), group_digits(service.calls), short_rate(rate) if rate is not None else ""),
         CardStat(_("Errors"), group_digits(service.errors), is_problem=service.errors > 0),
     )
     servers = tuple(
-        _row(facts, each.node_id, (group_digits(each.calls), group_digits(each.errors)))
+        _row(sources, each.node_id, (group_digits(each.calls), group_digits(each.errors)))
         for each in service.servers[:MAX_ROWS]
     )
     clients = tuple(
-        _row(facts, each.node_id, _received_texts(each.answered, each.failed))
+        _row(sources, each.node_id, _received_texts(each.answered, each.failed))
         for each in service.clients[:MAX_ROWS]
     )
     tables = (
         CardTable(_("Servers"), (_("Answered"), _("Errors")), servers),
         CardTable(_("Clients"), (_("Answered"), _("Failed")), clients),
     )
-    return CardContent(
-        service.name, _("service"), figures, (), tuple(table for table in tables if table.rows)
-    )
+    return CardContent(service.name, _("service"), stats, (), tuple(table for table in tables if table.rows))
 
 
-def _row(facts: CardSources, entry: str, figures: tuple[str, ...]) -> Row:
-    return facts.box_of(entry), facts.name_of(entry), figures
+def _row(sources: CardSources, entry: str, values: tuple[str, ...]) -> Row:
+    return sources.box_of(entry), sources.name_of(entry), values
 
 
 def node_card(
-    node: DrawnNode, services: Sequence[tuple[str, bool]], facts: CardSources
+    node: DrawnNode, services: Sequence[tuple[str, bool]], sources: CardSources
 ) -> CardContent | None:
     """Return the contents of the card for a node, or None for a collapsed group.
 
     Args:
         node: Node to describe.
         services: Services of the node, each with True if the node serves it, False if the node calls it.
-        facts: Sources of the information.
+        sources: Sources of the information.
     """
     entry = node.entry
     if entry is None:
@@ -489,14 +489,14 @@ def node_card(
     if entry.pid is not None:
         lines.append(_("pid {number}").format(number=entry.pid))
     if entry.since_ns and entry.gone_s is None:
-        since = max(0.0, (facts.now_ns() - entry.since_ns) / 1e9)
+        since = max(0.0, (sources.now_ns() - entry.since_ns) / 1e9)
         lines.append(_("connected for {age}").format(age=age_text(since - since % 10)))
     if entry.gone_s is not None:
         lines.append(_("gone"))
-    figures = (CardStat(_("Processor"), cpu_text(entry.cpu_ratio), _("of one core")),)
+    stats = (CardStat(_("Processor"), cpu_text(entry.cpu_ratio), _("of one core")),)
     tables = (
-        _topics_table(_("Publishes"), entry.network, entry.published_topics, facts),
-        _topics_table(_("Subscribes"), entry.network, entry.subscribed_topics, facts),
+        _topics_table(_("Publishes"), entry.network, entry.published_topics, sources),
+        _topics_table(_("Subscribes"), entry.network, entry.subscribed_topics, sources),
         CardTable(_("Serves"), (), tuple((name, name, ()) for name, serves in services if serves), "topic"),
         CardTable(
             _("Calls"), (), tuple((name, name, ()) for name, serves in services if not serves), "topic"
@@ -506,19 +506,19 @@ def node_card(
     return CardContent(
         node.name,
         kind,
-        figures if entry.cpu_ratio is not None else (),
+        stats if entry.cpu_ratio is not None else (),
         (", ".join(lines),) if lines else (),
         tuple(table for table in tables if table.rows),
         alarm="" if entry.network else f"alarm.node:{entry.name}",
     )
 
 
-def _topics_table(title: str, network: str, names: Sequence[str], facts: CardSources) -> CardTable:
+def _topics_table(title: str, network: str, names: Sequence[str], sources: CardSources) -> CardTable:
     rows: list[Row] = []
-    names = [name for name in names if facts.is_visible(name)]
+    names = [name for name in names if sources.is_visible(name)]
     for name in names[:MAX_ROWS]:
         key = key_of(network, name)
-        topic = facts.topic_of(key)
+        topic = sources.topic_of(key)
         rate = "" if topic is None else rate_text(finite_or_none(topic.rate_hz))
         rows.append((key if topic is not None else "", split_key(key)[1], (rate,)))
     if len(names) > MAX_ROWS:
@@ -530,7 +530,7 @@ def clock_offset_text(view: GraphView | None) -> str:
     """Format the largest uncertainty of the clock offsets between computers; "" if none was measured."""
     if view is None:
         return ""
-    known = [node.clock_uncertainty_ns for node in view.nodes.values() if node.clock_uncertainty_ns]
-    if not known:
+    uncertainties = [node.clock_uncertainty_ns for node in view.nodes.values() if node.clock_uncertainty_ns]
+    if not uncertainties:
         return ""
-    return _("Clock offset accurate to ±{time} ms").format(time=number(max(known) / 1e6, ".1f"))
+    return _("Clock offset accurate to ±{time} ms").format(time=number(max(uncertainties) / 1e6, ".1f"))

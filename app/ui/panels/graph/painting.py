@@ -22,7 +22,7 @@ def paint_scene(
     painter: QPainter,
     clip: QRectF,
     scale: float,
-    chosen: GraphSelection | None = None,
+    selection: GraphSelection | None = None,
     *,
     rings: bool = False,
 ) -> None:
@@ -33,11 +33,11 @@ def paint_scene(
         painter: Painter, which is transformed to scene coordinates.
         clip: Part to paint, in scene coordinates.
         scale: Scale of the painter, which determines the level of detail.
-        chosen: Selected item to highlight.
+        selection: Selected item to highlight.
         rings: True to paint focus rings, for use by keyboard.
     """
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    _ScenePainter(scene, painter, clip, scale, chosen, rings=rings).paint()
+    _ScenePainter(scene, painter, clip, scale, selection, rings=rings).paint()
 
 
 class _ScenePainter:
@@ -49,7 +49,7 @@ class _ScenePainter:
         painter: QPainter,
         clip: QRectF,
         scale: float,
-        chosen: GraphSelection | None,
+        selection: GraphSelection | None,
         *,
         rings: bool,
     ) -> None:
@@ -59,9 +59,13 @@ class _ScenePainter:
         self.has_small = scene.has_small_text(scale)
         self.is_tiny = not scene.has_stats(scale)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, not self.is_tiny)
-        line = scene.graph.line_of(chosen.key) if chosen is not None and chosen.kind == "topic" else None
+        line = (
+            scene.graph.line_of(selection.key)
+            if selection is not None and selection.kind == "topic"
+            else None
+        )
         self.line = line
-        self.chosen = chosen.key if chosen is not None and chosen.kind == "node" else ""
+        self.chosen = selection.key if selection is not None and selection.kind == "node" else ""
         self.ends = {*line.sources, *line.targets} if line is not None else set[str]()
 
     def paint(self) -> None:
@@ -70,9 +74,9 @@ class _ScenePainter:
         for group in self.scene.groups:
             if group.rect.intersects(clip):
                 self._paint_group(group)
-        shown = [item for item in self.scene.lines if item.bounds.intersects(clip)]
-        above = [item for item in shown if item.line is self.line]
-        for item in [*(each for each in shown if each.line is not self.line), *above]:
+        visible_lines = [item for item in self.scene.lines if item.bounds.intersects(clip)]
+        above = [item for item in visible_lines if item.line is self.line]
+        for item in [*(each for each in visible_lines if each.line is not self.line), *above]:
             painter.setOpacity(DIM_OPACITY if item.is_dim else 1.0)
             self._paint_line(item)
         if self.has_small:
@@ -93,19 +97,19 @@ class _ScenePainter:
         paint.box(painter, item.rect, theme.radius("card"), theme.colour("window"), theme.colour("border"))
         if not self.has_text:
             return
-        head = self.scene.sizes.header
+        header_height = self.scene.sizes.header
         side = theme.scaled(16)
         left = item.rect.left() + 14
-        middle = item.rect.top() + head / 2
+        middle = item.rect.top() + header_height / 2
         paint_icon(
             painter, QRectF(left, middle - side / 2, side, side), group.icon, theme.colour("textSecondary")
         )
         left += side + 8
-        area = QRectF(left, item.rect.top(), item.rect.right() - 10 - left, head)
+        area = QRectF(left, item.rect.top(), item.rect.right() - 10 - left, header_height)
         _paint_text(painter, area, item.name, self.scene.title_font, theme.colour("text"))
-        used = paint.width_of(self.scene.title_font, item.name) + 8
-        if area.width() - used > 40:
-            area.setLeft(left + used)
+        name_width = paint.width_of(self.scene.title_font, item.name) + 8
+        if area.width() - name_width > 40:
+            area.setLeft(left + name_width)
             paint.text_line(
                 painter, area, group_note(group), self.scene.small_font, theme.colour("textTertiary")
             )
@@ -135,8 +139,8 @@ class _ScenePainter:
         self.painter.setPen(pen)
         self.painter.setBrush(Qt.BrushStyle.NoBrush)
         if self.is_tiny:
-            for way in item.sharp_routes():
-                self.painter.drawPolyline(way)
+            for polyline in item.sharp_routes():
+                self.painter.drawPolyline(polyline)
             return
         self.painter.drawPath(item.path())
         self.painter.setPen(Qt.PenStyle.NoPen)
@@ -146,9 +150,9 @@ class _ScenePainter:
 
     def _paint_label(self, item: LineItem, rect: QRectF) -> None:
         theme, painter = self.theme, self.painter
-        names, _space, figure = item.stats.label.rpartition(" ")
-        if not names or not figure.endswith(("/s", "/min")):
-            names, figure = item.stats.label, ""
+        names, _space, rate = item.stats.label.rpartition(" ")
+        if not names or not rate.endswith(("/s", "/min")):
+            names, rate = item.stats.label, ""
         is_chosen = item.line is self.line
         if is_chosen:
             paint.box(
@@ -158,13 +162,13 @@ class _ScenePainter:
                 theme.colour("accentTint"),
                 theme.colour("accent"),
             )
-        ink = theme.colour("accentText" if is_chosen else "text")
-        _paint_text(painter, rect, names, self.scene.label_font, ink)
-        if figure:
-            used = (len(names) + 1) * self.scene.letter
-            area = rect.adjusted(used, 0, 20, 0)
+        colour = theme.colour("accentText" if is_chosen else "text")
+        _paint_text(painter, rect, names, self.scene.label_font, colour)
+        if rate:
+            names_width = (len(names) + 1) * self.scene.letter
+            area = rect.adjusted(names_width, 0, 20, 0)
             quiet = theme.colour("accentText" if is_chosen else "textSecondary")
-            _paint_text(painter, area, figure, self.scene.label_font, quiet)
+            _paint_text(painter, area, rate, self.scene.label_font, quiet)
 
     def _paint_losses(self, item: LineItem) -> None:
         if not self.has_small:
@@ -174,14 +178,14 @@ class _ScenePainter:
             tip = next((points[-1] for ends, points in item.routes.items() if ends[1] == box), None)
             if tip is None:
                 continue
-            words = percent_text(share)
+            text = percent_text(share)
             side = theme.scaled(12)
-            wide, high = paint.width_of(font, words) + side + 18, theme.scaled(20)
-            chip = QRectF(tip[0] - wide - 12, tip[1] + 6, wide, high)
-            paint.box(painter, chip, high / 2, theme.colour("warnTint"), theme.colour("warnBorder"))
-            square = QRectF(chip.left() + 7, chip.center().y() - side / 2, side, side)
-            paint_icon(painter, square, "triangle-alert", theme.colour("warn"))
-            _paint_text(painter, chip.adjusted(side + 11, 0, 0, 0), words, font, theme.colour("warn"))
+            width, height = paint.width_of(font, text) + side + 18, theme.scaled(20)
+            chip = QRectF(tip[0] - width - 12, tip[1] + 6, width, height)
+            paint.box(painter, chip, height / 2, theme.colour("warnTint"), theme.colour("warnBorder"))
+            icon_rect = QRectF(chip.left() + 7, chip.center().y() - side / 2, side, side)
+            paint_icon(painter, icon_rect, "triangle-alert", theme.colour("warn"))
+            _paint_text(painter, chip.adjusted(side + 11, 0, 0, 0), text, font, theme.colour("warn"))
 
     def _paint_node(self, item: NodeItem) -> None:
         theme, painter, node = self.theme, self.painter, item.node
@@ -223,9 +227,9 @@ class _ScenePainter:
     def _paint_texts(self, item: NodeItem, role: str) -> None:
         theme, painter, rect = self.theme, self.painter, item.rect
         side = theme.scaled(16)
-        square = QRectF(rect.left() + 12, rect.center().y() - side / 2, side, side)
+        icon_rect = QRectF(rect.left() + 12, rect.center().y() - side / 2, side, side)
         quiet = theme.colour("textDisabled" if item.node.is_gone else "textSecondary")
-        paint_icon(painter, square, node_icon(item.node), quiet)
+        paint_icon(painter, icon_rect, node_icon(item.node), quiet)
         left = rect.left() + 12 + side + 10
         has_line = self.has_small and bool(item.line)
         area = QRectF(left, rect.top(), rect.right() - 4 - left, rect.height())

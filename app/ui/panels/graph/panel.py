@@ -100,10 +100,8 @@ class GraphPanel(PanelWidget):
         self.count = label("", "small", role="textSecondary")
         self.export = Button(theme, _("Export"), "download", size="small")
         self._menu = Menu(theme, self.export)
-        for words, kind in ((_("Image (SVG)"), SVG_KIND), (_("Graph (DOT)"), DOT_KIND)):
-            self._menu.addAction(words).triggered.connect(
-                lambda _on=False, kind=kind: self._prompt_file(kind)
-            )
+        for text, kind in ((_("Image (SVG)"), SVG_KIND), (_("Graph (DOT)"), DOT_KIND)):
+            self._menu.addAction(text).triggered.connect(lambda _on=False, kind=kind: self._prompt_file(kind))
         self.export.clicked.connect(
             lambda: self._menu.popup(self.export.mapToGlobal(self.export.rect().bottomLeft()))
         )
@@ -164,8 +162,8 @@ class GraphPanel(PanelWidget):
         self.card.select_requested.connect(self._select_item)
 
     def _make_page(self) -> QWidget:
-        left = QWidget()
-        column = QVBoxLayout(left)
+        main_area = QWidget()
+        column = QVBoxLayout(main_area)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         for widget, stretch in ((self.tools, 0), (self.canvas, 1), (self.note, 0), (self.legend, 0)):
@@ -174,7 +172,7 @@ class GraphPanel(PanelWidget):
         self._beside = QBoxLayout(QBoxLayout.Direction.LeftToRight, page)
         self._beside.setContentsMargins(0, 0, 0, 0)
         self._beside.setSpacing(0)
-        self._beside.addWidget(left, 1)
+        self._beside.addWidget(main_area, 1)
         self._line = Separator(self.theme, upright=True)
         self._line.hide()
         self._beside.addWidget(self._line)
@@ -190,9 +188,9 @@ class GraphPanel(PanelWidget):
         self._ticks += 1
         if self._ticks % QUIET_UPDATE_TICKS == 1:
             self._update_quiet_nodes()
-        facts = self._snapshot()
-        if facts != self._seen:
-            self._seen = facts
+        snapshot = self._snapshot()
+        if snapshot != self._seen:
+            self._seen = snapshot
             self._rebuild()
         self._apply_layout()
         values = (self.session.topics.values_revision, self.session.networks.values_revision)
@@ -222,22 +220,22 @@ class GraphPanel(PanelWidget):
         )
 
     def _update_quiet_nodes(self) -> None:
-        facts, now = self._graph_facts(), time.monotonic()
-        self._quiet.update(facts, now)
-        self._calls.update(facts, now)
+        graph_state, now = self._graph_facts(), time.monotonic()
+        self._quiet.update(graph_state, now)
+        self._calls.update(graph_state, now)
         self._hertz = self._calls.rates_hz()
         self._update_choices(quiet_nodes=self._quiet.quiet_keys(now))
 
     def _rebuild(self) -> None:
-        facts = self._graph_facts()
+        graph_state = self._graph_facts()
         choices = self._choices
-        if len(facts.nodes) > MAX_EXPANDED_NODES and not (choices.starts_collapsed or choices.toggled):
+        if len(graph_state.nodes) > MAX_EXPANDED_NODES and not (choices.starts_collapsed or choices.toggled):
             self._layout = None
             self._update_choices(starts_collapsed=True)
-        graph = node_graph(facts, self._choices)
-        self.pages.setCurrentIndex(0 if facts.nodes else 1)
-        self.export.setVisible(bool(facts.nodes))
-        if not facts.nodes:
+        graph = node_graph(graph_state, self._choices)
+        self.pages.setCurrentIndex(0 if graph_state.nodes else 1)
+        self.export.setVisible(bool(graph_state.nodes))
+        if not graph_state.nodes:
             self._update_choices(starts_collapsed=False)
             self._update_empty_state()
         self._update_counts(graph)
@@ -248,9 +246,9 @@ class GraphPanel(PanelWidget):
     def _apply_layout(self) -> None:
         # A large scene is shown one tick after it was built, to keep ticks short.
         scene, self._coming = self._coming, None
-        made = self._thread.pop_result()
-        if made is not None:
-            graph, self._layout = made
+        result = self._thread.pop_result()
+        if result is not None:
+            graph, self._layout = result
             scene = GraphScene(self.theme, graph, self._layout, self._sizes_asked, self._host)
             if len(scene.lines) > MAX_LINES_PER_TICK:
                 self._coming = scene
@@ -284,8 +282,8 @@ class GraphPanel(PanelWidget):
             start = self.session.launcher.ensure_master
             self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", is_primary=True)])
             return
-        said = _("Programs appear here as soon as they join the master.")
-        self.empty.set_texts(_("No nodes yet"), said, "workflow")
+        hint = _("Programs appear here as soon as they join the master.")
+        self.empty.set_texts(_("No nodes yet"), hint, "workflow")
         doctor = EmptyAction(
             _("Open the connection doctor"),
             lambda: self.context.open_doctor(self, ""),
@@ -300,18 +298,18 @@ class GraphPanel(PanelWidget):
             self.tools.show_quiet_count(graph.hidden_quiet_count, self._choices.hides_quiet)
 
     def _update_note(self, layout: GraphLayout) -> None:
-        words = []
+        notes = []
         if layout.omitted_routes:
-            left = ngettext(
+            template = ngettext(
                 "{count} line is hidden: too many to draw",
                 "{count} lines are hidden: too many to draw",
                 layout.omitted_routes,
             )
-            words.append(left.format(count=group_digits(layout.omitted_routes)))
+            notes.append(template.format(count=group_digits(layout.omitted_routes)))
         if layout.is_fallback:
-            words.append(_("The nodes are shown in rows: no better layout was found"))
-        self.note.setText(". ".join(words))
-        self.note.setVisible(bool(words))
+            notes.append(_("The nodes are shown in rows: no better layout was found"))
+        self.note.setText(". ".join(notes))
+        self.note.setVisible(bool(notes))
 
     # -- user actions -------------------------------------------------------------------------------------
 
@@ -363,11 +361,11 @@ class GraphPanel(PanelWidget):
         if self.session.topic(key) is not None:
             show_messages(self.context, key)
 
-    def _show_menu(self, choice: GraphSelection, at: QPoint) -> None:
+    def _show_menu(self, choice: GraphSelection, position: QPoint) -> None:
         menu = self.menu_of(choice)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         if menu.actions():
-            menu.popup(at)
+            menu.popup(position)
         else:
             menu.deleteLater()
 
@@ -444,12 +442,12 @@ class GraphPanel(PanelWidget):
 
     def _services_of(self, entry: str) -> list[tuple[str, bool]]:
         view = self.session.graph
-        found: list[tuple[str, bool]] = []
+        services: list[tuple[str, bool]] = []
         for name, service in view.services.items() if view is not None else ():
             if is_drawn(name, self._choices):
-                found += [(name, True)] if any(each.node_id == entry for each in service.servers) else []
-                found += [(name, False)] if any(each.node_id == entry for each in service.clients) else []
-        return found
+                services += [(name, True)] if any(each.node_id == entry for each in service.servers) else []
+                services += [(name, False)] if any(each.node_id == entry for each in service.clients) else []
+        return services
 
     def _description_of(self, choice: GraphSelection | None) -> str:
         scene = self.canvas.scene
@@ -462,8 +460,8 @@ class GraphPanel(PanelWidget):
             return ""
         outgoing = [line for line in scene.graph.lines if node.key in line.sources]
         incoming = [line for line in scene.graph.lines if node.key in line.targets]
-        said = _("{node}, {facts}. Outgoing lines: {out}. Incoming lines: {into}.")
-        return said.format(
+        template = _("{node}, {facts}. Outgoing lines: {out}. Incoming lines: {into}.")
+        return template.format(
             node=node_name(node, self._host), facts=node_detail(node), out=len(outgoing), into=len(incoming)
         )
 
@@ -471,15 +469,17 @@ class GraphPanel(PanelWidget):
         topic = self.session.topic(key)
         scene = self.canvas.scene
         line = scene.graph.line_of(key) if scene is not None else None
-        ends = ""
+        route_text = ""
         if line is not None:
-            said = _("from {sources} to {targets}")
-            ends = said.format(sources=self._names_text(line.sources), targets=self._names_text(line.targets))
-        figures = [split_key(key)[1]]
+            template = _("from {sources} to {targets}")
+            route_text = template.format(
+                sources=self._names_text(line.sources), targets=self._names_text(line.targets)
+            )
+        parts = [split_key(key)[1]]
         rate = finite_or_none(topic.rate_hz) if topic is not None else None
         if topic is not None and rate is not None:
-            figures += [short_rate(rate), bandwidth_text(finite_or_none(topic.bandwidth_Bps))]
-        return ", ".join(filter(None, (*figures, ends)))
+            parts += [short_rate(rate), bandwidth_text(finite_or_none(topic.bandwidth_Bps))]
+        return ", ".join(filter(None, (*parts, route_text)))
 
     def _names_text(self, keys: tuple[str, ...]) -> str:
         scene = self.canvas.scene
@@ -507,8 +507,8 @@ class GraphPanel(PanelWidget):
         try:
             write_atomically(path, data)
         except OSError as error:
-            said = _("Can't save the graph: {why}")
-            self.context.show_toast(said.format(why=error.strerror or str(error)))
+            template = _("Can't save the graph: {why}")
+            self.context.show_toast(template.format(why=error.strerror or str(error)))
         else:
             self.context.show_toast(_("Saved {name}").format(name=path.name))
 
@@ -559,11 +559,11 @@ class GraphPanel(PanelWidget):
 
     def _fit_card(self) -> None:
         is_wide = self.width() >= self.theme.scaled(MIN_SIDE_CARD_WIDTH)
-        ways = QBoxLayout.Direction
-        self._beside.setDirection(ways.LeftToRight if is_wide else ways.TopToBottom)
-        wide = round(self.theme.scaled(WIDTH))
-        self.card.setMinimumWidth(wide if is_wide else 0)
-        self.card.setMaximumWidth(wide if is_wide else 16_777_215)
+        direction = QBoxLayout.Direction
+        self._beside.setDirection(direction.LeftToRight if is_wide else direction.TopToBottom)
+        width = round(self.theme.scaled(WIDTH))
+        self.card.setMinimumWidth(width if is_wide else 0)
+        self.card.setMaximumWidth(width if is_wide else 16_777_215)
         self.card.setMaximumHeight(16_777_215 if is_wide else max(120, self.height() // 2))
         self._line.setFixedSize(*((1, 16_777_215) if is_wide else (16_777_215, 1)))
         self.legend.setVisible(is_wide and self.height() >= self.theme.scaled(420))
@@ -591,8 +591,8 @@ class GraphPanel(PanelWidget):
             self._update_choices(shows_services=services)
         if isinstance(hides := state.get("hides_quiet"), bool):
             self._update_choices(hides_quiet=hides)
-        if isinstance(own := state.get("own"), bool):
-            self._own.setChecked(own)
+        if isinstance(shows_own := state.get("own"), bool):
+            self._own.setChecked(shows_own)
 
     def dispose(self) -> None:
         self._thread.close()

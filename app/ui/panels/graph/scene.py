@@ -113,7 +113,7 @@ class LineItem:
         """Return the routes with sharp corners, which are faster to paint at small scales."""
         if self._sharp_routes is None:
             self._sharp_routes = [
-                QPolygonF([QPointF(*at) for at in points]) for points in self.routes.values()
+                QPolygonF([QPointF(*point) for point in points]) for points in self.routes.values()
             ]
         return self._sharp_routes
 
@@ -152,30 +152,32 @@ class GraphScene:
         self.theme = theme
         self.graph, self.layout, self.sizes, self._host = graph, layout, sizes, host
         self._update_fonts()
-        wide, high = sizes.node
+        node_width, node_height = sizes.node
         self.nodes = {
             node.key: NodeItem(
                 node,
-                QRectF(x - wide / 2, y - high / 2, wide, high),
+                QRectF(x - node_width / 2, y - node_height / 2, node_width, node_height),
                 self._elide(self.name_font, node_name(node, host), self._text_width(node)),
             )
             for node in graph.nodes
-            if (place := layout.positions.get(node.key)) is not None
-            for x, y in (place,)
+            if (position := layout.positions.get(node.key)) is not None
+            for x, y in (position,)
         }
         self.groups = [self._group_item(group) for group in graph.groups if group.key in layout.groups]
-        ways: dict[object, dict[tuple[str, str], Sequence[Position]]] = {}
+        routes_by_key: dict[object, dict[tuple[str, str], Sequence[Position]]] = {}
         for (key, source, target), points in layout.routes.items():
-            ways.setdefault(key, {})[source, target] = points
-        self.lines = [_line_item(line, ways[line.key]) for line in graph.lines if line.key in ways]
+            routes_by_key.setdefault(key, {})[source, target] = points
+        self.lines = [
+            _line_item(line, routes_by_key[line.key]) for line in graph.lines if line.key in routes_by_key
+        ]
         left, top, width, height = layout.bounds(sizes)
         self.bounds = QRectF(left, top, width, height)
-        heads = (
+        header_rects = (
             QRectF(item.rect.topLeft(), QSizeF(item.rect.width(), sizes.header - 8)) for item in self.groups
         )
         led = self.lines if len(layout.routes) <= MAX_AVOIDING_ROUTES else []
         self._crossed = _OccupiedAreas(_segment_rect(*part) for item in led for part in _segments(item))
-        self._taken = _OccupiedAreas([*(item.rect for item in self.nodes.values()), *heads])
+        self._taken = _OccupiedAreas([*(item.rect for item in self.nodes.values()), *header_rects])
 
     def _update_fonts(self) -> None:
         theme = self.theme
@@ -196,10 +198,10 @@ class GraphScene:
         rect = QRectF(*self.layout.groups[group.key])
         chip = None
         if group.quiet_count:
-            words = paint.width_of(self.small_font, quiet_text(group)) + 24
-            high = self.sizes.footer * 0.7
-            width = min(words, rect.width() - 16)
-            chip = QRectF(rect.right() - 10 - width, rect.bottom() - 8 - high, width, high)
+            text_width = paint.width_of(self.small_font, quiet_text(group)) + 24
+            chip_height = self.sizes.footer * 0.7
+            width = min(text_width, rect.width() - 16)
+            chip = QRectF(rect.right() - 10 - width, rect.bottom() - 8 - chip_height, width, chip_height)
         room = rect.width() - 48
         return GroupItem(
             group, rect, self._elide(self.title_font, group_name(group.key, self._host), room), chip
@@ -213,26 +215,26 @@ class GraphScene:
         return [*nodes, *(item for item in self.lines if item.bounds.intersects(area))]
 
     def update_stats(
-        self, item: NodeItem | LineItem, figures: StatsGetter, *, with_words: bool
+        self, item: NodeItem | LineItem, stats_of: StatsGetter, *, with_words: bool
     ) -> QRectF | None:
         """Update the rates and counts of one item.
 
         Args:
             item: Item to update.
-            figures: Returns label, width and losses of a line.
+            stats_of: Returns label, width and losses of a line.
             with_words: True if small text is legible. The first such call places the label of a line.
 
         Returns:
             The area to repaint, or None if nothing changed.
         """
         if isinstance(item, NodeItem):
-            said = node_detail(item.node) if with_words else item.detail
-            if said == item.detail:
+            detail = node_detail(item.node) if with_words else item.detail
+            if detail == item.detail:
                 return None
-            item.detail = said
-            item.line = self._elide(self.small_font, said, self._text_width(item.node))
+            item.detail = detail
+            item.line = self._elide(self.small_font, detail, self._text_width(item.node))
             return item.rect
-        now, before = figures(item.line), item.stats
+        now, before = stats_of(item.line), item.stats
         item.stats = now
         if now.width != before.width or now.losses != before.losses:
             area: QRectF | None = item.bounds
@@ -244,46 +246,50 @@ class GraphScene:
             area = area or item.label
         return area
 
-    def complete(self, figures: StatsGetter) -> None:
+    def complete(self, stats_of: StatsGetter) -> None:
         """Update the rates and counts of all items at once, for the export of an image."""
-        every: list[NodeItem | LineItem] = [*self.nodes.values(), *self.lines]
-        for item in every:
-            self.update_stats(item, figures, with_words=True)
+        items: list[NodeItem | LineItem] = [*self.nodes.values(), *self.lines]
+        for item in items:
+            self.update_stats(item, stats_of, with_words=True)
 
     def _label_rect_for(self, item: LineItem) -> QRectF | None:
         # Tries the longest horizontal segment first, and prefers places that no other line crosses.
         letters = len(line_name(item.line.topics)) + LABEL_RATE_CHARS
-        wide, high = letters * self.letter + 4, QFontMetricsF(self.label_font).height()
-        rooms = [rect for rect in _label_candidates(item, wide, high) if self._taken.is_free(rect)]
-        found = next((rect for rect in rooms if self._crossed.is_free(rect)), rooms[0] if rooms else None)
-        if found is not None:
-            self._taken.add(found)
-        return found
+        width, height = letters * self.letter + 4, QFontMetricsF(self.label_font).height()
+        rooms = [rect for rect in _label_candidates(item, width, height) if self._taken.is_free(rect)]
+        label_rect = next(
+            (rect for rect in rooms if self._crossed.is_free(rect)), rooms[0] if rooms else None
+        )
+        if label_rect is not None:
+            self._taken.add(label_rect)
+        return label_rect
 
-    def dim_unmatched(self, words: Sequence[str]) -> None:
+    def dim_unmatched(self, keywords: Sequence[str]) -> None:
         """Fade the items that don't match a filter.
 
         An item matches if its texts contain all of the words. Lines at matching nodes, and nodes at
         matching lines, are not faded either.
 
         Args:
-            words: Words in lower case; empty for no filter.
+            keywords: Words in lower case; empty for no filter.
         """
         bright = {
-            key for key, item in self.nodes.items() if all(word in _haystack(item.node) for word in words)
+            key
+            for key, item in self.nodes.items()
+            if all(keyword in _haystack(item.node) for keyword in keywords)
         }
-        named = [
+        matching_lines = [
             item
             for item in self.lines
-            if all(word in " ".join(item.line.topics).casefold() for word in words)
+            if all(keyword in " ".join(item.line.topics).casefold() for keyword in keywords)
         ]
-        ends = {key for item in named for key in (*item.line.sources, *item.line.targets)}
-        found = {id(item) for item in named}
+        connected_nodes = {key for item in matching_lines for key in (*item.line.sources, *item.line.targets)}
+        matching_ids = {id(item) for item in matching_lines}
         for item in self.lines:
-            at = {*item.line.sources, *item.line.targets}
-            item.is_dim = bool(words) and id(item) not in found and not (at & bright)
+            line_ends = {*item.line.sources, *item.line.targets}
+            item.is_dim = bool(keywords) and id(item) not in matching_ids and not (line_ends & bright)
         for key, box in self.nodes.items():
-            box.is_dim = bool(words) and key not in bright and key not in ends
+            box.is_dim = bool(keywords) and key not in bright and key not in connected_nodes
 
     @property
     def dimmed_count(self) -> int:
@@ -301,107 +307,111 @@ class GraphScene:
 
     # -- hit testing --------------------------------------------------------------------------------------
 
-    def node_at(self, at: QPointF) -> DrawnNode | None:
+    def node_at(self, point: QPointF) -> DrawnNode | None:
         """Return the node at a point in scene coordinates, or None."""
-        return next((item.node for item in self.nodes.values() if item.rect.contains(at)), None)
+        return next((item.node for item in self.nodes.values() if item.rect.contains(point)), None)
 
-    def group_at(self, at: QPointF) -> tuple[GraphGroup, bool] | None:
+    def group_at(self, point: QPointF) -> tuple[GraphGroup, bool] | None:
         """Return the group whose title or number of quiet nodes is at a point.
 
         Args:
-            at: Point in scene coordinates.
+            point: Point in scene coordinates.
 
         Returns:
             The group, with True for its title and False for its number of quiet nodes; None if there is
             neither.
         """
         for item in self.groups:
-            if item.quiet_rect is not None and item.quiet_rect.contains(at):
+            if item.quiet_rect is not None and item.quiet_rect.contains(point):
                 return item.group, False
-            head = QRectF(item.rect.left(), item.rect.top(), item.rect.width(), self.sizes.header - 4)
-            if head.contains(at):
+            header_rect = QRectF(item.rect.left(), item.rect.top(), item.rect.width(), self.sizes.header - 4)
+            if header_rect.contains(point):
                 return item.group, True
         return None
 
-    def line_at(self, at: QPointF, scale: float) -> LineItem | None:
+    def line_at(self, point: QPointF, scale: float) -> LineItem | None:
         """Return the line at a point, or None.
 
         Args:
-            at: Point in scene coordinates.
+            point: Point in scene coordinates.
             scale: Scale of the view.
 
         Returns:
             The line whose label contains the point, else the nearest line within `HIT_TOLERANCE_PX`.
         """
-        labelled = (item for item in self.lines if item.label is not None and item.label.contains(at))
-        found = next(labelled, None)
-        if found is not None:
-            return found
-        reach = HIT_TOLERANCE_PX / scale
-        near = [
-            (_distance(at, points), number)
+        labelled = (item for item in self.lines if item.label is not None and item.label.contains(point))
+        labelled_line = next(labelled, None)
+        if labelled_line is not None:
+            return labelled_line
+        tolerance = HIT_TOLERANCE_PX / scale
+        candidates = [
+            (_distance(point, points), number)
             for number, item in enumerate(self.lines)
-            if item.bounds.adjusted(-reach, -reach, reach, reach).contains(at)
+            if item.bounds.adjusted(-tolerance, -tolerance, tolerance, tolerance).contains(point)
             for points in item.routes.values()
         ]
-        distance, number = min(near, default=(math.inf, 0))
-        return self.lines[number] if distance <= reach else None
+        distance, number = min(candidates, default=(math.inf, 0))
+        return self.lines[number] if distance <= tolerance else None
 
 
-def _line_item(line: GraphLine, ways: dict[tuple[str, str], Sequence[Position]]) -> LineItem:
-    xs = [x for points in ways.values() for x, _y in points]
-    ys = [y for points in ways.values() for _x, y in points]
+def _line_item(line: GraphLine, routes: dict[tuple[str, str], Sequence[Position]]) -> LineItem:
+    xs = [x for points in routes.values() for x, _y in points]
+    ys = [y for points in routes.values() for _x, y in points]
     left, top = min(xs) - LINE_MARGIN, min(ys) - LINE_MARGIN
-    return LineItem(line, ways, QRectF(left, top, max(xs) + LINE_MARGIN - left, max(ys) + LINE_MARGIN - top))
+    return LineItem(
+        line, routes, QRectF(left, top, max(xs) + LINE_MARGIN - left, max(ys) + LINE_MARGIN - top)
+    )
 
 
 def _add_rounded(path: QPainterPath, points: Sequence[Position]) -> None:
     path.moveTo(*points[0])
-    for before, at, after in zip(points, points[1:], points[2:], strict=False):
-        radius = min(CORNER_RADIUS, math.dist(before, at) / 2, math.dist(at, after) / 2)
-        into, out = _point_towards(at, before, radius), _point_towards(at, after, radius)
-        path.lineTo(*into)
-        path.quadTo(*at, *out)
+    for before, corner, after in zip(points, points[1:], points[2:], strict=False):
+        radius = min(CORNER_RADIUS, math.dist(before, corner) / 2, math.dist(corner, after) / 2)
+        curve_start, out = _point_towards(corner, before, radius), _point_towards(corner, after, radius)
+        path.lineTo(*curve_start)
+        path.quadTo(*corner, *out)
     path.lineTo(*points[-1])
 
 
-def _point_towards(at: Position, other: Position, length: float) -> Position:
-    whole = math.dist(at, other) or 1.0
-    return at[0] + (other[0] - at[0]) * length / whole, at[1] + (other[1] - at[1]) * length / whole
+def _point_towards(start: Position, other: Position, length: float) -> Position:
+    distance = math.dist(start, other) or 1.0
+    return start[0] + (other[0] - start[0]) * length / distance, start[1] + (
+        other[1] - start[1]
+    ) * length / distance
 
 
 def _arrow(points: Sequence[Position]) -> QPolygonF:
     tip = points[-1]
     before = next((each for each in reversed(points[:-1]) if each != tip), (tip[0] - 1, tip[1]))
     base = _point_towards(tip, before, ARROW_LENGTH)
-    across = (
+    offset = (
         (tip[1] - base[1]) * ARROW_WIDTH / ARROW_LENGTH / 2,
         (base[0] - tip[0]) * ARROW_WIDTH / ARROW_LENGTH / 2,
     )
     return QPolygonF(
         [
             QPointF(*tip),
-            QPointF(base[0] + across[0], base[1] + across[1]),
-            QPointF(base[0] - across[0], base[1] - across[1]),
+            QPointF(base[0] + offset[0], base[1] + offset[1]),
+            QPointF(base[0] - offset[0], base[1] - offset[1]),
         ]
     )
 
 
-def _label_candidates(item: LineItem, wide: float, high: float) -> Iterator[QRectF]:
+def _label_candidates(item: LineItem, width: float, height: float) -> Iterator[QRectF]:
     # Best candidates first: horizontal segments, then vertical ones.
     parts = _segments(item)
     level = [each for each in parts if abs(each[1][1] - each[0][1]) < 1]
     for begin, end in sorted(level, key=_segment_length, reverse=True)[:6]:
-        left, room = min(begin[0], end[0]), abs(end[0] - begin[0]) - wide
+        left, room = min(begin[0], end[0]), abs(end[0] - begin[0]) - width
         for share in (0.5, 0.25, 0.75) if room >= 0 else ():
-            yield QRectF(left + room * share, begin[1] - high - 2, wide, high)
-            yield QRectF(left + room * share, begin[1] + 3, wide, high)
+            yield QRectF(left + room * share, begin[1] - height - 2, width, height)
+            yield QRectF(left + room * share, begin[1] + 3, width, height)
     upright = [each for each in parts if abs(each[1][0] - each[0][0]) < 1]
     for begin, end in sorted(upright, key=_segment_length, reverse=True)[:4]:
-        top, room = min(begin[1], end[1]), abs(end[1] - begin[1]) - high
+        top, room = min(begin[1], end[1]), abs(end[1] - begin[1]) - height
         for share in (0.5, 0.2, 0.8) if room >= 0 else ():
-            yield QRectF(begin[0] + 5, top + room * share, wide, high)
-            yield QRectF(begin[0] - 5 - wide, top + room * share, wide, high)
+            yield QRectF(begin[0] + 5, top + room * share, width, height)
+            yield QRectF(begin[0] - 5 - width, top + room * share, width, height)
 
 
 def _segments(item: LineItem) -> list[tuple[Position, Position]]:
@@ -417,18 +427,20 @@ def _segment_length(part: tuple[Position, Position]) -> float:
     return math.dist(*part)
 
 
-def _distance(at: QPointF, points: Sequence[Position]) -> float:
+def _distance(point: QPointF, points: Sequence[Position]) -> float:
     return min(
-        _distance_to_segment((at.x(), at.y()), begin, end) for begin, end in itertools.pairwise(points)
+        _distance_to_segment((point.x(), point.y()), begin, end) for begin, end in itertools.pairwise(points)
     )
 
 
-def _distance_to_segment(at: Position, begin: Position, end: Position) -> float:
-    wide, high = end[0] - begin[0], end[1] - begin[1]
-    square = wide * wide + high * high
-    share = ((at[0] - begin[0]) * wide + (at[1] - begin[1]) * high) / square if square else 0.0
+def _distance_to_segment(point: Position, begin: Position, end: Position) -> float:
+    dx, dy = end[0] - begin[0], end[1] - begin[1]
+    length_squared = dx * dx + dy * dy
+    share = (
+        ((point[0] - begin[0]) * dx + (point[1] - begin[1]) * dy) / length_squared if length_squared else 0.0
+    )
     share = min(1.0, max(0.0, share))
-    return math.dist(at, (begin[0] + wide * share, begin[1] + high * share))
+    return math.dist(point, (begin[0] + dx * share, begin[1] + dy * share))
 
 
 def _haystack(node: DrawnNode) -> str:
@@ -456,7 +468,7 @@ class _OccupiedAreas:
 
 
 def _cells(rect: QRectF) -> Iterator[tuple[int, int]]:
-    wide, high = CELL_SIZE
-    for column in range(math.floor(rect.left() / wide), math.floor(rect.right() / wide) + 1):
-        for row in range(math.floor(rect.top() / high), math.floor(rect.bottom() / high) + 1):
+    cell_width, cell_height = CELL_SIZE
+    for column in range(math.floor(rect.left() / cell_width), math.floor(rect.right() / cell_width) + 1):
+        for row in range(math.floor(rect.top() / cell_height), math.floor(rect.bottom() / cell_height) + 1):
             yield column, row

@@ -67,8 +67,8 @@ class GraphTools(QWidget):
             hides: True if quiet nodes are hidden.
         """
         if hides and hidden:
-            words = ngettext("{count} quiet node hidden", "{count} quiet nodes hidden", hidden)
-            self.quiet.set_label(words.format(count=hidden))
+            template = ngettext("{count} quiet node hidden", "{count} quiet nodes hidden", hidden)
+            self.quiet.set_label(template.format(count=hidden))
         else:
             self.quiet.set_label(_("Hide quiet nodes"))
 
@@ -84,13 +84,13 @@ class GraphLegend(QWidget):
         super().__init__()
         flow = Flow(self, gap=18, row_gap=2)
         flow.setContentsMargins(12, 4, 12, 8)
-        for kind, words in (
+        for kind, text in (
             ("topic", _("topic; thicker line: more data")),
             ("service", _("service")),
             ("chosen", _("selected topic")),
             ("gone", _("gone or quiet")),
         ):
-            flow.addWidget(_LegendEntry(theme, kind, words))
+            flow.addWidget(_LegendEntry(theme, kind, text))
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
@@ -101,17 +101,17 @@ class _LegendEntry(QWidget):
 
     SAMPLE_WIDTH = 36.0
 
-    def __init__(self, theme: Theme, kind: str, words: str) -> None:
+    def __init__(self, theme: Theme, kind: str, text: str) -> None:
         super().__init__()
-        self._theme, self._kind, self._words = theme, kind, words
-        self.setAccessibleName(words)
+        self._theme, self._kind, self._words = theme, kind, text
+        self.setAccessibleName(text)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self.updateGeometry)
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("small")
-        wide = self.SAMPLE_WIDTH + 8 + paint.width_of(font, self._words)
-        return QSize(round(wide) + 1, round(max(18.0, paint.height_of(font))))
+        width = self.SAMPLE_WIDTH + 8 + paint.width_of(font, self._words)
+        return QSize(round(width) + 1, round(max(18.0, paint.height_of(font))))
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()

@@ -93,9 +93,9 @@ def _network_text(node: DrawnNode) -> str:
 
 
 def _members_text(members: int, quiet: int) -> str:
-    words = ngettext("{count} node", "{count} nodes", members).format(count=group_digits(members))
+    text = ngettext("{count} node", "{count} nodes", members).format(count=group_digits(members))
     if quiet < members:
-        return words
+        return text
     return ngettext("{count} quiet node", "{count} quiet nodes", quiet).format(count=group_digits(quiet))
 
 
@@ -111,14 +111,14 @@ def counts_text(graph: NodeGraph) -> str:
 
     Return "" if there are no nodes.
     """
-    there = graph.node_count
-    if not there:
+    node_count = graph.node_count
+    if not node_count:
         return ""
-    shown = there - graph.hidden_quiet_count
-    nodes = ngettext("{shown} of {count} node", "{shown} of {count} nodes", there)
-    if shown == there:
-        nodes = ngettext("{count} node", "{count} nodes", there)
-    parts = [nodes.format(shown=group_digits(shown), count=group_digits(there))]
+    shown_count = node_count - graph.hidden_quiet_count
+    nodes = ngettext("{shown} of {count} node", "{shown} of {count} nodes", node_count)
+    if shown_count == node_count:
+        nodes = ngettext("{count} node", "{count} nodes", node_count)
+    parts = [nodes.format(shown=group_digits(shown_count), count=group_digits(node_count))]
     if graph.page_count:
         pages = ngettext("{count} of them a web page", "{count} of them web pages", graph.page_count)
         parts.append(pages.format(count=group_digits(graph.page_count)))
@@ -139,8 +139,8 @@ def group_name(key: str, host: str) -> str:
     """Return the displayed name of a group; `host` is the name of this computer."""
     kind, _colon, name = key.partition(":")
     if kind == "network":
-        known = find_kind(name)
-        return known.product_name if known is not None else name
+        network_kind = find_kind(name)
+        return network_kind.product_name if network_kind is not None else name
     if kind == "web":
         return _("Web pages")
     if kind == "robot":
@@ -161,8 +161,8 @@ def line_stats(
     """
     names = line_name(line.topics)
     if line.kind == "service":
-        known = [hertz[name] for name in line.topics if name in hertz]
-        return LineStats(f"{names} {short_rate(sum(known))}" if known else names, MIN_WIDTH)
+        rates_hz = [hertz[name] for name in line.topics if name in hertz]
+        return LineStats(f"{names} {short_rate(sum(rates_hz))}" if rates_hz else names, MIN_WIDTH)
     topics = [topic for name in line.topics if (topic := topic_of(name)) is not None]
     rates = [hz for topic in topics if (hz := finite_or_none(topic.rate_hz)) is not None]
     rate = short_rate(sum(rates)) if rates else ""
@@ -172,14 +172,14 @@ def line_stats(
 
 def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tuple[str, float], ...]:
     # The worst loss ratio of the line's topics, for each subscriber.
-    found: dict[str, float] = {}
+    loss_by_box: dict[str, float] = {}
     for topic in topics:
-        for each in topic.info.subscribers if topic.info is not None else ():
-            box = box_of(key_of(topic.network, each.node_id)) if each.lost else ""
-            if box and each.lost:
-                share = each.lost / (each.lost + max(0, each.received or 0))
-                found[box] = max(found.get(box, 0.0), share)
-    return tuple(sorted(found.items()))
+        for subscriber in topic.info.subscribers if topic.info is not None else ():
+            box = box_of(key_of(topic.network, subscriber.node_id)) if subscriber.lost else ""
+            if box and subscriber.lost:
+                share = subscriber.lost / (subscriber.lost + max(0, subscriber.received or 0))
+                loss_by_box[box] = max(loss_by_box.get(box, 0.0), share)
+    return tuple(sorted(loss_by_box.items()))
 
 
 def finite_or_none(value: float | None) -> float | None:
@@ -192,9 +192,9 @@ def line_name(topics: Sequence[str]) -> str:
 
     At most `MAX_NAMED_TOPICS` topics are named, for example "/scan /odom and 3 more".
     """
-    named = " ".join(split_key(topic)[1] for topic in topics[:MAX_NAMED_TOPICS])
+    names = " ".join(split_key(topic)[1] for topic in topics[:MAX_NAMED_TOPICS])
     more = len(topics) - MAX_NAMED_TOPICS
-    return _("{names} and {count} more").format(names=named, count=more) if more > 0 else named
+    return _("{names} and {count} more").format(names=names, count=more) if more > 0 else names
 
 
 def short_rate(rate_hz: float) -> str:

@@ -64,22 +64,24 @@ class PictureActions(QObject):
 
     Args:
         view: Image view that the actions change.
-        own: Functions of the actions that `view` does not implement, by name.
+        own_callbacks: Functions of the actions that `view` does not implement, by name.
     """
 
-    def __init__(self, theme: Theme, view: ZoomablePicture, own: Mapping[str, Callable[[], object]]) -> None:
+    def __init__(
+        self, theme: Theme, view: ZoomablePicture, own_callbacks: Mapping[str, Callable[[], object]]
+    ) -> None:
         super().__init__(view)
         self._view = view
-        does: dict[str, Callable[[], object]] = {
+        callbacks: dict[str, Callable[[], object]] = {
             "larger": lambda: view.zoom_by(STEP),
             "smaller": lambda: view.zoom_by(1 / STEP),
             "fit": view.fit_to_view,
             "exact": view.show_actual_size,
             "right": lambda: self._rotate(90),
             "left": lambda: self._rotate(-90),
-            "across": lambda: self._flip(across=True),
-            "down": lambda: self._flip(across=False),
-            **own,
+            "across": lambda: self._flip(is_horizontal=True),
+            "down": lambda: self._flip(is_horizontal=False),
+            **own_callbacks,
         }
         self._by_name: dict[str, QAction] = {}
         self._by_key: dict[str, QAction] = {}
@@ -89,7 +91,7 @@ class PictureActions(QObject):
             if row.icon is not None:
                 action.setIcon(theme.icon(row.icon))
             action.setCheckable(row.is_checkable)
-            action.triggered.connect(lambda _on=False, do=does[row.name]: do())
+            action.triggered.connect(lambda _on=False, do=callbacks[row.name]: do())
             self._by_name[row.name] = action
             if row.has_separator:
                 line = QAction(self)
@@ -108,14 +110,14 @@ class PictureActions(QObject):
         """Return all actions with separators, for a menu."""
         return list(self._listed)
 
-    def set_enabled(self, there: bool) -> None:
+    def set_enabled(self, has_image: bool) -> None:
         """Enable or disable all actions.
 
         Args:
-            there: True if an image is shown.
+            has_image: True if an image is shown.
         """
         for action in self._by_name.values():
-            action.setEnabled(there)
+            action.setEnabled(has_image)
 
     def update_checks(self) -> None:
         """Update the check marks of the flip actions."""
@@ -129,6 +131,6 @@ class PictureActions(QObject):
         self._view.place.rotate(degrees)
         self._view.notify_changed()
 
-    def _flip(self, *, across: bool) -> None:
-        self._view.place.flip(across=across)
+    def _flip(self, *, is_horizontal: bool) -> None:
+        self._view.place.flip(horizontally=is_horizontal)
         self._view.notify_changed()

@@ -82,22 +82,22 @@ class LookBar(QWidget):
             flow.addWidget(part)
         self.show_look(PLAIN)
 
-    def _make_slider(self, theme: Theme, name: str, does: Callable[[int], None]) -> SliderTrack:
-        made = SliderTrack(theme, 2 * SLIDER_STEPS)
-        made.setAccessibleName(name)
-        made.setMaximumWidth(120)
-        made.valueChanged.connect(does)
-        made.reset.connect(lambda: made.setValue(SLIDER_STEPS))
-        return made
+    def _make_slider(self, theme: Theme, name: str, on_change: Callable[[int], None]) -> SliderTrack:
+        slider = SliderTrack(theme, 2 * SLIDER_STEPS)
+        slider.setAccessibleName(name)
+        slider.setMaximumWidth(120)
+        slider.valueChanged.connect(on_change)
+        slider.reset.connect(lambda: slider.setValue(SLIDER_STEPS))
+        return slider
 
     def show_look(self, look: PictureLook) -> None:
         """Show other settings without emitting `changed`."""
         self.look = look
-        wanted = (
+        slider_values = (
             (self.brightness, round(SLIDER_STEPS * (1 + look.brightness))),
             (self.contrast, round(SLIDER_STEPS * (1 + log(look.contrast) / log(MAX_CONTRAST)))),
         )
-        for slider, value in wanted:
+        for slider, value in slider_values:
             slider.blockSignals(True)
             slider.setValue(value)
             slider.blockSignals(False)

@@ -42,24 +42,26 @@ class Overlays:
 
     def choices(self) -> list[str]:
         """Return the keys of the available overlay topics, and of selected ones that no longer exist."""
-        every = (*self._session.topics, *self._session.networks.topics)
-        there = [topic.key for topic in every if topic.gone_s is None and may_contain_annotations(topic)]
-        return [*there, *(key for key in self._watches if key not in there)]
+        all_topics = (*self._session.topics, *self._session.networks.topics)
+        available = [
+            topic.key for topic in all_topics if topic.gone_s is None and may_contain_annotations(topic)
+        ]
+        return [*available, *(key for key in self._watches if key not in available)]
 
-    def set_visible(self, topic: str, shown: bool) -> None:
+    def set_visible(self, topic: str, visible: bool) -> None:
         """Show or hide the annotations of a topic. At most `MAX_OVERLAYS` topics can be shown."""
-        if shown and topic not in self._watches and len(self._watches) < MAX_OVERLAYS:
+        if visible and topic not in self._watches and len(self._watches) < MAX_OVERLAYS:
             self._watches[topic] = self._session.watch_displayed(topic)
-        elif not shown and topic in self._watches:
+        elif not visible and topic in self._watches:
             self._watches.pop(topic).close()
             self._drawn.pop(topic, None)
 
     def restart(self) -> None:
         """Watch the selected topics again after the session switched to another source."""
-        chosen = self.selected
+        selected = self.selected
         self.close()
-        for topic in chosen:
-            self.set_visible(topic, shown=True)
+        for topic in selected:
+            self.set_visible(topic, visible=True)
 
     def annotations_for(self, width: int, height: int) -> tuple[AnnotationShape, ...]:
         """Return the annotations to draw over an image. Each message is decoded only once.
@@ -68,7 +70,7 @@ class Overlays:
             width: Width of the image in px.
             height: Height of the image in px.
         """
-        found: list[AnnotationShape] = []
+        shapes: list[AnnotationShape] = []
         for key in self._watches:
             topic = self._session.topic(key)
             message = topic.newest if topic is not None and topic.gone_s is None else None
@@ -79,8 +81,8 @@ class Overlays:
                     (width, height),
                     _decode_annotations(message, width, height),
                 )
-            found += before[2]
-        return tuple(found)
+            shapes += before[2]
+        return tuple(shapes)
 
     def suspendables(self) -> Iterable[Suspendable]:
         """Return the watches to suspend while the panel is hidden."""

@@ -92,13 +92,13 @@ class ImagePanel(PanelWidget):
                 self._stream.set_look(look)
 
     def _make_actions(self) -> None:
-        own = {
+        own_callbacks = {
             "freeze": self._toggle_freeze,
             "save": self.save_image,
             "copy": self.copy_image,
             "point": lambda: self._publish_points(on=not self.points.is_on),
         }
-        self.actions_of = PictureActions(self.theme, self.view, own)
+        self.actions_of = PictureActions(self.theme, self.view, own_callbacks)
         self._look_inside = QAction(self.theme.icon("list-tree"), _("Open in the Inspector"), self)
         self._look_inside.triggered.connect(self._inspect)
         self._sequence = QAction(self.theme.icon("film"), _("Record a sequence"), self)
@@ -125,8 +125,8 @@ class ImagePanel(PanelWidget):
 
     def topics(self) -> list[str]:
         """Return the keys of the available image topics: first Studio's own network, then other networks."""
-        every = (*self.session.topics, *self.session.networks.topics)
-        return [topic.key for topic in every if topic.codec == CODEC and topic.gone_s is None]
+        all_topics = (*self.session.topics, *self.session.networks.topics)
+        return [topic.key for topic in all_topics if topic.codec == CODEC and topic.gone_s is None]
 
     def show_topic(self, name: str) -> None:
         """Switch to another topic."""
@@ -169,10 +169,10 @@ class ImagePanel(PanelWidget):
         revision = self.session.topics.revision, self.session.networks.revision
         if revision != self._revision:
             self._revision = revision
-            there = self.topics()
-            self.choose.setVisible(bool(there))
-            if not self._topic and there:
-                self.show_topic(there[0])
+            topics = self.topics()
+            self.choose.setVisible(bool(topics))
+            if not self._topic and topics:
+                self.show_topic(topics[0])
         self.points.refresh()
         if self._stream is None:
             return
@@ -182,13 +182,13 @@ class ImagePanel(PanelWidget):
         self.view.show_image(self._stream, boxes, self.overlays.annotations_for)
         self.look_bar.refresh()
         if self._stream.picture is not None:
-            self._show_page(there=True)
+            self._show_page(has_image=True)
         elif self._stream.error:
             self.empty.set_texts(
                 _("Can't show the message as an image"), f"{self._stream.error}.", "circle-x"
             )
-            look = EmptyAction(_("Open the message"), self._inspect, "list-tree")
-            self.empty.set_actions([look, self.doctor_action(self._topic)])
+            open_message = EmptyAction(_("Open the message"), self._inspect, "list-tree")
+            self.empty.set_actions([open_message, self.doctor_action(self._topic)])
         # the playhead is before the topic's first image
         elif self.session.replay is not None and self._there:
             self.view.clear()
@@ -206,22 +206,22 @@ class ImagePanel(PanelWidget):
 
     def _update_empty_state(self) -> None:
         if self._topic:
-            words = _("The next image on {topic} appears here.").format(topic=topic_label(self._topic))
-            self.empty.set_texts(_("No images yet"), words, "image")
+            hint = _("The next image on {topic} appears here.").format(topic=topic_label(self._topic))
+            self.empty.set_texts(_("No images yet"), hint, "image")
             self.empty.set_actions([self.doctor_action(self._topic)])
         else:
-            words = _("Images appear here as soon as a camera publishes them.")
-            self.empty.set_texts(_("No images yet"), words, "image")
+            hint = _("Images appear here as soon as a camera publishes them.")
+            self.empty.set_texts(_("No images yet"), hint, "image")
             robot = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
             self.empty.set_actions([robot, self.doctor_action()])
-        self._show_page(there=False)
+        self._show_page(has_image=False)
 
-    def _show_page(self, *, there: bool) -> None:
-        if self._there is there:
+    def _show_page(self, *, has_image: bool) -> None:
+        if self._there is has_image:
             return
-        self._there = there
-        self.pages.setCurrentWidget(self.shown if there else self.empty)
-        self.actions_of.set_enabled(there)
+        self._there = has_image
+        self.pages.setCurrentWidget(self.shown if has_image else self.empty)
+        self.actions_of.set_enabled(has_image)
         self._fit_title()
 
     def _fit_title(self) -> None:
@@ -251,10 +251,10 @@ class ImagePanel(PanelWidget):
         self.points.set_active(on)
         self.actions_of["point"].setChecked(on)
 
-    def _set_frozen(self, held: bool) -> None:
-        self.actions_of["freeze"].setChecked(held)
+    def _set_frozen(self, is_frozen: bool) -> None:
+        self.actions_of["freeze"].setChecked(is_frozen)
         if self._stream is not None:
-            self._stream.set_frozen(held)
+            self._stream.set_frozen(is_frozen)
 
     def save_image(self) -> None:
         """Save the image as PNG at its original size."""
@@ -281,27 +281,27 @@ class ImagePanel(PanelWidget):
 
     def _on_saved(self, path: str) -> None:
         folder = QUrl.fromLocalFile(str(Path(path).parent))
-        said = _("Saved {file}").format(file=Path(path).name)
-        self.context.show_toast(said, _("Open folder"), lambda: open_externally(folder))
+        message = _("Saved {file}").format(file=Path(path).name)
+        self.context.show_toast(message, _("Open folder"), lambda: open_externally(folder))
 
     def _on_copied(self, image: QImage) -> None:
         QGuiApplication.clipboard().setImage(image)
         size = f"{image.width()}\u00d7{image.height()}"
         self.context.show_toast(_("Copied the image, {size}").format(size=size))
 
-    def _on_failed(self, sentence: str) -> None:
-        said = _("can't save the image: {reason}").format(reason=sentence)
-        self.session.console.add("error", "image", said)
+    def _on_failed(self, reason: str) -> None:
+        message = _("can't save the image: {reason}").format(reason=reason)
+        self.session.console.add("error", "image", message)
         self.session.alerts.raise_alert(
-            "snapshot", "error", _("Can't save the image."), sentence, button=_("Open the console"),
+            "snapshot", "error", _("Can't save the image."), reason, button=_("Open the console"),
             action="panel:console",
         )  # fmt: skip
 
-    def _show_actions(self, at: QPoint) -> None:
+    def _show_actions(self, position: QPoint) -> None:
         menu = Menu(self.theme, self)
         menu.addActions(self.more_actions())
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.popup(self.view.mapToGlobal(at))
+        menu.popup(self.view.mapToGlobal(position))
 
     def _inspect(self) -> None:
         self.context.run(f"inspect:{self._topic}")
@@ -361,7 +361,7 @@ class ImagePanel(PanelWidget):
         layers = state.get("layers")
         for name in layers if isinstance(layers, list) else ():
             if isinstance(name, str):
-                self.overlays.set_visible(name, shown=True)
+                self.overlays.set_visible(name, visible=True)
 
     def _close_robot_watch(self) -> None:
         if self._watch is not None:

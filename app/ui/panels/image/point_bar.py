@@ -32,11 +32,11 @@ class PointStrip(ArmedStrip):
 
     Args:
         arm: Arms the target topic; returns the reason on failure, or "".
-        said: Returns the summary of the published points, or "".
+        count_text: Returns the summary of the published points, or "".
     """
 
-    def __init__(self, context: PanelContext, arm: Callable[[], str], said: Callable[[], str]) -> None:
-        self._arm, self._said = arm, said
+    def __init__(self, context: PanelContext, arm: Callable[[], str], count_text: Callable[[], str]) -> None:
+        self._arm, self._said = arm, count_text
         super().__init__(context)
 
     def disarmed_text(self) -> str:
@@ -132,8 +132,8 @@ class PointBar(QWidget):
         if not self.is_on:
             return
         acting = self._acting
-        waits = acting.arming.is_on and not self.is_armed and acting.question is None
-        self.let.setVisible(waits and not self.problem.text() and not self._context.session.is_replaying)
+        is_waiting = acting.arming.is_on and not self.is_armed and acting.question is None
+        self.let.setVisible(is_waiting and not self.problem.text() and not self._context.session.is_replaying)
         self.strip.refresh()
 
     def set_image_topic(self, key: str) -> None:
@@ -166,8 +166,8 @@ class PointBar(QWidget):
     def _count_text(self) -> str:
         if not self.count:
             return ""
-        said = ngettext("{count} point sent", "{count} points sent", self.count).format(count=self.count)
-        return f"{said}, {subscribers_text(self.heard)}"
+        text = ngettext("{count} point sent", "{count} points sent", self.count).format(count=self.count)
+        return f"{text}, {subscribers_text(self.heard)}"
 
     # -- user actions -------------------------------------------------------------------------------------
 
@@ -188,8 +188,8 @@ class PointBar(QWidget):
         if self.problem.text():
             return self.problem.text()
         arming, target = self._acting.arming, self.target
-        why_not = self._acting.arm() if not arming.is_on else ""
-        return why_not or self._acting.allow(target, partial(self._arming_confirmed, arming.turn, target))
+        error = self._acting.arm() if not arming.is_on else ""
+        return error or self._acting.allow(target, partial(self._arming_confirmed, arming.turn, target))
 
     def _arming_confirmed(self, turn: int, target: Target) -> None:
         if self.is_on and target == self.target:
@@ -197,9 +197,9 @@ class PointBar(QWidget):
             self.refresh()
 
     def _arm_clicked(self) -> None:
-        why_not = self.arm()
-        if why_not:
-            self._context.show_toast(why_not)
+        error = self.arm()
+        if error:
+            self._context.show_toast(error)
 
     def _disarm(self) -> None:
         # Disarms this panel's target only.
@@ -222,9 +222,9 @@ class PointBar(QWidget):
             "image", name, self.target.name, self.kind.value, lambda: payload, source=str(payload),
             origin="image", on_result=partial(self._handle_result, point),
         )  # fmt: skip
-        why_not = self._acting.send_order(order)
-        if why_not:
-            self._context.show_toast(why_not)
+        error = self._acting.send_order(order)
+        if error:
+            self._context.show_toast(error)
 
     def _handle_result(self, point: PicturePoint, result: SendResult) -> None:
         if result.kind != "sent":

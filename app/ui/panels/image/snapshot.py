@@ -71,37 +71,37 @@ class SnapshotJob(QObject):
         if self._thread is not None:
             self._thread.join(2.0)
 
-    def _start(self, work: Callable[[], JobResult]) -> None:
+    def _start(self, job: Callable[[], JobResult]) -> None:
         if not self.is_busy:
             self._thread = threading.Thread(
-                target=self._run, args=(work,), name="studio-snapshot", daemon=True
+                target=self._run, args=(job,), name="studio-snapshot", daemon=True
             )
             self._thread.start()
             self._timer.start()
 
-    def _run(self, work: Callable[[], JobResult]) -> None:
+    def _run(self, job: Callable[[], JobResult]) -> None:
         # Runs in the background thread. Exceptions are returned as a sentence.
         try:
-            made: JobResult = work()
+            result: JobResult = job()
         except NepError as error:
-            made = str(error)
+            result = str(error)
         except OSError as error:
-            what = error.filename or _("image")
-            made = f"{what}: {(error.strerror or str(error)).lower()}"
+            file_name = error.filename or _("image")
+            result = f"{file_name}: {(error.strerror or str(error)).lower()}"
         except Exception as error:  # noqa: BLE001  otherwise the job would stay busy forever
-            made = f"{type(error).__name__}: {error}"
-        self._made.put(made)
+            result = f"{type(error).__name__}: {error}"
+        self._made.put(result)
 
     def _report(self) -> None:
         try:
-            made = self._made.get_nowait()
+            result = self._made.get_nowait()
         except queue.Empty:
             return
         self._timer.stop()
         self._thread = None
-        if isinstance(made, Path):
-            self.saved.emit(str(made))
-        elif isinstance(made, QImage):
-            self.copied.emit(made)
+        if isinstance(result, Path):
+            self.saved.emit(str(result))
+        elif isinstance(result, QImage):
+            self.copied.emit(result)
         else:
-            self.failed.emit(made)
+            self.failed.emit(result)

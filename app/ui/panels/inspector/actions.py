@@ -31,7 +31,7 @@ class InspectorActions(QObject):
     Args:
         panel: Panel in which the shortcuts work.
         body: Contents of the panel.
-        shown: Returns the message shown, or None.
+        current_message: Returns the message shown, or None.
         value: Returns the decoded payload of the message shown.
         find: Gives the find field the focus.
         toast: Shows a toast.
@@ -43,7 +43,7 @@ class InspectorActions(QObject):
         theme: Theme,
         panel: QWidget,
         body: InspectorBody,
-        shown: Callable[[], Message | None],
+        current_message: Callable[[], Message | None],
         value: Callable[[], object],
         *,
         find: Callable[[], object],
@@ -51,7 +51,13 @@ class InspectorActions(QObject):
         plot: Callable[[str], None],
     ) -> None:
         super().__init__(panel)
-        self._body, self._shown, self._value, self._toast, self._plot = body, shown, value, toast, plot
+        self._body, self._shown, self._value, self._toast, self._plot = (
+            body,
+            current_message,
+            value,
+            toast,
+            plot,
+        )
         rows: tuple[tuple[str, str, str, Callable[[], object]], ...] = (
             (_("Copy value"), "Ctrl+C", "copy", self.copy_value),
             (_("Copy path"), "Ctrl+Shift+C", "link", self.copy_path),
@@ -66,13 +72,13 @@ class InspectorActions(QObject):
         self._find = find
         panel.installEventFilter(self)
         self._actions: list[QAction] = []
-        for words, key, icon, does in rows:
-            action = QAction(words, panel)
+        for text, key, icon, callback in rows:
+            action = QAction(text, panel)
             action.setShortcut(QKeySequence(key))
             action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             if icon:
                 action.setIcon(theme.icon(icon))
-            action.triggered.connect(lambda _on=False, do=does: do())
+            action.triggered.connect(lambda _on=False, do=callback: do())
             (body.tree if key.endswith("C") else panel).addAction(action)  # text fields have their own Ctrl+C
             self._actions.append(action)
 
@@ -91,14 +97,14 @@ class InspectorActions(QObject):
         """Return all actions, for a menu."""
         return list(self._actions)
 
-    def set_enabled(self, there: bool) -> None:
+    def set_enabled(self, has_message: bool) -> None:
         """Enable or disable all actions.
 
         Args:
-            there: True if the tree shows a message.
+            has_message: True if the tree shows a message.
         """
         for action in self._actions:
-            action.setEnabled(there)
+            action.setEnabled(has_message)
 
     def copy_value(self) -> None:
         """Copy the selected value to the clipboard."""
@@ -142,6 +148,6 @@ class InspectorActions(QObject):
         index = self._body.tree.currentIndex()
         return self._body.model.node(index) if index.isValid() else None
 
-    def _copy_text(self, text: str, said: str) -> None:
+    def _copy_text(self, text: str, message: str) -> None:
         QGuiApplication.clipboard().setText(text)
-        self._toast(said)
+        self._toast(message)

@@ -48,16 +48,18 @@ class CompareStrip(QWidget):
         row.addWidget(self.only)
         self.hide()
 
-    def set_summary(self, compared_with: str, counts: Counts, whole: bool) -> None:
+    def set_summary(self, compared_with: str, counts: Counts, is_complete: bool) -> None:
         """Show a summary such as ``Previous message: 3 changed, 1 added``.
 
         Args:
             compared_with: Name of the base message.
             counts: Number of values by kind of difference.
-            whole: False if the counts are incomplete.
+            is_complete: False if the counts are incomplete.
         """
-        said = _("{compared_with}: {changes}")
-        self.words.setText(said.format(compared_with=compared_with, changes=changes_text(counts, whole)))
+        template = _("{compared_with}: {changes}")
+        self.words.setText(
+            template.format(compared_with=compared_with, changes=changes_text(counts, is_complete))
+        )
         self.setAccessibleDescription(self.words.text())
 
 
@@ -135,9 +137,9 @@ class InspectorBody(QWidget):
             page: `NOTHING`, `LARGE`, `TREE`, `RAW` or `TABLE`.
             comparing: True if the tree shows the differences to another message.
         """
-        sentence = self.sentence.text() if page == RAW else ""
-        self.sentence.setText(sentence)
-        self.sentence.setVisible(bool(sentence))
+        text = self.sentence.text() if page == RAW else ""
+        self.sentence.setText(text)
+        self.sentence.setVisible(bool(text))
         self.pages.setCurrentIndex(page)
         for widget in (self.bar, self.line, self.foot):
             widget.setVisible(page in MODES)
@@ -147,62 +149,62 @@ class InspectorBody(QWidget):
         if page in MODES:
             self.mode.set_value(MODES[page])
 
-    def show_waiting(self, topic: str, published: bool, why: EmptyAction) -> None:
+    def show_waiting(self, topic: str, published: bool, doctor_action: EmptyAction) -> None:
         """Show the empty state for a topic whose first message has not arrived yet.
 
         Args:
             topic: Name of the topic.
             published: True if the topic has a publisher.
-            why: Action that opens the connection doctor.
+            doctor_action: Action that opens the connection doctor.
         """
         if published:
-            words = _("The next message on {topic} appears here.")
+            text = _("The next message on {topic} appears here.")
         else:
-            words = _("No publisher now. The next message on {topic} appears here.")
-        words = words.format(topic=topic)
-        if words != self._waiting:
-            self._waiting = words
-            self.empty.set_texts(_("No message yet"), words)
-            self.empty.set_actions([why])
+            text = _("No publisher now. The next message on {topic} appears here.")
+        text = text.format(topic=topic)
+        if text != self._waiting:
+            self._waiting = text
+            self.empty.set_texts(_("No message yet"), text)
+            self.empty.set_actions([doctor_action])
 
-    def show_undecodable(self, topic: str, reason: str, why: EmptyAction) -> None:
+    def show_undecodable(self, topic: str, reason: str, doctor_action: EmptyAction) -> None:
         """Show the empty state for a topic whose messages can't be decoded.
 
         Args:
             topic: Name of the topic.
             reason: Reason why decoding fails.
-            why: Action that opens the connection doctor.
+            doctor_action: Action that opens the connection doctor.
         """
-        words = _("{topic}: {reason}.").format(topic=topic, reason=reason)
-        if words != self._waiting:
-            self._waiting = words
-            self.empty.set_texts(_("Can't decode the messages"), words)
-            self.empty.set_actions([why])
+        text = _("{topic}: {reason}.").format(topic=topic, reason=reason)
+        if text != self._waiting:
+            self._waiting = text
+            self.empty.set_texts(_("Can't decode the messages"), text)
+            self.empty.set_actions([doctor_action])
 
-    def show_empty(self, topic: str, choose: Callable[[], object], why: EmptyAction) -> None:
+    def show_empty(self, topic: str, choose: Callable[[], object], doctor_action: EmptyAction) -> None:
         """Show the empty state before the first message or without a selected topic.
 
         Args:
             topic: Name of the selected topic; "" if none is selected.
             choose: Lets the user select a topic.
-            why: Action that opens the connection doctor.
+            doctor_action: Action that opens the connection doctor.
         """
         self._waiting = ""
         if topic:
-            self.show_waiting(topic, published=True, why=why)
+            self.show_waiting(topic, published=True, doctor_action=doctor_action)
         else:
             self.empty.set_texts(_("Nothing selected"), _("Click a topic to see its newest message."))
             self.empty.set_actions([EmptyAction(_("Choose a topic"), choose, "list")])
 
-    def show_large(self, size_bytes: int, words: str, read: Callable[[], object] | None = None) -> None:
+    def show_large(self, size_bytes: int, explanation: str, read: Callable[[], object] | None = None) -> None:
         """Show that the message is large instead of its values.
 
         Args:
             size_bytes: Size of the message.
-            words: Explanation.
+            explanation: Explanation.
             read: Decodes the message when the user clicks the button; None for no button.
         """
-        self.large.set_texts(_("Large message ({size})").format(size=size_text(size_bytes)), words)
+        self.large.set_texts(_("Large message ({size})").format(size=size_text(size_bytes)), explanation)
         if read is None:
             self.large.set_actions([])
         elif self.page != LARGE:

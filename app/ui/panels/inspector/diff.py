@@ -28,8 +28,8 @@ MARK_TEXTS: Mapping[Mark, str] = {
 class _Sentinel:
     """Type of the sentinels `NO_BASE` and `MISSING`, which are distinct from null."""
 
-    def __init__(self, words: str) -> None:
-        self._words = words
+    def __init__(self, text: str) -> None:
+        self._words = text
 
     def __repr__(self) -> str:
         return self._words
@@ -88,16 +88,16 @@ def child_diffs(
         Key, value, base value and kind of difference of each child, and the total number of children.
     """
     if mark in {"added", "removed"} or not is_container(base) or _kind(base) != _kind(value):
-        whole: Mark = "removed" if mark == "removed" else "added"
+        child_mark: Mark = "removed" if mark == "removed" else "added"
         pairs = zip(keys_of(value, count), values_of(value, count), strict=False)
-        return [(key, below, MISSING, whole) for key, below in pairs], size_of(value)
+        return [(key, below, MISSING, child_mark) for key, below in pairs], size_of(value)
     if changes_only:
-        found = [part for part in islice(_compare_children(value, base), MAX_CHILDREN) if part[3]]
-        return found[:count], len(found)
+        changed = [part for part in islice(_compare_children(value, base), MAX_CHILDREN) if part[3]]
+        return changed[:count], len(changed)
     return list(islice(_compare_children(value, base), count)), _child_count(value, base)
 
 
-def count_changes(value: object, base: object, most: int = MAX_COUNTED_VALUES) -> tuple[Counts, bool]:
+def count_changes(value: object, base: object, max_values: int = MAX_COUNTED_VALUES) -> tuple[Counts, bool]:
     """Count the changed, added and removed values of a message.
 
     An added or removed object or list counts as one value.
@@ -105,7 +105,7 @@ def count_changes(value: object, base: object, most: int = MAX_COUNTED_VALUES) -
     Args:
         value: Message to check.
         base: Base message.
-        most: Maximum number of values to compare. In long lists only the beginning is compared.
+        max_values: Maximum number of values to compare. In long lists only the beginning is compared.
 
     Returns:
         The counts by kind of difference, and True if they are complete.
@@ -113,32 +113,32 @@ def count_changes(value: object, base: object, most: int = MAX_COUNTED_VALUES) -
     counts: Counts = {"changed": 0, "added": 0, "removed": 0}
     if base is NO_BASE:
         return counts, True
-    whole = True
+    is_complete = True
     waiting: list[tuple[object, object, Mark]] = [(value, base, mark_of(value, base))]
     looked = 0
-    while waiting and looked < most:
-        here, before, mark = waiting.pop()
+    while waiting and looked < max_values:
+        current, before, mark = waiting.pop()
         looked += 1
-        if mark == "changed" and is_container(here) and is_container(before):
-            parts, _total = child_diffs(here, before, mark, most, changes_only=True)
-            whole = whole and max(size_of(here), size_of(before)) <= MAX_CHILDREN
+        if mark == "changed" and is_container(current) and is_container(before):
+            parts, _total = child_diffs(current, before, mark, max_values, changes_only=True)
+            is_complete = is_complete and max(size_of(current), size_of(before)) <= MAX_CHILDREN
             waiting += [(below, was, how) for _key, below, was, how in parts]
         elif mark:
             counts[mark] += 1
-    return counts, whole and not waiting
+    return counts, is_complete and not waiting
 
 
-def changes_text(counts: Counts, whole: bool = True) -> str:
+def changes_text(counts: Counts, is_complete: bool = True) -> str:
     """Format counts as ``3 changed, 1 added`` or ``no difference``.
 
     Args:
         counts: Number of values by kind of difference.
-        whole: False if the counts are incomplete; "at least" is added then.
+        is_complete: False if the counts are incomplete; "at least" is added then.
     """
-    said = ", ".join(_count_text(mark, count) for mark, count in counts.items() if count)
-    if not said:
-        return _("no difference") if whole else _("no difference at the start of long lists")
-    return said if whole else _("at least {changes}").format(changes=said)
+    text = ", ".join(_count_text(mark, count) for mark, count in counts.items() if count)
+    if not text:
+        return _("no difference") if is_complete else _("no difference at the start of long lists")
+    return text if is_complete else _("at least {changes}").format(changes=text)
 
 
 def _count_text(mark: Mark, count: int) -> str:
@@ -154,8 +154,8 @@ def _compare_children(value: object, base: object) -> Iterator[ChildDiff]:
     if isinstance(value, Mapping) and isinstance(base, Mapping):
         before = {str(key): key for key in base}
         for key, below in value.items():
-            own = before.pop(str(key), MISSING)
-            was = MISSING if own is MISSING else base[own]
+            base_key = before.pop(str(key), MISSING)
+            was = MISSING if base_key is MISSING else base[base_key]
             yield str(key), below, was, mark_of(below, was)
         for name, key in before.items():
             yield name, base[key], MISSING, "removed"

@@ -23,21 +23,21 @@ MAX_MATCHES = 1000
 Path = tuple[str | int, ...]
 
 
-def find_in_text(index: JsonIndex, words: str, most: int = MAX_MATCHES) -> list[int]:
+def find_in_text(index: JsonIndex, needle: str, max_matches: int = MAX_MATCHES) -> list[int]:
     """Return the byte offsets of a text in a large JSON message. The case of ASCII letters is ignored.
 
     Args:
         index: Index of the message.
-        words: Text to find.
-        most: Maximum number of offsets to return.
+        needle: Text to find.
+        max_matches: Maximum number of offsets to return.
     """
-    text, wanted = bytes(index.data).lower(), words.encode().lower()
-    found: list[int] = []
-    at = text.find(wanted) if wanted else -1
-    while at >= 0 and len(found) < most:
-        found.append(at)
-        at = text.find(wanted, at + len(wanted))
-    return found
+    text, pattern = bytes(index.data).lower(), needle.encode().lower()
+    offsets: list[int] = []
+    offset = text.find(pattern) if pattern else -1
+    while offset >= 0 and len(offsets) < max_matches:
+        offsets.append(offset)
+        offset = text.find(pattern, offset + len(pattern))
+    return offsets
 
 
 class FindField(SearchField):
@@ -58,13 +58,13 @@ class FindField(SearchField):
         """Text at the right end of the field, such as ``2 of 111``."""
         return self._count
 
-    def show_count(self, words: str) -> None:
+    def show_count(self, text: str) -> None:
         """Show a text such as ``2 of 111`` in the field."""
-        if words != self._count:
-            self._count = words
-            room = round(paint.width_of(self._theme.font("small"), words)) + 6 if words else 0
+        if text != self._count:
+            self._count = text
+            room = round(paint.width_of(self._theme.font("small"), text)) + 6 if text else 0
             self.setTextMargins(20, 0, room, 0)
-            self.setAccessibleDescription(words)
+            self.setAccessibleDescription(text)
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -72,8 +72,8 @@ class FindField(SearchField):
         if self._count:
             painter = QPainter(self)
             room = QRectF(self.rect()).adjusted(0, 0, -8, 0)
-            ink = self._theme.colour("textTertiary")
-            paint.text_line(painter, room, self._count, self._theme.font("small"), ink, paint.RIGHT)
+            colour = self._theme.colour("textTertiary")
+            paint.text_line(painter, room, self._count, self._theme.font("small"), colour, paint.RIGHT)
             painter.end()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -133,21 +133,21 @@ class FindBar(QWidget):
         """Matches found so far: paths, or byte offsets in a large message."""
         return self._matches or []
 
-    def search(self, words: str) -> None:
+    def search(self, text: str) -> None:
         """Search for a text and select the first match. A text that begins with ``$`` is a query."""
         self._place = -1
         self._matches = []
         is_query = self.is_query
         for button in (self.before, self.after):
-            button.setVisible(bool(words) and not is_query)
+            button.setVisible(bool(text) and not is_query)
         if is_query:
             self.field.show_count("")
-            self.set_invalid(wrong=False)
-        self.query_changed.emit(words if is_query else "")
+            self.set_invalid(is_invalid=False)
+        self.query_changed.emit(text if is_query else "")
         if is_query:
             return
-        self._search(words)
-        self._update_count(wrong=bool(words) and not self.matches)
+        self._search(text)
+        self._update_count(is_invalid=bool(text) and not self.matches)
         if self.matches:
             self.step(1)
 
@@ -162,46 +162,46 @@ class FindBar(QWidget):
 
     def step(self, by: int) -> None:
         """Select the next match (`by` is 1) or the previous one (-1)."""
-        words = self.field.text()
-        if not words or self.is_query:
+        text = self.field.text()
+        if not text or self.is_query:
             return
         if self._matches is None:
             last = self._place
-            self._search(words)
+            self._search(text)
             self._place = min(last, len(self.matches) - 1)
         if self.matches:
             self._place = (self._place + by) % len(self.matches)
-            found = self.matches[self._place]
-            place = isinstance(found, int) and self._index is not None
-            self.match_selected.emit(self._index.path_to(found) if place else found)  # type: ignore[union-attr, arg-type]
-        self._update_count(wrong=not self.matches)
+            match = self.matches[self._place]
+            is_offset = isinstance(match, int) and self._index is not None
+            self.match_selected.emit(self._index.path_to(match) if is_offset else match)  # type: ignore[union-attr, arg-type]
+        self._update_count(is_invalid=not self.matches)
 
-    def _search(self, words: str) -> None:
-        if not words:
+    def _search(self, text: str) -> None:
+        if not text:
             self._matches = []
             return
         value, self._index = self._source()
-        found: list[Path] | list[int]
+        matches: list[Path] | list[int]
         if self._index is not None:
-            found = find_in_text(self._index, words, MAX_MATCHES + 1)
+            matches = find_in_text(self._index, text, MAX_MATCHES + 1)
         else:
-            found = list(islice(search(value, words), MAX_MATCHES + 1))
-        self._more = len(found) > MAX_MATCHES
-        self._matches = found[:MAX_MATCHES]
+            matches = list(islice(search(value, text), MAX_MATCHES + 1))
+        self._more = len(matches) > MAX_MATCHES
+        self._matches = matches[:MAX_MATCHES]
 
-    def _update_count(self, *, wrong: bool) -> None:
+    def _update_count(self, *, is_invalid: bool) -> None:
         total = f"{len(self.matches)}{'+' if self._more else ''}"
-        words = _("{place} of {total}") if self.matches else pgettext("found", "none")
-        words = words.format(place=self._place + 1, total=total)
-        self.field.show_count(words if self.field.text() else "")
-        self.set_invalid(wrong=wrong)
+        text = _("{place} of {total}") if self.matches else pgettext("found", "none")
+        text = text.format(place=self._place + 1, total=total)
+        self.field.show_count(text if self.field.text() else "")
+        self.set_invalid(is_invalid=is_invalid)
 
-    def set_invalid(self, *, wrong: bool) -> None:
+    def set_invalid(self, *, is_invalid: bool) -> None:
         """Show or remove the error style of the field.
 
         Args:
-            wrong: True if there is no match or the query is invalid.
+            is_invalid: True if there is no match or the query is invalid.
         """
-        self.field.setProperty("wrong", "true" if wrong else "false")
+        self.field.setProperty("wrong", "true" if is_invalid else "false")
         self.field.style().unpolish(self.field)
         self.field.style().polish(self.field)

@@ -41,20 +41,20 @@ def message_info(
             not report.
         recorded: True to show the time of day instead of the latency.
     """
-    facts = [size_text(message.size_bytes)]
+    parts = [size_text(message.size_bytes)]
     if message.seq is not None:
-        facts.insert(0, _("seq {number}").format(number=group_digits(message.seq)))
+        parts.insert(0, _("seq {number}").format(number=group_digits(message.seq)))
     if message.stamp_ns is not None:
         if recorded:
-            facts.append(_("sent {clock}").format(clock=clock_text(min(message.stamp_ns, 2**62))))
+            parts.append(_("sent {clock}").format(clock=clock_text(min(message.stamp_ns, 2**62))))
         elif message.is_latched and message.stamp_ns < since_ns:
             age_s = (time.time_ns() - message.stamp_ns) / 1e9
-            facts.append(_("latched, sent {age} ago").format(age=age_text(age_s)))
+            parts.append(_("latched, sent {age} ago").format(age=age_text(age_s)))
         else:
-            facts += _latency_info(message)
+            parts += _latency_info(message)
     if network is not None:
-        facts += _unreported_info(message, network.product_name)
-    return "   ".join(facts)
+        parts += _unreported_info(message, network.product_name)
+    return "   ".join(parts)
 
 
 def _latency_info(message: Message) -> list[str]:
@@ -63,12 +63,12 @@ def _latency_info(message: Message) -> list[str]:
         return [_("latency under {latency}").format(latency=latency_text(uncertainty_s))]
     if not 0 <= latency_s < 3600:
         return [] if uncertainty_s is not None else [_("latency unknown: clocks not synchronized")]
-    words = latency_text(latency_s)
+    text = latency_text(latency_s)
     if uncertainty_s:
-        words = _("{latency} ± {uncertainty}").format(
-            latency=words, uncertainty=latency_text(max(uncertainty_s, _MIN_DISPLAYED_LATENCY_S))
+        text = _("{latency} ± {uncertainty}").format(
+            latency=text, uncertainty=latency_text(max(uncertainty_s, _MIN_DISPLAYED_LATENCY_S))
         )
-    return [_("latency {latency}").format(latency=words)]
+    return [_("latency {latency}").format(latency=text)]
 
 
 def _unreported_info(message: Message, network: str) -> Iterator[str]:
@@ -100,8 +100,8 @@ class Legend(QWidget):
         painter = QPainter(self)
         colour = self._theme.colour("changed")
         painter.fillRect(QRectF(0, self.height() / 2 - 7, 3, 14), colour)
-        words = QRectF(self.rect()).adjusted(7, 0, 3, 0)
-        paint.text_line(painter, words, self._words, self._theme.font("small"), colour)
+        text_rect = QRectF(self.rect()).adjusted(7, 0, 3, 0)
+        paint.text_line(painter, text_rect, self._words, self._theme.font("small"), colour)
         painter.end()
 
 
@@ -142,6 +142,6 @@ class Footer(QWidget):
         """Remove the path; called before another topic is shown."""
         self.show_path("")
 
-    def show_info(self, facts: str) -> None:
+    def show_info(self, text: str) -> None:
         """Show the properties of a message."""
-        self.facts.setText(facts)
+        self.facts.setText(text)

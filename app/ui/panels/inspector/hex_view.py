@@ -51,7 +51,7 @@ class HexView(QAbstractScrollArea):
         """Return all lines as text."""
         count = self.per_line()
         return "\n".join(
-            "  ".join(hex_line(self._data, at, count)) for at in range(0, len(self._data), count)
+            "  ".join(hex_line(self._data, offset, count)) for offset in range(0, len(self._data), count)
         )
 
     def per_line(self) -> int:
@@ -95,8 +95,8 @@ class HexView(QAbstractScrollArea):
             parts = zip(
                 hex_line(self._data, offset, count), columns, ("textTertiary", "text", "ok"), strict=True
             )
-            for words, x, role in parts:
+            for text, x, role in parts:
                 painter.setPen(self._theme.colour(role))
                 box = QRectF(x, 4 + row * height, self.viewport().width(), height)
-                painter.drawText(box, int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter), words)
+                painter.drawText(box, int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter), text)
         painter.end()

@@ -73,7 +73,7 @@ class HistoryStrip(QWidget):
             self.at = None
         self._feed, self._topic = feed, topic
         if topic:
-            feed.register(topic, self.kept, deep=False)
+            feed.register(topic, self.kept, is_lossless=False)
 
     def pause(self) -> None:
         """Stop collecting messages until the next `start`. The collected messages remain available."""
@@ -106,8 +106,8 @@ class HistoryStrip(QWidget):
         """
         if not len(self.kept):
             return
-        wanted = (self.at if self.at is not None else self.kept.end - 1) + by
-        self.select(None if wanted >= self.kept.end else self.kept.nearest(wanted))
+        target = (self.at if self.at is not None else self.kept.end - 1) + by
+        self.select(None if target >= self.kept.end else self.kept.nearest(target))
 
     def select(self, number: int | None) -> None:
         """Select a message by its number.
@@ -125,48 +125,52 @@ class HistoryStrip(QWidget):
         if self.at is not None and self.at >= self.kept.end:
             self.at = None
 
-    def refresh(self, *, at_once: bool = False, beside: bool = False) -> None:
+    def refresh(self, *, at_once: bool = False, is_busy: bool = False) -> None:
         """Update the strip; call on every refresh.
 
         Args:
             at_once: True to update now instead of every `UPDATE_TICKS`.
-            beside: True if other parts of the panel are repainted in this refresh. Otherwise the strip is
+            is_busy: True if other parts of the panel are repainted in this refresh. Otherwise the strip is
                 updated half as often.
         """
         self._ticks += 1
         self.clamp_selection()
-        kept = self.kept
-        state = (kept.first, kept.end, self.at)
-        is_there = len(kept) > 1 or self.at is not None
-        waits = UPDATE_TICKS if beside else 2 * UPDATE_TICKS
-        due = at_once or is_there is self.isHidden() or self._ticks >= waits
+        messages = self.kept
+        state = (messages.first, messages.end, self.at)
+        is_needed = len(messages) > 1 or self.at is not None
+        interval_ticks = UPDATE_TICKS if is_busy else 2 * UPDATE_TICKS
+        due = at_once or is_needed is self.isHidden() or self._ticks >= interval_ticks
         if state == self._said or not due:
             return
         self._said, self._ticks = state, 0
-        show_when(self, is_there)
+        show_when(self, is_needed)
         self.track.blockSignals(True)
-        self.track.setRange(0, max(0, len(kept) - 1))
-        place = kept.nearest(self.at) - kept.first if self.at is not None and len(kept) else len(kept) - 1
+        self.track.setRange(0, max(0, len(messages) - 1))
+        index = (
+            messages.nearest(self.at) - messages.first
+            if self.at is not None and len(messages)
+            else len(messages) - 1
+        )
         if not self.track.isSliderDown():
-            self.track.setValue(max(0, place))
+            self.track.setValue(max(0, index))
         self.track.blockSignals(False)
         self.track.update()
-        self.back.setEnabled(place > 0)
+        self.back.setEnabled(index > 0)
         self.on.setEnabled(self.at is not None)
         self.newest.setEnabled(self.at is not None)
-        self.words.setText(self._position_text(place))
+        self.words.setText(self._position_text(index))
 
-    def _position_text(self, place: int) -> str:
+    def _position_text(self, index: int) -> str:
         if self.at is None:
             return _("the newest of {count}").format(count=len(self.kept))
         message = self.selected_message()
         if message is None:
             return _("no longer available")
-        words = _("{place} of {count}").format(place=place + 1, count=len(self.kept))
+        text = _("{place} of {count}").format(place=index + 1, count=len(self.kept))
         if message.stamp_ns is not None and 0 <= message.stamp_ns < 2**62:
-            words = f"{words}   {clock_text(message.stamp_ns)}"
-        return words
+            text = f"{text}   {clock_text(message.stamp_ns)}"
+        return text
 
-    def _slider_moved(self, place: int) -> None:
-        last = place >= len(self.kept) - 1
-        self.select(None if last else self.kept.first + place)
+    def _slider_moved(self, index: int) -> None:
+        last = index >= len(self.kept) - 1
+        self.select(None if last else self.kept.first + index)

@@ -123,19 +123,19 @@ class ObjectsView(QWidget):
         if steps != self._steps:
             self._steps = steps
             self._sorted_at = 0.0
-        shown = value_at(value, steps) if steps is not None else MISSING
-        self._show(rows_of(shown), size_of(shown), path_text(steps) if steps else "", now)
+        items = value_at(value, steps) if steps is not None else MISSING
+        self._show(rows_of(items), size_of(items), path_text(steps) if steps else "", now)
         self.choose.setVisible(True)
 
-    def show_query_objects(self, found: Iterable[tuple[str, object]], now: float) -> None:
+    def show_query_objects(self, results: Iterable[tuple[str, object]], now: float) -> None:
         """Show the objects found by a query.
 
         Args:
-            found: Path and value of each result.
+            results: Path and value of each result.
             now: Monotonic time in s.
         """
         self._value, self._steps = None, None
-        rows = query_rows(found)
+        rows = query_rows(results)
         self._show(rows, len(rows), "", now)
         self.choose.setVisible(False)
 
@@ -143,8 +143,8 @@ class ObjectsView(QWidget):
         for length in range(len(self._wanted), -1, -1):
             if is_list_of_objects(value_at(value, self._wanted[:length])):
                 return self._wanted[:length]
-        there = lists_of_objects(value, 1)
-        return there[0] if there else None
+        paths = lists_of_objects(value, 1)
+        return paths[0] if paths else None
 
     def _show(self, rows: list[ObjectRow], total: int, path: str, now: float) -> None:
         columns = columns_of(rows)
@@ -158,16 +158,18 @@ class ObjectsView(QWidget):
         self._update_rows(rows, now)
         self._set_status(len(rows), total, path)
 
-    def _set_status(self, shown: int, total: int, path: str) -> None:
-        if shown < total and shown >= MAX_ROWS:
-            words = _("the first {shown} of {count} rows").format(
-                shown=group_digits(shown), count=group_digits(total)
+    def _set_status(self, shown_count: int, total: int, path: str) -> None:
+        if shown_count < total and shown_count >= MAX_ROWS:
+            text = _("the first {shown} of {count} rows").format(
+                shown=group_digits(shown_count), count=group_digits(total)
             )
         else:
-            words = ngettext("{count} row", "{count} rows", shown).format(count=group_digits(shown))
+            text = ngettext("{count} row", "{count} rows", shown_count).format(
+                count=group_digits(shown_count)
+            )
         if len(self._columns) >= MAX_COLUMNS:
-            words = _("{rows}, the first {count} columns").format(rows=words, count=MAX_COLUMNS)
-        self.words.setText(f"{path}   {words}" if path else words)
+            text = _("{rows}, the first {count} columns").format(rows=text, count=MAX_COLUMNS)
+        self.words.setText(f"{path}   {text}" if path else text)
 
     def _update_rows(self, rows: list[ObjectRow], now: float) -> None:
         # Keeps the previous order except for one re-sort per second.
@@ -178,8 +180,8 @@ class ObjectsView(QWidget):
             self._sorted_at = now
             rows = table.order.sort(rows)
         else:
-            place = {row.name: number for number, row in enumerate(self._model.rows())}
-            rows.sort(key=lambda row: place.get(row.name, len(place) + row.index))
+            positions = {row.name: number for number, row in enumerate(self._model.rows())}
+            rows.sort(key=lambda row: positions.get(row.name, len(positions) + row.index))
         self._model.set_rows(rows)
         table.refresh_visible()
 
@@ -192,9 +194,9 @@ class ObjectsView(QWidget):
         before = self.table.saved_state() if self.table is not None else None
         self._remove_table()
         self._columns = columns
-        made = [_index_column(rows)]
-        made += [_column(column, rows) for column in columns]
-        self._model = _ObjectModel(made, lambda row: row.name)
+        table_columns = [_index_column(rows)]
+        table_columns += [_column(column, rows) for column in columns]
+        self._model = _ObjectModel(table_columns, lambda row: row.name)
         table = self.table = TableView(self._theme, self._model, "#")
         table.setAccessibleName(_("Objects"))
         if before is not None:
@@ -219,8 +221,8 @@ class ObjectsView(QWidget):
         if self.table is not None:
             QGuiApplication.clipboard().setText(format_table_csv("#", self._columns, self._model.rows()))
             count = len(self._model.rows())
-            said = ngettext("Copied {count} row as CSV", "Copied {count} rows as CSV", count)
-            self._toast(said.format(count=group_digits(count)))
+            template = ngettext("Copied {count} row as CSV", "Copied {count} rows as CSV", count)
+            self._toast(template.format(count=group_digits(count)))
 
     def _show_list_menu(self) -> None:
         menu = Menu(self._theme, self)
@@ -239,7 +241,7 @@ class ObjectsView(QWidget):
         self.select_list(steps)
         self.show_message(self._value, self._sorted_at)
 
-    def _show_menu(self, key: str, at: QPoint) -> None:
+    def _show_menu(self, key: str, position: QPoint) -> None:
         menu = Menu(self._theme, self)
         menu.addAction(self._theme.icon("copy"), _("Copy the table as CSV"), self.copy_csv)
         if self._steps is not None:
@@ -247,7 +249,7 @@ class ObjectsView(QWidget):
             show = lambda: self.reveal_requested.emit(steps)  # noqa: E731
             menu.addAction(self._theme.icon("list-tree"), _("Show in the tree"), show)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.popup(at)
+        menu.popup(position)
 
 
 class _ObjectModel(TableModel[ObjectRow]):
@@ -270,14 +272,14 @@ def _name_cell(row: ObjectRow) -> Cell:
 def _column(steps: Steps, rows: Sequence[ObjectRow]) -> Column[ObjectRow]:
     name = column_name(steps)
     first = [row.at(steps) for row in rows[:20]]
-    figures = all(isinstance(value, (int, float)) or value in (None, MISSING) for value in first)
+    is_numeric = all(isinstance(value, (int, float)) or value in (None, MISSING) for value in first)
     return Column(
         name,
         name,
         _column_width(name, [_cell_text(value) for value in first]),
         lambda row: Cell(_cell_text(value := row.at(steps)), role=_role(value), mono=True),
         lambda row: sort_key(row.at(steps)),
-        is_numeric=figures,
+        is_numeric=is_numeric,
         tip=lambda row: _cell_text(row.at(steps)),
         is_verbatim=True,
     )
@@ -295,7 +297,7 @@ def _role(value: object) -> str:
     return "textTertiary" if value is None else "text"
 
 
-def _column_width(head: str, words: Sequence[str]) -> int:
+def _column_width(header: str, cell_texts: Sequence[str]) -> int:
     # Computed from the header with its sort arrow and the first rows.
-    letters = max([len(head) + 2, *(len(each) for each in words[:20])])
+    letters = max([len(header) + 2, *(len(each) for each in cell_texts[:20])])
     return min(MAX_COLUMN_WIDTH, max(MIN_COLUMN_WIDTH, letters * CHAR_WIDTH + COLUMN_PADDING))

@@ -144,32 +144,32 @@ class InspectorPanel(PanelWidget):
         self.history.clamp_selection()
         earlier = self.history.at is not None
         self.live.set(*chip_state(topic, self.is_frozen, recorded=recorded, earlier=earlier))
-        newest, taken = topic.newest if topic is not None and topic.gone_s is None else None, False
+        newest, is_shown = topic.newest if topic is not None and topic.gone_s is None else None, False
         if (
             topic is not None
             and newest is not None
             and newest is not self._shown
             and not self.is_display_fixed
         ):
-            taken = self._pace.try_acquire(self.clock())
-            if taken:
+            is_shown = self._pace.try_acquire(self.clock())
+            if is_shown:
                 self._show_message(newest)
         elif recorded and newest is None and self._shown is not None and not self.is_display_fixed:
             self._show_no_message()
         if self.body.page == NOTHING:
             self._show_waiting(topic)
-        done = self.reader.pop_result()
-        if done is not None and not self._raw_wanted:
-            self._show_decoded(done)
-        answer = self.query.pop_result(self.clock())
-        if answer is not None and self._value is not None:
-            self._show_query_result(answer)
-        self.history.refresh(beside=taken)
-        self._repaint_fading(taken=taken)
+        reading = self.reader.pop_result()
+        if reading is not None and not self._raw_wanted:
+            self._show_decoded(reading)
+        query_result = self.query.pop_result(self.clock())
+        if query_result is not None and self._value is not None:
+            self._show_query_result(query_result)
+        self.history.refresh(is_busy=is_shown)
+        self._repaint_fading(is_shown=is_shown)
 
-    def _repaint_fading(self, *, taken: bool) -> None:
+    def _repaint_fading(self, *, is_shown: bool) -> None:
         # A message that was just shown has painted its marks already.
-        if taken:
+        if is_shown:
             self._fades.drain(self.clock())
         elif self.body.page == TREE and self.tree.is_fading() and self._fades.try_acquire(self.clock()):
             self.tree.viewport().update()
@@ -217,14 +217,14 @@ class InspectorPanel(PanelWidget):
             self.body.show_large(message.size_bytes, _("Reading the message."))
             self._show_page(LARGE)
 
-    def _show_decoded(self, done: ReadResult) -> None:
-        message = done.message
-        if done.error is not None:
-            self._show_raw(message, done.error)
+    def _show_decoded(self, reading: ReadResult) -> None:
+        message = reading.message
+        if reading.error is not None:
+            self._show_raw(message, reading.error)
             return
-        fresh = message is not self._shown
-        self._shown, self._reading = message, done
-        if fresh:
+        is_new = message is not self._shown
+        self._shown, self._reading = message, reading
+        if is_new:
             self._before = self._value if self._value is not None else NO_BASE
             topic = self.session.topic(self._topic)
             previous = topic.previous if topic is not None else None
@@ -233,7 +233,7 @@ class InspectorPanel(PanelWidget):
             if message.size_bytes <= LARGE_BYTES and previous is not None:
                 self._before = payload_or_default(previous, self._before)
             self.finder.invalidate_matches()
-        self._value = done.value
+        self._value = reading.value
         self._show_value()
         self.foot.show_info(self._message_info(message))
         self._show_page(TABLE if self._table_wanted else TREE)
@@ -269,31 +269,29 @@ class InspectorPanel(PanelWidget):
         if first:
             self.tree.expand_small(MAX_EXPANDED_ROWS)
 
-    def _show_query_result(self, answer: QueryResult) -> None:
+    def _show_query_result(self, result: QueryResult) -> None:
         if self._table_wanted:
-            self.body.objects.show_query_objects(answer.values.items(), self.clock())
+            self.body.objects.show_query_objects(result.values.items(), self.clock())
             return
         first = not self.model.rowCount()
-        self.model.set_value(answer.values, self.clock())
+        self.model.set_value(result.values, self.clock())
         if first:
             self.tree.expand_small(MAX_EXPANDED_ROWS)
 
-    def _show_raw(self, message: Message, sentence: str) -> None:
+    def _show_raw(self, message: Message, reason: str) -> None:
         self._shown = message
         self.foot.show_info(self._message_info(message))
         self.bytes.show_bytes(message.data)
-        said = _("Can't decode the message as {codec}: {reason}.").format(
-            codec=message.codec, reason=sentence
-        )
-        self.body.sentence.setText(said if sentence else "")
+        text = _("Can't decode the message as {codec}: {reason}.").format(codec=message.codec, reason=reason)
+        self.body.sentence.setText(text if reason else "")
         self._show_page(RAW)
 
     def _offer_large(self, message: Message) -> None:
         self._shown = message
-        words = _("{codec} messages larger than 1 MB are decoded only on request.").format(
+        explanation = _("{codec} messages larger than 1 MB are decoded only on request.").format(
             codec=message.codec
         )
-        self.body.show_large(message.size_bytes, words, self._decode_large)
+        self.body.show_large(message.size_bytes, explanation, self._decode_large)
         self._show_page(LARGE)
 
     def _decode_large(self) -> None:
@@ -349,8 +347,8 @@ class InspectorPanel(PanelWidget):
         stamp_ns = self._shown.stamp_ns if self._shown is not None else None
         self._pinned_words = _(PINNED)
         if self.history.at is not None and stamp_ns is not None and 0 <= stamp_ns < 2**62:
-            at = clock_text(stamp_ns)
-            self._pinned_words = _("{message} of {clock}").format(message=_(PINNED), clock=at)
+            time_text = clock_text(stamp_ns)
+            self._pinned_words = _("{message} of {clock}").format(message=_(PINNED), clock=time_text)
         self._show_value()
 
     def _history_selected(self) -> None:
@@ -366,7 +364,7 @@ class InspectorPanel(PanelWidget):
         # "" ends the query.
         if not text and not self.query.has_query:
             return
-        self.finder.set_invalid(wrong=not self.query.set_query(text))
+        self.finder.set_invalid(is_invalid=not self.query.set_query(text))
         self.compare.setVisible(not text)  # parts of messages can't be compared, and the query needs the room
         self.model.clear()
         self._show_value()
@@ -376,13 +374,13 @@ class InspectorPanel(PanelWidget):
         if self._table_wanted and self.body.page == TREE and not self.query.has_query:
             index = self.tree.currentIndex()
             self.body.objects.select_list(steps_of(self.model.node(index)) if index.isValid() else ())
-        shown = self._shown
-        if shown is None:
+        displayed = self._shown
+        if displayed is None:
             return
-        if self._reading is not None and self._reading.message is shown and not self._raw_wanted:
+        if self._reading is not None and self._reading.message is displayed and not self._raw_wanted:
             self._show_decoded(self._reading)
         elif self.session.topic(self._topic) is not None:
-            self._show_message(shown)
+            self._show_message(displayed)
 
     def _row_selected(self, index: QModelIndex) -> None:
         self.foot.show_path(self.model.node(index).path if index.isValid() else "")
@@ -406,20 +404,20 @@ class InspectorPanel(PanelWidget):
     def _search_source(self) -> tuple[object, JsonIndex | None]:
         return self._full_value(), self._reading.index if self._reading is not None else None
 
-    def _show_menu(self, at: QPoint) -> None:
+    def _show_menu(self, position: QPoint) -> None:
         menu = Menu(self.theme, self)
         menu.addActions(self.own.menu_actions())
         index = self.tree.currentIndex()
         if index.isValid() and self._topic and not split_key(self._topic)[0]:
-            what = f"alarm.value:{self._topic} {path_text(steps_of(self.model.node(index)))}"
+            command = f"alarm.value:{self._topic} {path_text(steps_of(self.model.node(index)))}"
             menu.addSeparator()
-            menu.addAction(self.theme.icon("bell"), _("New alarm"), lambda: self.context.run(what))
+            menu.addAction(self.theme.icon("bell"), _("New alarm"), lambda: self.context.run(command))
             publish = f"publish.topic:{self._topic}"
             menu.addAction(
                 self.theme.icon("send"), _("Publish to this topic"), lambda: self.context.run(publish)
             )
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.popup(self.tree.viewport().mapToGlobal(at))
+        menu.popup(self.tree.viewport().mapToGlobal(position))
 
     def more_actions(self) -> list[QAction]:
         return self.own.menu_actions()

@@ -31,10 +31,10 @@ class _QueryOutcome:
     duration_s: float
 
 
-def _evaluate(asked: _QueryJob) -> _QueryOutcome:
-    began = time.perf_counter()
-    answer = asked.query.evaluate(asked.value)
-    return _QueryOutcome(answer, time.perf_counter() - began)
+def _evaluate(job: _QueryJob) -> _QueryOutcome:
+    start_s = time.perf_counter()
+    result = job.query.evaluate(job.value)
+    return _QueryOutcome(result, time.perf_counter() - start_s)
 
 
 class QueryStrip(QWidget):
@@ -65,14 +65,14 @@ class QueryStrip(QWidget):
         self._typed, self._query = text, None
         self._worker.clear()
         self._not_before = 0.0
-        sentence = ""
+        message = ""
         if text:
             try:
                 self._query = JsonQuery(text)
             except QueryError as error:
-                sentence = error.sentence
-        self._set_status(sentence, wrong=bool(sentence))
-        return not sentence
+                message = error.sentence
+        self._set_status(message, is_error=bool(message))
+        return not message
 
     def request_evaluation(self, value: object) -> None:
         """Queue a message for evaluation in place of the pending one; `pop_result` returns the result."""
@@ -86,20 +86,20 @@ class QueryStrip(QWidget):
         Args:
             now: Monotonic time in s.
         """
-        done = self._worker.pop_result()
-        if done is not None:
-            self._not_before = now + (LOAD_DIVISOR - 1) * done.duration_s
-            self._set_status(result_text(done.result), wrong=False)
+        outcome = self._worker.pop_result()
+        if outcome is not None:
+            self._not_before = now + (LOAD_DIVISOR - 1) * outcome.duration_s
+            self._set_status(result_text(outcome.result), is_error=False)
         if self._due and self._query is not None and not self._worker.is_busy and now >= self._not_before:
             self._due = False
             self._worker.submit(_QueryJob(self._query, self._value))
-        return done.result if done is not None else None
+        return outcome.result if outcome is not None else None
 
     def discard_pending(self) -> None:
         """Discard pending evaluations; called before another topic is shown."""
         self._worker.clear()
         self._value, self._due = None, False
-        self._set_status("", wrong=False)
+        self._set_status("", is_error=False)
 
     def set_tree_visible(self, *, tree: bool) -> None:
         """Show or hide the strip. It is visible only if it has a text.
@@ -114,14 +114,14 @@ class QueryStrip(QWidget):
         """Stop the background thread."""
         self._worker.close()
 
-    def _set_status(self, words: str, *, wrong: bool) -> None:
-        self.words.setText(words)
-        set_role(self.words, "warn" if wrong else "textSecondary")
+    def _set_status(self, text: str, *, is_error: bool) -> None:
+        self.words.setText(text)
+        set_role(self.words, "warn" if is_error else "textSecondary")
         self.set_tree_visible(tree=self._on_tree)
 
 
-def result_text(answer: QueryResult) -> str:
+def result_text(result: QueryResult) -> str:
     """Format the number of results, such as ``12 found``, and the reason if the results are incomplete."""
-    count = len(answer.values)
-    said = ngettext("{count} found.", "{count} found.", count).format(count=count)
-    return f"{said} {answer.cut}".rstrip()
+    count = len(result.values)
+    text = ngettext("{count} found.", "{count} found.", count).format(count=count)
+    return f"{text} {result.cut}".rstrip()

@@ -75,8 +75,8 @@ def field_of(node: TreeNode) -> str:
     For a list of numbers, the path stands for all elements.
     """
     kind = kind_of_value(node.value)
-    every: tuple[Step, ...] = (ALL,) if kind == "list" else ()
-    return str(FieldPath((*steps_of(node), *every))) if kind is not None else ""
+    suffix: tuple[Step, ...] = (ALL,) if kind == "list" else ()
+    return str(FieldPath((*steps_of(node), *suffix))) if kind is not None else ""
 
 
 def steps_of(node: TreeNode) -> tuple[str | int, ...]:
@@ -146,16 +146,16 @@ class TreeModel(QAbstractItemModel):
         if role == Qt.ItemDataRole.ToolTipRole:
             return plain.tip(node.path)
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            said = (str(node.key), value_text(node.value), _(MARK_TEXTS.get(node.mark, "")))
-            return ", ".join(part for part in said if part)
+            parts = (str(node.key), value_text(node.value), _(MARK_TEXTS.get(node.mark, "")))
+            return ", ".join(part for part in parts if part)
         return None
 
     # -- access by the inspector --------------------------------------------------------------------------
 
     def node(self, index: Index) -> TreeNode:
         """Return the node of an index; the root for an invalid index."""
-        inside = index.internalPointer() if index.isValid() else None
-        return inside if isinstance(inside, TreeNode) else self._root
+        pointer = index.internalPointer() if index.isValid() else None
+        return pointer if isinstance(pointer, TreeNode) else self._root
 
     def index_of(self, node: TreeNode) -> QModelIndex:
         """Return the index of a node."""
@@ -187,11 +187,11 @@ class TreeModel(QAbstractItemModel):
             changes_only: True to omit nodes that are equal in both messages.
         """
         first = not self._root.children
-        shown = _as_container(value)
+        container = _as_container(value)
         self._changes_only = changes_only
         self._changing = True
         try:
-            self._update(self._root, (0, shown, _as_container(base), ""), None if first else now)
+            self._update(self._root, (0, container, _as_container(base), ""), None if first else now)
             if not self._root.children:
                 self._load(self._root, PAGE_SIZE)
         finally:
@@ -223,11 +223,11 @@ class TreeModel(QAbstractItemModel):
                 self._emit_changed(node, node)
             return
         parts = self._parts(node, max(len(loaded), PAGE_SIZE) if loaded or is_container(value) else 0)
-        wanted = [each[0] for each in parts]
-        if [child.key for child in loaded] != wanted[: len(loaded)] or len(wanted) < len(loaded):
+        keys = [each[0] for each in parts]
+        if [child.key for child in loaded] != keys[: len(loaded)] or len(keys) < len(loaded):
             self._sync_children(node, loaded, parts)
-        elif len(wanted) > len(loaded):
-            self._load(node, len(wanted))
+        elif len(keys) > len(loaded):
+            self._load(node, len(keys))
         if not is_container(value) and node is not self._root:
             node.children = None
             return
@@ -249,26 +249,26 @@ class TreeModel(QAbstractItemModel):
         first = len(node.children)
         if len(parts) <= first:
             return
-        fresh = [_make_node(node, row, parts[row]) for row in range(first, len(parts))]
+        new_nodes = [_make_node(node, row, parts[row]) for row in range(first, len(parts))]
         before, self._changing = self._changing, True  # receivers of the signals must not load the same rows
         self.beginInsertRows(self.index_of(node), first, len(parts) - 1)
-        node.children.extend(fresh)
+        node.children.extend(new_nodes)
         self._changing = before
         self.endInsertRows()
 
     def _sync_children(self, node: TreeNode, loaded: list[TreeNode], parts: Sequence[ChildDiff]) -> None:
         # Nodes that still exist keep their expanded state.
-        wanted = [part[0] for part in parts]
-        keep = set(wanted)
+        keys = [part[0] for part in parts]
+        key_set = set(keys)
         for row in range(len(loaded) - 1, -1, -1):
-            if loaded[row].key not in keep:
+            if loaded[row].key not in key_set:
                 self.beginRemoveRows(self.index_of(node), row, row)
                 del loaded[row]
                 _renumber(loaded)
                 self.endRemoveRows()
         have = {child.key for child in loaded}
-        if [key for key in wanted if key in have] != [child.key for child in loaded]:
-            self._reorder(loaded, wanted)
+        if [key for key in keys if key in have] != [child.key for child in loaded]:
+            self._reorder(loaded, keys)
         for row, part in enumerate(parts):
             if part[0] not in have:
                 self.beginInsertRows(self.index_of(node), row, row)
@@ -276,12 +276,12 @@ class TreeModel(QAbstractItemModel):
                 _renumber(loaded)
                 self.endInsertRows()
 
-    def _reorder(self, loaded: list[TreeNode], wanted: Sequence[str | int]) -> None:
-        place = {key: number for number, key in enumerate(wanted)}
+    def _reorder(self, loaded: list[TreeNode], keys: Sequence[str | int]) -> None:
+        positions = {key: number for number, key in enumerate(keys)}
         self.layoutAboutToBeChanged.emit()
         before = self.persistentIndexList()
         nodes = [self.node(index) for index in before]
-        loaded.sort(key=lambda child: place[child.key])
+        loaded.sort(key=lambda child: positions[child.key])
         _renumber(loaded)
         self.changePersistentIndexList(before, [self.index_of(node) for node in nodes])
         self.layoutChanged.emit()

@@ -33,13 +33,13 @@ MARK_SIGNS = {"added": "+ ", "removed": "\u2212 "}
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
-def blend(under: QColor, over: QColor, share: float) -> QColor:
-    """Blend `over` onto `under` with opacity `share` (0 to 1)."""
-    keep = 1.0 - share
+def blend(under: QColor, top: QColor, share: float) -> QColor:
+    """Blend `top` onto `under` with opacity `share` (0 to 1)."""
+    inverse = 1.0 - share
     return QColor.fromRgbF(
-        under.redF() * keep + over.redF() * share,
-        under.greenF() * keep + over.greenF() * share,
-        under.blueF() * keep + over.blueF() * share,
+        under.redF() * inverse + top.redF() * share,
+        under.greenF() * inverse + top.greenF() * share,
+        under.blueF() * inverse + top.blueF() * share,
     )
 
 
@@ -110,7 +110,7 @@ class TreeView(QTreeView):
         Args:
             rows: Maximum number of visible rows.
         """
-        waiting, shown = [QModelIndex()], self._tree.rowCount()
+        waiting, visible_rows = [QModelIndex()], self._tree.rowCount()
         while waiting:
             above = waiting.pop(0)
             for row in range(self._tree.rowCount(above)):
@@ -118,8 +118,8 @@ class TreeView(QTreeView):
                 node = self._tree.node(index)
                 size = size_of(node.value)
                 few = 0 < size <= (8 if isinstance(node.value, Mapping) else 1)
-                if few and node.depth < 3 and shown + size <= rows:
-                    shown += size
+                if few and node.depth < 3 and visible_rows + size <= rows:
+                    visible_rows += size
                     self._tree.fetchMore(index)
                     self.expand(index)
                     waiting.append(index)
@@ -133,26 +133,26 @@ class TreeView(QTreeView):
             return
         rect = QRect(option.rect)
         rect.setLeft(0)
-        chosen = index == self.currentIndex()
+        is_selected = index == self.currentIndex()
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        ground = self.theme.colour("selected" if chosen else "panel")
-        if chosen:
+        ground = self.theme.colour("selected" if is_selected else "panel")
+        if is_selected:
             painter.fillRect(rect, ground)
         share = self.highlight_opacity(node)
         if share > 0:
             bar = blend(ground, self.theme.colour(BAR_ROLES[node.mark]), share)
             painter.fillRect(QRect(0, rect.top() + 4, BAR_WIDTH, rect.height() - 8), bar)
-        key_end = self._paint_key(painter, rect, node, chosen=chosen)
+        key_end = self._paint_key(painter, rect, node, is_selected=is_selected)
         if not node.is_container:
             self._paint_value(painter, rect, node, key_end, ground, share)
-        if chosen and self._keyboard and self.hasFocus():
+        if is_selected and self._keyboard and self.hasFocus():
             painter.setPen(QPen(self.theme.colour("focus"), 2))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(QRectF(rect).adjusted(1, 1, -1, -1), 4, 4)
         painter.restore()
 
-    def _paint_key(self, painter: QPainter, rect: QRect, node: TreeNode, *, chosen: bool) -> float:
+    def _paint_key(self, painter: QPainter, rect: QRect, node: TreeNode, *, is_selected: bool) -> float:
         theme = self.theme
         left = LEFT_EDGE + node.depth * INDENT
         if node.is_container and self._tree.hasChildren(self._tree.index_of(node)):
@@ -164,17 +164,17 @@ class TreeView(QTreeView):
         metrics = QFontMetricsF(font)
         x = float(left + CHEVRON + 4)
         room = rect.width() - x - VALUE_EDGE
-        said = MARK_SIGNS.get(node.mark, "") + str(node.key)
-        key = metrics.elidedText(said, Qt.TextElideMode.ElideRight, max(40.0, room * 0.6))
+        key_text = MARK_SIGNS.get(node.mark, "") + str(node.key)
+        key = metrics.elidedText(key_text, Qt.TextElideMode.ElideRight, max(40.0, room * 0.6))
         painter.setFont(font)
-        role = BAR_ROLES[node.mark] if node.mark in MARK_SIGNS else "selectedText" if chosen else "text"
+        role = BAR_ROLES[node.mark] if node.mark in MARK_SIGNS else "selectedText" if is_selected else "text"
         painter.setPen(theme.colour(role))
         width = metrics.horizontalAdvance(key)
         painter.drawText(QRectF(x, rect.top(), width + 2, rect.height()), LEFT, key)
         x += width
         if node.is_container:
             count = value_text(node.value)
-            painter.setPen(theme.colour("accentText" if chosen else "textTertiary"))
+            painter.setPen(theme.colour("accentText" if is_selected else "textTertiary"))
             painter.drawText(QRectF(x + 7, rect.top(), 90, rect.height()), LEFT, count)
         return x
 
@@ -229,9 +229,9 @@ class TreeView(QTreeView):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         # Starts a drag after the platform's drag distance.
         if self._pressed_at is not None and event.buttons() & Qt.MouseButton.LeftButton:
-            began, node = self._pressed_at
-            far = (event.position().toPoint() - began).manhattanLength()
-            if far >= QApplication.startDragDistance():
+            press_position, node = self._pressed_at
+            distance = (event.position().toPoint() - press_position).manhattanLength()
+            if distance >= QApplication.startDragDistance():
                 self._pressed_at = None
                 self.drag_started.emit(node)
             return

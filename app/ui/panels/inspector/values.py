@@ -71,27 +71,27 @@ def value_text(value: object) -> str:
     return repr(value) if isinstance(value, float) else str(value)
 
 
-def search(value: object, words: str, limit: int = MAX_SEARCHED_VALUES) -> Iterator[tuple[str | int, ...]]:
+def search(value: object, text: str, limit: int = MAX_SEARCHED_VALUES) -> Iterator[tuple[str | int, ...]]:
     """Yield the paths of keys and values that contain a text, in tree order.
 
     Args:
         value: Decoded message.
-        words: Text to find; case is ignored.
+        text: Text to find; case is ignored.
         limit: Maximum number of values to check.
     """
-    wanted = words.casefold()
+    folded_text = text.casefold()
     waiting: list[tuple[tuple[str | int, ...], object]] = [((), value)]
     for _each in range(limit):
         if not waiting:
             return
-        path, here = waiting.pop()
+        path, node = waiting.pop()
         if path and (
-            wanted in str(path[-1]).casefold()
-            or (not is_container(here) and wanted in value_text(here).casefold())
+            folded_text in str(path[-1]).casefold()
+            or (not is_container(node) and folded_text in value_text(node).casefold())
         ):
             yield path
-        inside = zip(keys_of(here, limit), values_of(here, limit), strict=False)
-        waiting.extend(((*path, key), below) for key, below in reversed(list(inside)))
+        children = zip(keys_of(node, limit), values_of(node, limit), strict=False)
+        waiting.extend(((*path, key), below) for key, below in reversed(list(children)))
 
 
 def clipboard_text(value: object) -> str:
@@ -127,8 +127,8 @@ def payload_or_default(message: Message, otherwise: object) -> object:
     """
     if message.size_bytes > LARGE_BYTES or message.codec == "image":
         return otherwise
-    found = read(message)
-    return otherwise if found.error is not None else found.value
+    decoded = read(message)
+    return otherwise if decoded.error is not None else decoded.value
 
 
 def image_summary(message: Message) -> Mapping[str, object]:

@@ -116,12 +116,12 @@ class NodesPanel(NetworkTable[NodeRow]):
         nodes = [*self.session.nodes, *self.session.networks.nodes]
         self._seen = self._snapshot()
         self._gone = any(node.gone_s is not None for node in nodes)
-        words = self.filter_words()
-        found = [node for node in nodes if all(word in _haystack(node) for word in words)]
-        self.model.set_rows(rows_of(found, self._opened, self.table.order, self._rate_text))
+        keywords = self.filter_words()
+        matches = [node for node in nodes if all(keyword in _haystack(node) for keyword in keywords)]
+        self.model.set_rows(rows_of(matches, self._opened, self.table.order, self._rate_text))
         self.filter.setVisible(len(nodes) > 0)
         self.table.refresh_visible()
-        self.show_table(bool(found), bool(words))
+        self.show_table(bool(matches), bool(keywords))
         self.show_networks()
         self._show_details()
 
@@ -130,8 +130,8 @@ class NodesPanel(NetworkTable[NodeRow]):
         return rate_text(topic.rate_hz) if topic is not None else ""
 
     def update_empty_state(self) -> None:
-        said = _("Programs appear here as soon as they join the master.")
-        self.empty.set_texts(_("No nodes yet"), said, "network")
+        text = _("Programs appear here as soon as they join the master.")
+        self.empty.set_texts(_("No nodes yet"), text, "network")
         self.empty.set_actions([])
 
     def _selection_changed(self, _now: QModelIndex, _before: QModelIndex) -> None:
@@ -139,24 +139,24 @@ class NodesPanel(NetworkTable[NodeRow]):
 
     def _show_details(self) -> None:
         row = self.model.row_at(self.table.currentIndex())
-        shown = self.pages.currentIndex() == 0
-        words = _("Expand a node to see its topics") if row is None else details_text(row.node)
+        is_table_visible = self.pages.currentIndex() == 0
+        text = _("Expand a node to see its topics") if row is None else details_text(row.node)
         limits = limits_text(row.node) if row is not None else ""
         if row is not None:
             limits = "\n".join(filter(None, (limits, no_parameters_reason(row.node))))
-        self._parameters.show(row.node if row is not None and shown else None)
+        self._parameters.show(row.node if row is not None and is_table_visible else None)
         show_when(self.parameters, self._parameters.node is not None)
-        self.foot.setText(f"{words}.\n{limits}" if limits else words)
-        self._about.setVisible(shown)
-        self.line.setVisible(shown)
+        self.foot.setText(f"{text}.\n{limits}" if limits else text)
+        self._about.setVisible(is_table_visible)
+        self.line.setVisible(is_table_visible)
 
     def open_row(self, key: str) -> None:
         row = self.model.row_at(self.model.index_of(key))
         if row is None:
             return
         if row.is_pattern and self.session.topic(row.topic_key) is None:
-            said = _("{pattern} has wildcards and matches several topics")
-            self.context.show_toast(said.format(pattern=row.topic))
+            message = _("{pattern} has wildcards and matches several topics")
+            self.context.show_toast(message.format(pattern=row.topic))
         elif row.topic:
             show_messages(self.context, row.topic_key)
         else:
@@ -215,8 +215,8 @@ class _NodeTable(TableView[NodeRow]):
 def _haystack(node: NodeEntry) -> str:
     topics = " ".join((*node.published_topics, *node.subscribed_topics))
     network = network_label(node.network)
-    facts = f"{node.name} {node.host} {node.pid} {node.language} {node.generation} {network}"
-    return f"{facts} {topics}".casefold()
+    own_fields = f"{node.name} {node.host} {node.pid} {node.language} {node.generation} {network}"
+    return f"{own_fields} {topics}".casefold()
 
 
 PANEL = Panel("nodes", TABLE_TEXTS.title, "network", (), NodesPanel)

@@ -39,18 +39,18 @@ def allowed_values_text(parameter: ReportedParameter) -> str:
     if parameter.is_read_only:
         return _("read only")
     if parameter.choices:
-        some = [shortened(format_value(each), 40) for each in parameter.choices[:MAX_DISPLAYED_CHOICES]]
+        texts = [shortened(format_value(each), 40) for each in parameter.choices[:MAX_DISPLAYED_CHOICES]]
         return (
-            ", ".join(some) + " …"
+            ", ".join(texts) + " …"
             if len(parameter.choices) > MAX_DISPLAYED_CHOICES
-            else format_list(some, "or")
+            else format_list(texts, "or")
         )
-    least, most = parameter.minimum, parameter.maximum
-    if least is not None and most is not None:
-        return _("{least} to {most}").format(least=format_value(least), most=format_value(most))
-    if least is not None:
-        return _("{least} or more").format(least=format_value(least))
-    return _("{most} or less").format(most=format_value(most)) if most is not None else ""
+    minimum, maximum = parameter.minimum, parameter.maximum
+    if minimum is not None and maximum is not None:
+        return _("{least} to {most}").format(least=format_value(minimum), most=format_value(maximum))
+    if minimum is not None:
+        return _("{least} or more").format(least=format_value(minimum))
+    return _("{most} or less").format(most=format_value(maximum)) if maximum is not None else ""
 
 
 class ParametersView(QWidget):
@@ -124,11 +124,11 @@ class ParametersView(QWidget):
         return Cell(parameter.name, role=self._text_role("text"), mono=True, elide_middle=True)
 
     def _value_cell(self, parameter: ReportedParameter) -> Cell:
-        words = shortened(parameter.text, MAX_DISPLAYED_CHARS)
+        text = shortened(parameter.text, MAX_DISPLAYED_CHARS)
         changed = self.parameters.changed.get(parameter.name)
         if changed is not None and self.clock() - changed < CHANGE_HIGHLIGHT_S:
-            return Cell(words, role="changed", mono=True, tint="changedTint")
-        return Cell(words, role=self._text_role("text"), mono=True)
+            return Cell(text, role="changed", mono=True, tint="changedTint")
+        return Cell(text, role=self._text_role("text"), mono=True)
 
     # -- display ------------------------------------------------------------------------------------------
 
@@ -139,10 +139,10 @@ class ParametersView(QWidget):
         node = parameters.node
         if node is None:
             return
-        facts = (parameters.revision, node.key, node.gone_s is None, node.can_set_parameters, node.is_stale)
-        if facts != self._seen:
-            another = not self._seen or facts[1] != self._seen[1]
-            self._seen = facts
+        state = (parameters.revision, node.key, node.gone_s is None, node.can_set_parameters, node.is_stale)
+        if state != self._seen:
+            another = not self._seen or state[1] != self._seen[1]
+            self._seen = state
             if another:
                 self._edited = False
             self.title.setText(self._title_text())
@@ -156,10 +156,12 @@ class ParametersView(QWidget):
         parameters = self.parameters
         name = parameters.node.name if parameters.node is not None else ""
         if parameters.problem:
-            said = _("The parameters of {node} can't be read: {reason}")
-            return said.format(node=name, reason=parameters.problem)
-        said = _("Parameters of {node}") if parameters.heard else _("Waiting for the parameters of {node}")
-        return said.format(node=name)
+            template = _("The parameters of {node} can't be read: {reason}")
+            return template.format(node=name, reason=parameters.problem)
+        template = (
+            _("Parameters of {node}") if parameters.heard else _("Waiting for the parameters of {node}")
+        )
+        return template.format(node=name)
 
     @property
     def selected(self) -> ReportedParameter | None:
@@ -174,28 +176,28 @@ class ParametersView(QWidget):
 
     def _show_selected(self) -> None:
         parameter, node = self.selected, self.parameters.node
-        shown = parameter is not None and node is not None
+        is_visible = parameter is not None and node is not None
         for widget in (self.name, self.editors, self.button):
-            paint.show_when(widget, shown)
+            paint.show_when(widget, is_visible)
         if parameter is None or node is None:
             self._set_status(_("Choose a parameter to change its value."))
             return
         self.name.setText(parameter.name)
         self.name.setToolTip(plain.tip(_tooltip(parameter)))
-        why_not = read_only_reason(node, parameter)
+        disabled_reason = read_only_reason(node, parameter)
         options = [format_value(each) for each in parameter.choices]
         if parameter.kind == "bool" and not options:
             options = ["false", "true"]
-        waits = self.parameters.setting == parameter.name
+        is_pending = self.parameters.setting == parameter.name
         if self._waits and not self.parameters.setting:
             self._waits = False
             self._edited = bool(self.parameters.refusal)
         self._show_editor(parameter, options)
-        self.field.setEnabled(not why_not)
-        self.choice.setEnabled(not why_not)
-        self.button.setEnabled(not why_not and not waits)
+        self.field.setEnabled(not disabled_reason)
+        self.choice.setEnabled(not disabled_reason)
+        self.button.setEnabled(not disabled_reason and not is_pending)
         paint.show_when(self.button, not options)
-        self._update_status(parameter, why_not, waits=waits)
+        self._update_status(parameter, disabled_reason, is_pending=is_pending)
 
     def _show_editor(self, parameter: ReportedParameter, options: list[str]) -> None:
         now = parameter.text
@@ -203,33 +205,33 @@ class ParametersView(QWidget):
         for widget in (self.field, self.choice):
             widget.setAccessibleName(_("Value of {parameter}").format(parameter=parameter.name))
         if options:
-            if [self.choice.itemData(place) for place in range(self.choice.count())] != options:
+            if [self.choice.itemData(index) for index in range(self.choice.count())] != options:
                 self.choice.clear()
-                for each in options:
-                    self.choice.addItem(shortened(each, MAX_DISPLAYED_CHARS), each)
+                for option in options:
+                    self.choice.addItem(shortened(option, MAX_DISPLAYED_CHARS), option)
             self.choice.set_value(now)
         elif not self._edited and self.field.text() != now:
             self.field.setText(now[:MAX_TEXT_LENGTH])
 
-    def _update_status(self, parameter: ReportedParameter, why_not: str, *, waits: bool) -> None:
-        refusal = self.parameters.refusal
-        self.field.set_invalid(wrong=bool(refusal))
-        if refusal:
-            self._set_status(_as_sentence(refusal), "error")
-        elif waits:
+    def _update_status(self, parameter: ReportedParameter, disabled_reason: str, *, is_pending: bool) -> None:
+        rejection = self.parameters.refusal
+        self.field.set_invalid(is_invalid=bool(rejection))
+        if rejection:
+            self._set_status(_as_sentence(rejection), "error")
+        elif is_pending:
             self._set_status(_("Waiting for the node's reply"))
-        elif why_not:
-            self._set_status(_as_sentence(why_not))
+        elif disabled_reason:
+            self._set_status(_as_sentence(disabled_reason))
         else:
-            words = (shortened(parameter.description, 300), allowed_values_text(parameter))
-            self._set_status("; ".join(filter(None, words)))
+            parts = (shortened(parameter.description, 300), allowed_values_text(parameter))
+            self._set_status("; ".join(filter(None, parts)))
 
-    def _set_status(self, words: str, role: str = "textTertiary") -> None:
+    def _set_status(self, text: str, role: str = "textTertiary") -> None:
         set_role(self.sentence, role)
-        if words != self.sentence.text():
-            self.sentence.setText(words)
+        if text != self.sentence.text():
+            self.sentence.setText(text)
             if role == "error":
-                paint.announce(self.sentence, words)
+                paint.announce(self.sentence, text)
 
     # -- user actions -------------------------------------------------------------------------------------
 
@@ -261,21 +263,21 @@ class ParametersView(QWidget):
 class ValueField(QLineEdit):
     """Text field for the value of a parameter. Return sets the value, Esc restores the current one."""
 
-    def __init__(self, theme: Theme, take: Callable[[], object], leave: Callable[[], object]) -> None:
+    def __init__(self, theme: Theme, on_submit: Callable[[], object], leave: Callable[[], object]) -> None:
         super().__init__()
-        self._take, self._leave = take, leave
+        self._take, self._leave = on_submit, leave
         self.setProperty("focusRadius", theme.radius("control"))
         self.setMinimumWidth(60)
         ContextMenuFilter(theme, self)
 
-    def set_invalid(self, *, wrong: bool) -> None:
+    def set_invalid(self, *, is_invalid: bool) -> None:
         """Show or remove the red outline.
 
         Args:
-            wrong: True if the value is invalid.
+            is_invalid: True if the value is invalid.
         """
-        if (self.property("wrong") == "true") is not wrong:
-            self.setProperty("wrong", "true" if wrong else "false")
+        if (self.property("wrong") == "true") is not is_invalid:
+            self.setProperty("wrong", "true" if is_invalid else "false")
             self.style().unpolish(self)
             self.style().polish(self)
 
@@ -296,5 +298,5 @@ def _allowed_cell(parameter: ReportedParameter) -> Cell:
     return Cell(allowed_values_text(parameter), role="textTertiary")
 
 
-def _as_sentence(words: str) -> str:
-    return f"{words[:1].upper()}{words[1:]}."
+def _as_sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."

@@ -87,10 +87,10 @@ def rows_of(
         rate: Returns the formatted rate of a topic by key.
     """
     rows: list[NodeRow] = []
-    for head in order.sort([NodeRow(node, node.key in opened) for node in nodes]):
-        rows.append(head)
-        if head.is_expanded:
-            node = head.node
+    for row in order.sort([NodeRow(node, node.key in opened) for node in nodes]):
+        rows.append(row)
+        if row.is_expanded:
+            node = row.node
             rows += [
                 NodeRow(node, direction=PUBLISHES, topic=topic, rate=rate) for topic in node.published_topics
             ]
@@ -137,8 +137,8 @@ def details_text(node: NodeEntry) -> str:
     """
     parts = [node.name]
     if node.host:
-        here = node.host == platform.node()
-        parts.append(_("on this computer") if here else _("on {host}").format(host=node.host))
+        is_local = node.host == platform.node()
+        parts.append(_("on this computer") if is_local else _("on {host}").format(host=node.host))
     if node.pid is not None:
         parts.append(_("pid {number}").format(number=node.pid))
     if node.language:
@@ -155,29 +155,31 @@ def _text_role(row: NodeRow, role: str) -> str:
 
 def name_cell(row: NodeRow) -> Cell:
     """Return the cell with a node's name and arrow, bold while the node is new; topics are indented."""
-    gone = row.node.gone_s is not None
+    is_gone = row.node.gone_s is not None
     if row.topic:
         return Cell(
             row.topic,
             role=_text_role(row, "text"),
             mono=True,
-            is_struck_out=gone,
+            is_struck_out=is_gone,
             indent=INDENT,
             elide_middle=True,
         )
-    chip = pgettext("node", "new") if row.node.is_new and not gone else None
+    chip = pgettext("node", "new") if row.node.is_new and not is_gone else None
     icon = "chevron-down" if row.is_expanded else "chevron-right"
-    return Cell(row.node.name, icon, _text_role(row, "text"), bold=bool(chip), is_struck_out=gone, chip=chip)
+    return Cell(
+        row.node.name, icon, _text_role(row, "text"), bold=bool(chip), is_struck_out=is_gone, chip=chip
+    )
 
 
 def generation_cell(row: NodeRow) -> Cell:
     """Return the cell with a node's kind (native, original, bridge), or a topic's direction and rate."""
     if row.topic:
         rate = row.rate(row.topic_key) if row.rate is not None and row.direction == PUBLISHES else ""
-        said = _("publishes {rate}/s").format(rate=rate) if rate else _(row.direction)
+        text = _("publishes {rate}/s").format(rate=rate) if rate else _(row.direction)
         if row.is_pattern:
-            said = _("all matching topics")
-        return Cell(said, role=_text_role(row, "textTertiary"))
+            text = _("all matching topics")
+        return Cell(text, role=_text_role(row, "textTertiary"))
     if row.node.is_bridge:
         return Cell(pgettext("node", "bridge"), "arrow-left-right", _text_role(row, "textSecondary"))
     if row.node.generation in UNSUPPORTED_VERSIONS:
@@ -218,10 +220,12 @@ def _name_tip(row: NodeRow) -> str:
     if not row.topic:
         return details_text(row.node)
     if row.is_pattern:
-        said = _("{node} subscribes to all topics that match {pattern}")
-        return said.format(node=row.node.name, pattern=row.topic)
-    said = _("{node} publishes {topic}") if row.direction == PUBLISHES else _("{node} subscribes to {topic}")
-    return said.format(node=row.node.name, topic=row.topic)
+        template = _("{node} subscribes to all topics that match {pattern}")
+        return template.format(node=row.node.name, pattern=row.topic)
+    template = (
+        _("{node} publishes {topic}") if row.direction == PUBLISHES else _("{node} subscribes to {topic}")
+    )
+    return template.format(node=row.node.name, topic=row.topic)
 
 
 def _generation_tip(row: NodeRow) -> str:
@@ -229,8 +233,8 @@ def _generation_tip(row: NodeRow) -> str:
         return _name_tip(row)
     if row.node.network:
         return limits_text(row.node) or _("On {network}").format(network=generation_text(row.node))
-    said = _("Uses nep: messages have sequence numbers and time stamps, and losses are counted")
-    return limits_text(row.node) or said
+    text = _("Uses nep: messages have sequence numbers and time stamps, and losses are counted")
+    return limits_text(row.node) or text
 
 
 def _cpu_tip(row: NodeRow) -> str:
@@ -278,15 +282,15 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
 )  # fmt: skip
 
 
-def columns(own: Callable[[NodeEntry], bool]) -> tuple[Column[NodeRow], ...]:
+def columns(is_own: Callable[[NodeEntry], bool]) -> tuple[Column[NodeRow], ...]:
     """Return the columns of the table.
 
     Args:
-        own: Returns True for Studio's own nodes, which are never shown as new.
+        is_own: Returns True for Studio's own nodes, which are never shown as new.
     """
 
     def node_name_cell(row: NodeRow) -> Cell:
         cell = name_cell(row)
-        return replace(cell, bold=False, chip=None) if cell.chip and own(row.node) else cell
+        return replace(cell, bold=False, chip=None) if cell.chip and is_own(row.node) else cell
 
     return (replace(COLUMNS[0], cell=node_name_cell), *COLUMNS[1:])

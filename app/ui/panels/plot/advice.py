@@ -20,10 +20,10 @@ class PlotAdvice(QWidget):
     """Line with a hint, hidden while there is nothing to explain.
 
     Args:
-        ask: Opens the connection doctor for a topic.
+        on_click: Opens the connection doctor for a topic.
     """
 
-    def __init__(self, theme: Theme, ask: Callable[[str], object]) -> None:
+    def __init__(self, theme: Theme, on_click: Callable[[str], object]) -> None:
         super().__init__()
         self.topic = ""
         """Topic without data, or ""."""
@@ -31,7 +31,7 @@ class PlotAdvice(QWidget):
         self._words.setMinimumWidth(0)
         self.why = LinkButton(theme, _("Why is nothing shown?"))
         self.why.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
-        self.why.clicked.connect(lambda: ask(self.topic))
+        self.why.clicked.connect(lambda: on_click(self.topic))
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 2, 12, 2)
         row.setSpacing(8)
@@ -42,24 +42,26 @@ class PlotAdvice(QWidget):
         """Return the text of the hint, or ""."""
         return self._words.text()
 
-    def show_for(self, curves: Curves, shown: Sequence[PlotCurve]) -> None:
+    def show_for(self, curves: Curves, plot_curves: Sequence[PlotCurve]) -> None:
         """Show the hint that applies to some curves, or hide the line.
 
         Args:
             curves: All curves of the plot.
-            shown: The same curves with their display settings.
+            plot_curves: The same curves with their display settings.
         """
-        said = next(filter(None, (curves.no_values_reason(each.curve) for each in shown)), "")
-        empty = [each for each in shown if not said and not _has_data(each)]
-        topics = sorted(topics_of(empty[0].curve.source)) if shown and len(empty) == len(shown) else []
+        message = next(filter(None, (curves.no_values_reason(each.curve) for each in plot_curves)), "")
+        empty = [each for each in plot_curves if not message and not _has_data(each)]
+        topics = (
+            sorted(topics_of(empty[0].curve.source)) if plot_curves and len(empty) == len(plot_curves) else []
+        )
         self.topic = topics[0] if topics else ""
         if self.topic:
-            said = _("No values that can be plotted yet.")
-        self._words.setText(said)
+            message = _("No values that can be plotted yet.")
+        self._words.setText(message)
         show_when(self.why, bool(self.topic))
-        show_when(self, bool(said))
+        show_when(self, bool(message))
 
 
-def _has_data(shown: PlotCurve) -> bool:
-    curve = shown.curve
+def _has_data(plot_curve: PlotCurve) -> bool:
+    curve = plot_curve.curve
     return bool(len(curve.samples) or (curve.states is not None and len(curve.states)))

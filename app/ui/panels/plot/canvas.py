@@ -84,8 +84,8 @@ class ValueRange:
         if self.is_manual or not (math.isfinite(low) and math.isfinite(high)):
             return False
         span = high - low
-        inside = self.low <= low and high <= self.high and not self.is_new
-        if inside and span >= 0.5 * (self.high - self.low):
+        is_within = self.low <= low and high <= self.high and not self.is_new
+        if is_within and span >= 0.5 * (self.high - self.low):
             return False
         room = span * 0.08 or abs(high) * 0.1 or 1.0
         self.low, self.high = max(-MAX_ABS_VALUE, low - room), min(MAX_ABS_VALUE, high + room)
@@ -104,8 +104,10 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph is untyped
         # pyqtgraph omits labels that exceed the bounding rectangle, such as the time of day at the edge.
         return QRectF(super().boundingRect()).adjusted(-LABEL_OVERHANG, 0, LABEL_OVERHANG, 0)
 
-    def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
-        return readable_levels(super().tickSpacing(least, most, size), most - least, size, TICK_SPACING_X)
+    def tickSpacing(self, min_value: float, max_value: float, size: float) -> list[tuple[float, float]]:
+        return readable_levels(
+            super().tickSpacing(min_value, max_value, size), max_value - min_value, size, TICK_SPACING_X
+        )
 
     def tickStrings(self, values: Sequence[float], _scale: float, spacing: float) -> list[str]:
         return [self.clock if abs(value) < spacing / 100 else time_label(value, spacing) for value in values]
@@ -114,9 +116,11 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph is untyped
 class ValueAxis(pg.AxisItem):  # type: ignore[misc]
     """Axis of numbers; the labels have as many decimals as the tick spacing requires."""
 
-    def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
+    def tickSpacing(self, min_value: float, max_value: float, size: float) -> list[tuple[float, float]]:
         apart = TICK_SPACING_Y if self.orientation in {"left", "right"} else TICK_SPACING_X
-        return readable_levels(super().tickSpacing(least, most, size), most - least, size, apart)
+        return readable_levels(
+            super().tickSpacing(min_value, max_value, size), max_value - min_value, size, apart
+        )
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
         return [value_label(value * scale, spacing * scale) for value in values]
@@ -133,8 +137,8 @@ def readable_levels(
         size: Length of the axis in px.
         apart: Minimum distance of labels in px.
     """
-    fitting = [level for level in levels if span > 0 and level[0] / span * size >= apart]
-    return fitting[-1:] or levels[:1]
+    readable = [level for level in levels if span > 0 and level[0] / span * size >= apart]
+    return readable[-1:] or levels[:1]
 
 
 def time_label(value_s: float, spacing_s: float) -> str:
@@ -145,11 +149,11 @@ def time_label(value_s: float, spacing_s: float) -> str:
         spacing_s: Distance between ticks in s, which determines unit and decimals.
     """
     if spacing_s >= 60:
-        words = _("{minutes} min").format(minutes=number(round(abs(value_s) / 60, 3)))
+        text = _("{minutes} min").format(minutes=number(round(abs(value_s) / 60, 3)))
     else:
         digits = max(0, math.ceil(-math.log10(spacing_s) - 1e-9)) if spacing_s < 1 else 0
-        words = f"{number(abs(value_s), f'.{min(digits, 6)}f')} s"
-    return f"{MINUS if value_s < 0 else '+'}{words}"
+        text = f"{number(abs(value_s), f'.{min(digits, 6)}f')} s"
+    return f"{MINUS if value_s < 0 else '+'}{text}"
 
 
 def value_label(value: float, spacing: float) -> str:
@@ -299,8 +303,10 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             right: True for the right axis, False for the left one.
             area: Value of the property `area`, to avoid computing it repeatedly.
         """
-        area, shown = area or self.area, self.ranges["right" if right else "left"]
-        return area.bottom() - (value - shown.low) / (shown.high - shown.low) * area.height()
+        area, value_range = area or self.area, self.ranges["right" if right else "left"]
+        return (
+            area.bottom() - (value - value_range.low) / (value_range.high - value_range.low) * area.height()
+        )
 
     def show_lines(self, lines: Sequence[tuple[PlotCurve, Polyline]], clock_s: float) -> None:
         """Draw curves in place of the previous ones.
@@ -309,17 +315,17 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             lines: Curves with their points.
             clock_s: Time of day at the origin of the time axis, in s since 1970.
         """
-        shown = {curve.name for curve, _line in lines}
-        for name in [name for name in self._lines if name not in shown]:
+        names = {curve.name for curve, _line in lines}
+        for name in [name for name in self._lines if name not in names]:
             item = self._lines.pop(name)
             item.getViewBox().removeItem(item)
         self._show_axes([curve for curve, _line in lines])
         self._fit_values(lines)
         self.signs = []
-        for place, (curve, line) in enumerate(lines):
+        for index, (curve, line) in enumerate(lines):
             self._show_line(curve, line)
             if len(lines) > 1 and self._is_dense(line, right=curve.right):
-                self._add_marks(curve, place / len(lines))
+                self._add_marks(curve, index / len(lines))
         self._show_clock(clock_s)
         self.view.setXRange(self.begin_s - self.anchor_s, self.end_s - self.anchor_s, padding=0)
         self.viewport().update()
@@ -346,50 +352,52 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         # True for many points, and for steep oscillations.
         if len(line.times) > MAX_ANTIALIASED_POINTS or not line.is_complete:
             return True
-        shown = self.ranges["right" if right else "left"]
+        value_range = self.ranges["right" if right else "left"]
         with np.errstate(over="ignore", invalid="ignore"):
-            travelled = float(np.nansum(np.abs(np.diff(line.values)))) / (shown.high - shown.low)
+            travelled = float(np.nansum(np.abs(np.diff(line.values)))) / (value_range.high - value_range.low)
         return not travelled * self.area.height() < DENSE_TRAVEL_RATIO * self.area.width()
 
     def _add_marks(self, curve: PlotCurve, shift: float) -> None:
         # Dense lines have no dashes; marks at fixed times identify them instead.
         step_s = (self.end_s - self.begin_s) / DENSE_LINE_MARKS
         first = math.floor(self.begin_s / step_s) + shift
-        for place in range(DENSE_LINE_MARKS + 1):
-            time_s = (first + place) * step_s
-            found = curve.curve.samples.at(time_s)
-            if found is not None and self.begin_s <= time_s <= self.end_s:
-                self.signs.append((curve, *found))
+        for index in range(DENSE_LINE_MARKS + 1):
+            time_s = (first + index) * step_s
+            sample = curve.curve.samples.at(time_s)
+            if sample is not None and self.begin_s <= time_s <= self.end_s:
+                self.signs.append((curve, *sample))
 
     def _show_axes(self, curves: Sequence[PlotCurve]) -> None:
         for name, right in (("left", False), ("right", True)):
-            there = [curve for curve in curves if curve.right is right]
+            axis_curves = [curve for curve in curves if curve.right is right]
             axis = self.plot.getAxis(name)
-            ink = (
-                there[0].look.line_colour(self.theme)
-                if len(there) == 1
+            colour = (
+                axis_curves[0].look.line_colour(self.theme)
+                if len(axis_curves) == 1
                 else self.theme.colour("textSecondary")
             )
-            axis.setTextPen(ink)
-            axis.setStyle(showValues=bool(there))
+            axis.setTextPen(colour)
+            axis.setStyle(showValues=bool(axis_curves))
 
     def _fit_values(self, lines: Sequence[tuple[PlotCurve, Polyline]]) -> None:
         for name, right, view in (("left", False, self.view), ("right", True, self.right_view)):
-            shown = self.ranges[name]
-            found = [line.values for curve, line in lines if curve.right is right and len(line.values)]
-            good = [each[np.isfinite(each)] for each in found]
-            good = [each for each in good if len(each)]
-            if good:
-                shown.fit(min(float(each.min()) for each in good), max(float(each.max()) for each in good))
-            view.setYRange(shown.low, shown.high, padding=0)
+            value_range = self.ranges[name]
+            arrays = [line.values for curve, line in lines if curve.right is right and len(line.values)]
+            finite = [each[np.isfinite(each)] for each in arrays]
+            finite = [each for each in finite if len(each)]
+            if finite:
+                value_range.fit(
+                    min(float(each.min()) for each in finite), max(float(each.max()) for each in finite)
+                )
+            view.setYRange(value_range.low, value_range.high, padding=0)
 
     def _show_clock(self, clock_s: float) -> None:
         try:
-            words = f"{datetime.fromtimestamp(clock_s):%H:%M:%S}"  # noqa: DTZ006  local time, as on the person's clock
+            text = f"{datetime.fromtimestamp(clock_s):%H:%M:%S}"  # noqa: DTZ006  local time, as on the person's clock
         except (OverflowError, ValueError, OSError):
-            words = "0 s"
-        if words != self.time_axis.clock:
-            self.time_axis.clock = words
+            text = "0 s"
+        if text != self.time_axis.clock:
+            self.time_axis.clock = text
             self.time_axis.picture = None
             self.time_axis.update()
 
@@ -400,51 +408,54 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             factor: Factor by which the length of the range is multiplied.
             shift: Shift relative to the length of the range.
         """
-        for shown in self.ranges.values():
-            middle, half = (shown.low + shown.high) / 2, (shown.high - shown.low) / 2 * factor
+        for value_range in self.ranges.values():
+            middle, half = (
+                (value_range.low + value_range.high) / 2,
+                (value_range.high - value_range.low) / 2 * factor,
+            )
             middle += shift * 2 * half
             if 1e-300 < half < MAX_ABS_VALUE and abs(middle) < MAX_ABS_VALUE:
-                shown.low, shown.high, shown.is_manual = middle - half, middle + half, True
+                value_range.low, value_range.high, value_range.is_manual = middle - half, middle + half, True
         self.values_changed.emit()
 
     def reset_value_ranges(self) -> None:
         """Enable the automatic range of the value axes."""
-        for shown in self.ranges.values():
-            shown.is_manual, shown.is_new = False, True
+        for value_range in self.ranges.values():
+            value_range.is_manual, value_range.is_new = False, True
         self.values_changed.emit()
 
     # -- cursors ------------------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        began = time.thread_time()
+        start_s = time.thread_time()
         super().paintEvent(event)
         painter = QPainter(self.viewport())
         self.paint_cursors(painter)
         painter.end()
-        self.painted_s += time.thread_time() - began
+        self.painted_s += time.thread_time() - start_s
 
     def paint_cursors(self, painter: QPainter) -> None:
         """Paint the cursors A and B, and the marks of curves, over the curves."""
         area, theme = self.area, self.theme
-        places = {name: self.x_of(time_s, area) for name, time_s in self.cursors.items()}
-        inside = {name: x for name, x in places.items() if area.left() - 1 <= x <= area.right() + 1}
+        positions = {name: self.x_of(time_s, area) for name, time_s in self.cursors.items()}
+        visible = {name: x for name, x in positions.items() if area.left() - 1 <= x <= area.right() + 1}
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        if len(places) == 2:
-            left, right = sorted(min(max(x, area.left()), area.right()) for x in places.values())
+        if len(positions) == 2:
+            left, right = sorted(min(max(x, area.left()), area.right()) for x in positions.values())
             tint = theme.colour("text")
             tint.setAlphaF(CURSOR_RANGE_ALPHA)
             painter.fillRect(QRectF(left, area.top(), right - left, area.height()), tint)
         pen = QPen(theme.colour("text"), 1.25)
         pen.setDashPattern([1.5, 2.5])
-        for x in inside.values():
+        for x in visible.values():
             painter.setPen(pen)
             painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()))
         for curve, time_s, value in (*self.signs, *self.marks):
             x, y = self.x_of(time_s, area), self.y_of(value, right=curve.right, area=area)
             if area.left() <= x <= area.right() and area.top() - 1 <= y <= area.bottom() + 1:
                 curve.look.paint_mark(painter, theme, QPointF(x, y), 9)
-        self._paint_distance(painter, places)
-        for name, x in inside.items():
+        self._paint_distance(painter, positions)
+        for name, x in visible.items():
             flag = self._flag_rect(x)
             paint.box(painter, flag, theme.radius("key"), theme.colour("tooltip"))
             font = theme.font("small")
@@ -452,33 +463,33 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             paint.text_line(painter, flag, name, font, theme.colour("tooltipText"), paint.CENTRE)
 
     def _flag_rect(self, x: float) -> QRectF:
-        wide, high = (
+        width, height = (
             self.theme.scaled(FLAG_SIZE.width()),
             min(FLAG_SPACE - 2.0, self.theme.scaled(FLAG_SIZE.height())),
         )
-        return QRectF(x - wide / 2, self.area.top() - high - 3, wide, high)
+        return QRectF(x - width / 2, self.area.top() - height - 3, width, height)
 
-    def _paint_distance(self, painter: QPainter, places: dict[str, float]) -> None:
-        if len(places) < 2:
+    def _paint_distance(self, painter: QPainter, positions: dict[str, float]) -> None:
+        if len(positions) < 2:
             return
-        left, right = sorted(places.values())
+        left, right = sorted(positions.values())
         distance_s = abs(self.cursors["A"] - self.cursors["B"])
-        words = distance_text(distance_s)
+        text = distance_text(distance_s)
         font = self.theme.font("small")
         font.setWeight(QFont.Weight.DemiBold)
-        wide, edge = paint.width_of(font, words), self.theme.scaled(FLAG_SIZE.width()) / 2
-        if right - left > wide + 2 * edge + 12:
-            place = self._flag_rect((left + right) / 2)
-            box = QRectF(place.center().x() - wide / 2 - 1, place.top(), wide + 3, place.height())
-            paint.text_line(painter, box, words, font, self.theme.colour("text"), paint.CENTRE)
+        width, edge = paint.width_of(font, text), self.theme.scaled(FLAG_SIZE.width()) / 2
+        if right - left > width + 2 * edge + 12:
+            flag = self._flag_rect((left + right) / 2)
+            box = QRectF(flag.center().x() - width / 2 - 1, flag.top(), width + 3, flag.height())
+            paint.text_line(painter, box, text, font, self.theme.colour("text"), paint.CENTRE)
 
-    def _cursor_at(self, place: QPointF) -> str | None:
+    def _cursor_at(self, position: QPointF) -> str | None:
         # Hit test of the cursors' flags and lines.
         for name, time_s in reversed(self.cursors.items()):
             x = self.x_of(time_s)
-            if self._flag_rect(x).adjusted(-4, -4, 4, 4).contains(place):
+            if self._flag_rect(x).adjusted(-4, -4, 4, 4).contains(position):
                 return name
-            if abs(place.x() - x) <= HIT_WIDTH_PX / 2 and self.area.contains(place):
+            if abs(position.x() - x) <= HIT_WIDTH_PX / 2 and self.area.contains(position):
                 return name
         return None
 
@@ -486,28 +497,28 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
-        place = event.position()
+        position = event.position()
         if event.button() == Qt.MouseButton.LeftButton:
-            self._held = (self._cursor_at(place) or "", place)
+            self._held = (self._cursor_at(position) or "", position)
             event.accept()
         else:
             event.ignore()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        place = event.position()
-        self.mouse_s = self.time_at(place.x()) if self.area.contains(place) else None
+        position = event.position()
+        self.mouse_s = self.time_at(position.x()) if self.area.contains(position) else None
         if self._held is None:
-            over = self._cursor_at(place) is not None
-            self.setCursor(Qt.CursorShape.SizeHorCursor if over else Qt.CursorShape.ArrowCursor)
+            is_over_cursor = self._cursor_at(position) is not None
+            self.setCursor(Qt.CursorShape.SizeHorCursor if is_over_cursor else Qt.CursorShape.ArrowCursor)
             return
         name, before = self._held
         if name:
-            self.cursor_moved.emit(name, self.time_at(place.x()))
+            self.cursor_moved.emit(name, self.time_at(position.x()))
         else:
-            self.moved.emit(self.time_at(before.x()) - self.time_at(place.x()))
+            self.moved.emit(self.time_at(before.x()) - self.time_at(position.x()))
             if event.modifiers() & Qt.KeyboardModifier.ControlModifier:
-                self.scale_values(shift=(place.y() - before.y()) / max(1.0, self.area.height()))
-        self._held = (name, place)
+                self.scale_values(shift=(position.y() - before.y()) / max(1.0, self.area.height()))
+        self._held = (name, position)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         self._held = None
@@ -545,10 +556,10 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        found = dropped_field(event.mimeData())
-        if found is not None:
+        field = dropped_field(event.mimeData())
+        if field is not None:
             event.acceptProposedAction()
-            self.field_dropped.emit(*found)
+            self.field_dropped.emit(*field)
 
 
 def distance_text(distance_s: float) -> str:

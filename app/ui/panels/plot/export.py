@@ -103,8 +103,8 @@ class PlotPicture:
     def size(self) -> QSize:
         """Size in px."""
         row = round(self._theme.scaled(LEGEND_ROW_HEIGHT))
-        high = sum(size.height() for size, _paint in self._parts) + row * len(self._curves) + 8
-        return QSize(max(size.width() for size, _paint in self._parts), high)
+        height = sum(size.height() for size, _paint in self._parts) + row * len(self._curves) + 8
+        return QSize(max(size.width() for size, _paint in self._parts), height)
 
     def paint(self, painter: QPainter) -> None:
         """Paint the image with its top left corner at the origin."""
@@ -144,12 +144,12 @@ class PlotPicture:
         """Return the image as SVG."""
         buffer = QBuffer()
         buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-        made = QSvgGenerator()
-        made.setOutputDevice(buffer)
-        made.setSize(self.size)
-        made.setViewBox(QRect(0, 0, self.size.width(), self.size.height()))
-        made.setTitle("NEP Studio")
-        painter = QPainter(made)
+        generator = QSvgGenerator()
+        generator.setOutputDevice(buffer)
+        generator.setSize(self.size)
+        generator.setViewBox(QRect(0, 0, self.size.width(), self.size.height()))
+        generator.setTitle("NEP Studio")
+        painter = QPainter(generator)
         self.paint(painter)
         painter.end()
         return bytes(buffer.data().data())
@@ -161,7 +161,7 @@ class PlotExport:
     Args:
         parts: Returns size and paint function of the canvas and of the lanes.
         curves: Returns the curves of the plot.
-        shown: Returns start and end of the visible range in s.
+        visible_range: Returns start and end of the visible range in s.
     """
 
     def __init__(
@@ -169,9 +169,9 @@ class PlotExport:
         context: PanelContext,
         parts: Callable[[], Iterable[PicturePart]],
         curves: Callable[[], Sequence[PlotCurve]],
-        shown: Callable[[], tuple[float, float]],
+        visible_range: Callable[[], tuple[float, float]],
     ) -> None:
-        self._context, self._parts, self._curves, self._shown = context, parts, curves, shown
+        self._context, self._parts, self._curves, self._shown = context, parts, curves, visible_range
         self._writer: CsvWriter | None = None
 
     def menu(self, parent: QWidget) -> Menu:
@@ -222,10 +222,10 @@ class PlotExport:
 
     def _report(self, path: Path, reason: str) -> None:
         if reason:
-            said = _("can't write {file}: {reason}").format(file=path.name, reason=reason)
+            message = _("can't write {file}: {reason}").format(file=path.name, reason=reason)
         else:
-            said = _("Exported {file}").format(file=path.name)
-        self._context.show_toast(said)
+            message = _("Exported {file}").format(file=path.name)
+        self._context.show_toast(message)
 
     def close(self) -> None:
         """Wait for a running export to finish."""

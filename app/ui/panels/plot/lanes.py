@@ -97,8 +97,8 @@ class StateLanes(QWidget):
         for curve, run, box in self.boxes():
             paint_state(painter, theme, box, curve.look)
             if box.width() >= MIN_WORD_WIDTH:
-                inside = box.adjusted(6, 0, -4, 0)
-                paint.text_line(painter, inside, run.value or "", theme.font("small"), theme.colour("text"))
+                text_box = box.adjusted(6, 0, -4, 0)
+                paint.text_line(painter, text_box, run.value or "", theme.font("small"), theme.colour("text"))
         self._paint_cursors(painter)
 
     def _paint_cursors(self, painter: QPainter) -> None:
@@ -106,20 +106,20 @@ class StateLanes(QWidget):
         pen = QPen(self._theme.colour("text"), 1.25)
         pen.setDashPattern([1.5, 2.5])
         painter.setPen(pen)
-        high = self._lane_height() * len(self.curves)
+        height = self._lane_height() * len(self.curves)
         for time_s in self._canvas.cursors.values():
             x = self._canvas.x_of(time_s)
             if area.left() <= x <= area.right():
-                painter.drawLine(QPointF(x, 0), QPointF(x, high))
+                painter.drawLine(QPointF(x, 0), QPointF(x, height))
 
     def event(self, event: QEvent) -> bool:
         if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
-            place = QPointF(event.pos())
-            found = (run.value for _curve, run, box in self.boxes() if box.contains(place))
-            word = next(found, None)
-            row = int(place.y() // self._lane_height())
+            position = QPointF(event.pos())
+            values = (run.value for _curve, run, box in self.boxes() if box.contains(position))
+            value = next(values, None)
+            row = int(position.y() // self._lane_height())
             name = self.curves[row].name if row < len(self.curves) else ""
-            QToolTip.showText(event.globalPos(), plain.tip(word or name), self)
+            QToolTip.showText(event.globalPos(), plain.tip(value or name), self)
             return True
         return super().event(event)
 

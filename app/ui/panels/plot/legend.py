@@ -39,114 +39,116 @@ class LegendStats:
         self.begin_s, self.end_s, self.cursors = begin_s, end_s, cursors
         self._kept.clear()
 
-    def stats_for(self, shown: PlotCurve) -> RangeStats:
+    def stats_for(self, plot_curve: PlotCurve) -> RangeStats:
         """Return minimum, maximum and mean of a curve."""
-        found = self._kept.get(shown.name)
-        if found is None:
-            found = self._kept[shown.name] = shown.curve.samples.stats(self.begin_s, self.end_s)
-        return found
+        stats = self._kept.get(plot_curve.name)
+        if stats is None:
+            stats = self._kept[plot_curve.name] = plot_curve.curve.samples.stats(self.begin_s, self.end_s)
+        return stats
 
-    def value_at_cursor(self, shown: PlotCurve, which: int) -> float | str | None:
+    def value_at_cursor(self, plot_curve: PlotCurve, which: int) -> float | str | None:
         """Return the value of a curve at a cursor, or None if there is no value or no cursor.
 
         Args:
-            shown: Curve.
+            plot_curve: Curve.
             which: 0 for cursor A, 1 for cursor B.
         """
         if self.cursors is None:
             return None
         time_s = self.cursors[which]
-        if shown.curve.is_state:
-            return shown.curve.states.at(time_s) if shown.curve.states is not None else None
-        found = shown.curve.samples.at(time_s)
-        return found[1] if found is not None else None
+        if plot_curve.curve.is_state:
+            return plot_curve.curve.states.at(time_s) if plot_curve.curve.states is not None else None
+        sample = plot_curve.curve.samples.at(time_s)
+        return sample[1] if sample is not None else None
 
 
 class _CellFactory:
     """Functions that create the cells of the columns."""
 
-    def __init__(self, figures: LegendStats, is_gone: Callable[[PlotCurve], bool]) -> None:
-        self.figures, self._is_gone = figures, is_gone
+    def __init__(self, stats: LegendStats, is_gone: Callable[[PlotCurve], bool]) -> None:
+        self.figures, self._is_gone = stats, is_gone
 
     @staticmethod
-    def _role(shown: PlotCurve) -> str:
-        return "textDisabled" if shown.is_hidden else "text"
+    def _role(plot_curve: PlotCurve) -> str:
+        return "textDisabled" if plot_curve.is_hidden else "text"
 
     @staticmethod
-    def eye(shown: PlotCurve) -> Cell:
-        name = "eye-off" if shown.is_hidden else "eye"
-        words = pgettext("curve", "hidden") if shown.is_hidden else pgettext("curve", "shown")
+    def eye(plot_curve: PlotCurve) -> Cell:
+        name = "eye-off" if plot_curve.is_hidden else "eye"
+        text = pgettext("curve", "hidden") if plot_curve.is_hidden else pgettext("curve", "shown")
         return Cell(
-            icon=name, role="textTertiary" if shown.is_hidden else "textSecondary", accessible_text=words
+            icon=name, role="textTertiary" if plot_curve.is_hidden else "textSecondary", accessible_text=text
         )
 
     @staticmethod
-    def stroke(shown: PlotCurve) -> Cell:
-        look = shown.look
+    def stroke(plot_curve: PlotCurve) -> Cell:
+        look = plot_curve.look
         return Cell(
-            mark=Stroke(look, shown.curve.is_state, shown.is_hidden),
+            mark=Stroke(look, plot_curve.curve.is_state, plot_curve.is_hidden),
             accessible_text=_(COLOUR_NAMES[look.colour % len(COLOUR_NAMES)]),
         )
 
-    def name(self, shown: PlotCurve) -> Cell:
-        is_field = isinstance(shown.curve.source, FieldSource)
+    def name(self, plot_curve: PlotCurve) -> Cell:
+        is_field = isinstance(plot_curve.curve.source, FieldSource)
         icon = None if is_field else "square-function"
-        gone = self._is_gone(shown)
-        return Cell(shown.name, icon, self._role(shown), mono=True, elide_middle=True, is_struck_out=gone)
+        is_gone = self._is_gone(plot_curve)
+        return Cell(
+            plot_curve.name, icon, self._role(plot_curve), mono=True, elide_middle=True, is_struck_out=is_gone
+        )
 
-    def axis(self, shown: PlotCurve) -> Cell:
-        if shown.curve.is_state:
-            words = _("yes or no") if isinstance(shown.curve.last, bool) else _("text")
+    def axis(self, plot_curve: PlotCurve) -> Cell:
+        if plot_curve.curve.is_state:
+            text = _("yes or no") if isinstance(plot_curve.curve.last, bool) else _("text")
         else:
-            words = pgettext("axis", "right") if shown.right else pgettext("axis", "left")
-        return Cell(words, role="textSecondary" if not shown.is_hidden else "textDisabled")
+            text = pgettext("axis", "right") if plot_curve.right else pgettext("axis", "left")
+        return Cell(text, role="textSecondary" if not plot_curve.is_hidden else "textDisabled")
 
-    def last(self, shown: PlotCurve) -> Cell:
-        return Cell(value_text(shown.curve.last), role=self._role(shown))
+    def last(self, plot_curve: PlotCurve) -> Cell:
+        return Cell(value_text(plot_curve.curve.last), role=self._role(plot_curve))
 
-    def at_a(self, shown: PlotCurve) -> Cell:
-        return Cell(value_text(self.figures.value_at_cursor(shown, 0)), role=self._role(shown))
+    def at_a(self, plot_curve: PlotCurve) -> Cell:
+        return Cell(value_text(self.figures.value_at_cursor(plot_curve, 0)), role=self._role(plot_curve))
 
-    def at_b(self, shown: PlotCurve) -> Cell:
-        return Cell(value_text(self.figures.value_at_cursor(shown, 1)), role=self._role(shown))
+    def at_b(self, plot_curve: PlotCurve) -> Cell:
+        return Cell(value_text(self.figures.value_at_cursor(plot_curve, 1)), role=self._role(plot_curve))
 
-    def difference(self, shown: PlotCurve) -> Cell:
-        figures = self.figures
-        if figures.cursors is None:
+    def difference(self, plot_curve: PlotCurve) -> Cell:
+        stats = self.figures
+        if stats.cursors is None:
             return Cell()
-        if shown.curve.is_state and shown.curve.states is not None:
-            begin_s, end_s = sorted(figures.cursors)
-            if isinstance(shown.curve.last, bool):
-                lasted = seconds_text(shown.curve.states.duration_s("true", begin_s, end_s))
-                words = _("true for {seconds}").format(seconds=lasted)
+        if plot_curve.curve.is_state and plot_curve.curve.states is not None:
+            begin_s, end_s = sorted(stats.cursors)
+            if isinstance(plot_curve.curve.last, bool):
+                lasted = seconds_text(plot_curve.curve.states.duration_s("true", begin_s, end_s))
+                text = _("true for {seconds}").format(seconds=lasted)
             else:
-                count = shown.curve.states.change_count(begin_s, end_s)
-                words = ngettext("{count} change", "{count} changes", count).format(count=count)
-            return Cell(words, role=self._role(shown), bold=True)
-        first, second = figures.value_at_cursor(shown, 0), figures.value_at_cursor(shown, 1)
+                count = plot_curve.curve.states.change_count(begin_s, end_s)
+                text = ngettext("{count} change", "{count} changes", count).format(count=count)
+            return Cell(text, role=self._role(plot_curve), bold=True)
+        first, second = stats.value_at_cursor(plot_curve, 0), stats.value_at_cursor(plot_curve, 1)
         if not (isinstance(first, float) and isinstance(second, float)):
             return Cell()
-        return Cell(number_text(second - first), role=self._role(shown), bold=True)
+        return Cell(number_text(second - first), role=self._role(plot_curve), bold=True)
 
     def stat(self, which: str) -> Callable[[PlotCurve], Cell]:
-        def cell(shown: PlotCurve) -> Cell:
-            found = None if shown.curve.is_state else getattr(self.figures.stats_for(shown), which)
-            return Cell("" if found is None else number_text(found), role=self._role(shown))
+        def cell(plot_curve: PlotCurve) -> Cell:
+            value = None if plot_curve.curve.is_state else getattr(self.figures.stats_for(plot_curve), which)
+            return Cell("" if value is None else number_text(value), role=self._role(plot_curve))
 
         return cell
 
 
 def columns(
-    figures: LegendStats, has_cursors: Callable[[], bool], is_gone: Callable[[PlotCurve], bool]
+    stats: LegendStats, has_cursors: Callable[[], bool], is_gone: Callable[[PlotCurve], bool]
 ) -> tuple[Column[PlotCurve], ...]:
     """Return the columns of the legend.
 
     Args:
-        figures: Statistics of the curves.
+        stats: Statistics of the curves.
         has_cursors: Returns True if there are cursors; the columns about A and B are hidden otherwise.
         is_gone: Returns True for a curve whose topic no longer exists.
     """
-    cells = _CellFactory(figures, is_gone)
+    cells = _CellFactory(stats, is_gone)
     between = {"is_numeric": True, "is_available": has_cursors}
     return (
         Column("eye", "", 34, cells.eye, label=lazy("Shown")),
@@ -185,90 +187,92 @@ class LegendTable(TableView[PlotCurve]):
         self.opened.connect(self._handle_enter)
 
     def _press(self, index: QModelIndex) -> None:
-        shown = self._model.row_at(index)
+        plot_curve = self._model.row_at(index)
         column = self.columns[index.column()].name
-        if shown is None:
+        if plot_curve is None:
             return
         if column == "eye":
-            self.toggle_visibility(shown)
+            self.toggle_visibility(plot_curve)
         elif column == "stroke":
-            self._open_curve_menu(shown, self.visualRect(index).bottomLeft())
+            self._open_curve_menu(plot_curve, self.visualRect(index).bottomLeft())
 
     def _handle_enter(self, key: str) -> None:
         # Enter opens the menu; a click does so only on the sample of the line.
         if self.keyboard:
             index = self._model.index_of(key)
-            shown = self._model.row_at(index)
-            if shown is not None:
-                self._open_curve_menu(shown, self.visualRect(index).bottomLeft())
+            plot_curve = self._model.row_at(index)
+            if plot_curve is not None:
+                self._open_curve_menu(plot_curve, self.visualRect(index).bottomLeft())
 
-    def toggle_visibility(self, shown: PlotCurve) -> None:
+    def toggle_visibility(self, plot_curve: PlotCurve) -> None:
         """Toggle the visibility of a curve."""
-        shown.is_hidden = not shown.is_hidden
+        plot_curve.is_hidden = not plot_curve.is_hidden
         self.changed.emit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        shown = self._model.row_at(self.currentIndex())
-        if shown is not None and event.key() in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace}:
-            self.removed.emit(shown.name)
-        elif shown is not None and event.key() == Qt.Key.Key_H and not event.modifiers():
-            self.toggle_visibility(shown)
+        plot_curve = self._model.row_at(self.currentIndex())
+        if plot_curve is not None and event.key() in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace}:
+            self.removed.emit(plot_curve.name)
+        elif plot_curve is not None and event.key() == Qt.Key.Key_H and not event.modifiers():
+            self.toggle_visibility(plot_curve)
         elif event.text().isprintable() and event.text().strip() != "/" and event.text():
             event.ignore()  # handled by the plot panel
         else:
             super().keyPressEvent(event)
 
-    def _show_menu(self, at: QPoint) -> None:
-        index = self.indexAt(at)
-        shown = self._model.row_at(index)
-        if shown is not None:
-            self._open_curve_menu(shown, at)
+    def _show_menu(self, position: QPoint) -> None:
+        index = self.indexAt(position)
+        plot_curve = self._model.row_at(index)
+        if plot_curve is not None:
+            self._open_curve_menu(plot_curve, position)
 
-    def _open_curve_menu(self, shown: PlotCurve, at: QPoint) -> None:
-        menu = self.menu_of(shown)
+    def _open_curve_menu(self, plot_curve: PlotCurve, position: QPoint) -> None:
+        menu = self.menu_of(plot_curve)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.popup(self.viewport().mapToGlobal(at))
+        menu.popup(self.viewport().mapToGlobal(position))
 
-    def menu_of(self, shown: PlotCurve) -> Menu:
+    def menu_of(self, plot_curve: PlotCurve) -> Menu:
         """Return the context menu of a curve."""
         menu = Menu(self.theme, self)
-        if not shown.curve.is_state:
-            for right, words in ((False, _("Left axis")), (True, _("Right axis"))):
-                action = menu.addAction(words)
+        if not plot_curve.curve.is_state:
+            for right, text in ((False, _("Left axis")), (True, _("Right axis"))):
+                action = menu.addAction(text)
                 action.setCheckable(True)
-                action.setChecked(shown.right is right)
-                action.triggered.connect(lambda _on=False, right=right: self._set_axis(shown, right=right))
+                action.setChecked(plot_curve.right is right)
+                action.triggered.connect(
+                    lambda _on=False, right=right: self._set_axis(plot_curve, right=right)
+                )
             menu.addSeparator()
-        for number, words in enumerate(COLOUR_NAMES):
-            action = menu.addAction(_(words))
+        for number, text in enumerate(COLOUR_NAMES):
+            action = menu.addAction(_(text))
             action.setCheckable(True)
-            action.setChecked(shown.look.colour % len(COLOUR_NAMES) == number)
-            action.triggered.connect(lambda _on=False, number=number: self._set_colour(shown, number))
+            action.setChecked(plot_curve.look.colour % len(COLOUR_NAMES) == number)
+            action.triggered.connect(lambda _on=False, number=number: self._set_colour(plot_curve, number))
         menu.addSeparator()
         hide = menu.addAction(
-            self.theme.icon("eye" if shown.is_hidden else "eye-off"),
-            _("Show") if shown.is_hidden else _("Hide"),
+            self.theme.icon("eye" if plot_curve.is_hidden else "eye-off"),
+            _("Show") if plot_curve.is_hidden else _("Hide"),
         )
-        hide.triggered.connect(lambda: self.toggle_visibility(shown))
+        hide.triggered.connect(lambda: self.toggle_visibility(plot_curve))
         copy = menu.addAction(self.theme.icon("copy"), _("Copy name"))
-        copy.triggered.connect(lambda: self.copy_requested.emit(shown.name))
+        copy.triggered.connect(lambda: self.copy_requested.emit(plot_curve.name))
         remove = menu.addAction(self.theme.icon("trash-2"), _("Remove"))
-        remove.triggered.connect(lambda: self.removed.emit(shown.name))
+        remove.triggered.connect(lambda: self.removed.emit(plot_curve.name))
         return menu
 
-    def _set_axis(self, shown: PlotCurve, *, right: bool) -> None:
-        shown.right = right
+    def _set_axis(self, plot_curve: PlotCurve, *, right: bool) -> None:
+        plot_curve.right = right
         self.changed.emit()
 
-    def _set_colour(self, shown: PlotCurve, number: int) -> None:
-        shown.look = CurveLook(number, shown.look.pattern)
+    def _set_colour(self, plot_curve: PlotCurve, number: int) -> None:
+        plot_curve.look = CurveLook(number, plot_curve.look.pattern)
         self.changed.emit()
 
 
-def next_look(there: Sequence[PlotCurve]) -> CurveLook:
+def next_look(curves: Sequence[PlotCurve]) -> CurveLook:
     """Return a style for a new curve, with the colour and the pattern that the fewest curves have."""
-    colours = [shown.look.colour % len(COLOUR_NAMES) for shown in there]
-    patterns = [shown.look.pattern % 4 for shown in there]
+    colours = [curve.look.colour % len(COLOUR_NAMES) for curve in curves]
+    patterns = [curve.look.pattern % 4 for curve in curves]
     colour = min(range(len(COLOUR_NAMES)), key=lambda each: (colours.count(each), each))
     pattern = min(range(4), key=lambda each: (patterns.count(each), each))
     return CurveLook(colour, pattern)
@@ -286,7 +290,7 @@ def caption_text(curves: Curves, *, has_cursors: bool, distance: float | None) -
     parts = [about if has_cursors else _("Min, max and mean of the visible range")]
     if distance is not None:
         parts.append(_("A to B: {distance}").format(distance=number_text(distance)))
-    for count, words in (
+    for count, template in (
         (curves.lost, ngettext("{count} message lost: a gap", "{count} messages lost: gaps", curves.lost)),
         (
             curves.unread_count,
@@ -308,5 +312,5 @@ def caption_text(curves: Curves, *, has_cursors: bool, distance: float | None) -
         ),
     ):
         if count:
-            parts.append(words.format(count=group_digits(count)))
+            parts.append(template.format(count=group_digits(count)))
     return " · ".join(parts)

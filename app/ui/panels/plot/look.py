@@ -69,12 +69,12 @@ class CurveLook:
             case 1:
                 painter.drawRect(QRectF(centre.x() - half, centre.y() - half, size, size))
             case 2:
-                far = half + 0.5
-                around = [(0.0, -far), (far, half), (-far, half)]
+                extent = half + 0.5
+                around = [(0.0, -extent), (extent, half), (-extent, half)]
                 painter.drawPolygon(QPolygonF([centre + QPointF(x, y) for x, y in around]))
             case _:
-                far = half + 1
-                around = [(0.0, -far), (far, 0.0), (0.0, far), (-far, 0.0)]
+                extent = half + 1
+                around = [(0.0, -extent), (extent, 0.0), (0.0, extent), (-extent, 0.0)]
                 painter.drawPolygon(QPolygonF([centre + QPointF(x, y) for x, y in around]))
 
 
@@ -97,13 +97,13 @@ class Stroke:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setOpacity(0.35 if self.is_hidden else 1.0)
         middle = box.center().y()
-        wide = min(box.width(), 34.0)
+        width = min(box.width(), 34.0)
         if self.is_state:
-            paint_state(painter, theme, QRectF(box.left(), middle - 7, wide, 14), self.look)
+            paint_state(painter, theme, QRectF(box.left(), middle - 7, width, 14), self.look)
         else:
             painter.setPen(self.look.pen(theme))
-            painter.drawLine(QPointF(box.left(), middle), QPointF(box.left() + wide, middle))
-            self.look.paint_mark(painter, theme, QPointF(box.left() + wide / 2, middle))
+            painter.drawLine(QPointF(box.left(), middle), QPointF(box.left() + width, middle))
+            self.look.paint_mark(painter, theme, QPointF(box.left() + width / 2, middle))
         painter.setOpacity(1.0)
 
 

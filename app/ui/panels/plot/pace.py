@@ -42,9 +42,9 @@ class DrawThrottle:
     @contextmanager
     def measure(self, painted: TimedWidget) -> Iterator[None]:
         """Measure one drawing within a ``with`` block, and the painting since the previous drawing."""
-        began = time.thread_time()
+        start_s = time.thread_time()
         yield
-        self.add_sample(time.thread_time() - began + painted.painted_s - self._painted_s)
+        self.add_sample(time.thread_time() - start_s + painted.painted_s - self._painted_s)
         self._painted_s = painted.painted_s
 
     def add_sample(self, seconds: float) -> None:
@@ -61,5 +61,5 @@ class DrawThrottle:
         Args:
             pixel_s: Time in s in which the data moves by one pixel, which is the minimum interval.
         """
-        least, most = DRAW_INTERVAL_TICKS
-        return round(min(most, max(least, pixel_s * 30, self.drawing_s / MAX_CPU_SHARE * 30)))
+        min_ticks, max_ticks = DRAW_INTERVAL_TICKS
+        return round(min(max_ticks, max(min_ticks, pixel_s * 30, self.drawing_s / MAX_CPU_SHARE * 30)))

@@ -124,11 +124,11 @@ class PlotPanel(PanelWidget):
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
         self.pages.addWidget(body)
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.setSpacing(0)
-        whole.addWidget(self.tools)
-        whole.addWidget(self.pages, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(self.tools)
+        layout.addWidget(self.pages, 1)
         self.setFocusProxy(self.canvas)
 
     def _make_lower(self) -> QWidget:
@@ -142,10 +142,10 @@ class PlotPanel(PanelWidget):
             label("", "small", role="textTertiary"),
         )
         self.about.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        foot = QHBoxLayout()
-        foot.setContentsMargins(12, 4, 12, 5)
-        foot.addWidget(self.about, 1)
-        foot.addWidget(self.points)
+        footer = QHBoxLayout()
+        footer.setContentsMargins(12, 4, 12, 5)
+        footer.addWidget(self.about, 1)
+        footer.addWidget(self.points)
         self.advice = PlotAdvice(self.theme, lambda topic: self.context.open_doctor(self, topic))
         body = QWidget()
         column = QVBoxLayout(body)
@@ -156,7 +156,7 @@ class PlotPanel(PanelWidget):
         column.addWidget(Separator(self.theme))
         column.addWidget(self.table)
         column.addWidget(Separator(self.theme))
-        column.addLayout(foot)
+        column.addLayout(footer)
         return body
 
     def _connect_canvas(self) -> None:
@@ -169,14 +169,14 @@ class PlotPanel(PanelWidget):
 
     def source_changed(self) -> None:
         """Plot the same fields from the new source."""
-        kept = self.save_state()
+        state = self.save_state()
         self.tools.add.dispose()
         self.curves.close()
         self.curves = Curves(self.session.series, self._topic_names)
         self.shown.clear()
         self.canvas.cursors.clear()
         self.cursors.setChecked(False)
-        self.restore_state(kept)
+        self.restore_state(state)
 
     def _topic_names(self) -> list[str]:
         topics = [*self.session.topics, *self.session.networks.topics]
@@ -200,47 +200,47 @@ class PlotPanel(PanelWidget):
 
     def _add_typed(self, text: str, right: bool) -> None:
         try:
-            made = self.curves.add(text)
+            curves = self.curves.add(text)
         except CurveError as error:
             self.add.show_error(_as_sentence(error))
             return
-        if not made:
+        if not curves:
             self.add.show_error(_("{field} is already shown.").format(field=text))
             return
         self.add.clear()
         self.add.dispose()
-        self._add_curves(made, right=right)
+        self._add_curves(curves, right=right)
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _add_curves(self, made: Sequence[Curve], *, right: bool) -> None:
-        for curve in made:
+    def _add_curves(self, curves: Sequence[Curve], *, right: bool) -> None:
+        for curve in curves:
             self.shown.append(PlotCurve(curve, next_look(self.shown), right))
         self._curves_changed()
 
     def remove(self, name: str) -> None:
         """Remove a curve; the toast offers to undo the removal."""
-        found = next((each for each in self.shown if each.name == name), None)
-        if found is None:
+        plot_curve = next((each for each in self.shown if each.name == name), None)
+        if plot_curve is None:
             return
-        place = self.shown.index(found)
-        self.shown.remove(found)
-        self.curves.remove(found.curve)
+        index = self.shown.index(plot_curve)
+        self.shown.remove(plot_curve)
+        self.curves.remove(plot_curve.curve)
         self._curves_changed()
-        said = _("Removed {field}").format(field=name)
-        self.context.show_toast(said, _("Undo"), lambda: self._restore_removed(found, place))
+        message = _("Removed {field}").format(field=name)
+        self.context.show_toast(message, _("Undo"), lambda: self._restore_removed(plot_curve, index))
 
-    def _restore_removed(self, before: PlotCurve, place: int) -> None:
+    def _restore_removed(self, before: PlotCurve, index: int) -> None:
         self._restore_curve(before.to_json())
         if self.shown and self.shown[-1].name == before.name:
-            self.shown.insert(place, self.shown.pop())
+            self.shown.insert(index, self.shown.pop())
         self._curves_changed()
 
     def _copy_path(self, name: str) -> None:
         QGuiApplication.clipboard().setText(name)
         self.context.show_toast(_("Copied {path}").format(path=name))
 
-    def _is_gone(self, shown: PlotCurve) -> bool:
-        for name in topics_of(shown.curve.source):
+    def _is_gone(self, plot_curve: PlotCurve) -> bool:
+        for name in topics_of(plot_curve.curve.source):
             topic = self.session.topic(name)
             if topic is None or topic.gone_s is not None:
                 return True
@@ -309,16 +309,16 @@ class PlotPanel(PanelWidget):
         return self.across.isChecked() and self._numeric_count() > 1
 
     def _pairs(self) -> list[tuple[PlotCurve, PlotCurve]]:
-        there = [each for each in self.shown if not each.is_hidden and not each.curve.is_state]
-        return list(zip(there[0::2], there[1::2], strict=False))
+        visible = [each for each in self.shown if not each.is_hidden and not each.curve.is_state]
+        return list(zip(visible[0::2], visible[1::2], strict=False))
 
     def _mark_cursors(self, lines: Sequence[tuple[PlotCurve, object]]) -> None:
         marks = []
         for curve, _line in lines:
             for time_s in self.canvas.cursors.values():
-                found = curve.curve.samples.at(time_s)
-                if found is not None:
-                    marks.append((curve, time_s, found[1]))
+                sample = curve.curve.samples.at(time_s)
+                if sample is not None:
+                    marks.append((curve, time_s, sample[1]))
         self.canvas.marks = marks
 
     def _update_stats(self) -> None:
@@ -330,16 +330,16 @@ class PlotPanel(PanelWidget):
         self.table.refresh_visible()
         distance = self.xy.distance() if self.is_xy else None
         self.about.setText(caption_text(self.curves, has_cursors=both is not None, distance=distance))
-        count, whole = self._points
+        count, is_complete = self._points
         points = ngettext("{count} point", "{count} points", count).format(count=group_digits(count))
-        words = _("{points}, all shown") if whole else _("{points}, downsampled to 2 per pixel")
-        self.points.setText(words.format(points=points))
+        text = _("{points}, all shown") if is_complete else _("{points}, downsampled to 2 per pixel")
+        self.points.setText(text.format(points=points))
         self.advice.show_for(self.curves, self.shown)
 
     def _curves_changed(self) -> None:
-        there = bool(self.shown)
-        self.pages.setCurrentIndex(1 if there else 0)
-        show_when(self.freeze, there)
+        has_curves = bool(self.shown)
+        self.pages.setCurrentIndex(1 if has_curves else 0)
+        show_when(self.freeze, has_curves)
         self.tools.update_tools(len(self.shown), self._numeric_count())
         self.drawings.setCurrentIndex(1 if self.is_xy else 0)
         self.model.set_rows(self.shown)
@@ -389,16 +389,16 @@ class PlotPanel(PanelWidget):
         self._schedule_redraw()
 
     def _update_span(self) -> None:
-        chosen = self.view.selected_span()
-        if chosen:
-            self.span.set_value(chosen)
+        selected = self.view.selected_span()
+        if selected:
+            self.span.set_value(selected)
         else:
             self.span.clear_selection()
 
     # -- cursors ------------------------------------------------------------------------------------------
 
-    def _show_cursors(self, shown: bool) -> None:
-        if not shown:
+    def _show_cursors(self, is_visible: bool) -> None:
+        if not is_visible:
             self.canvas.cursors.clear()
             self.canvas.marks = []
         else:
@@ -424,9 +424,9 @@ class PlotPanel(PanelWidget):
         first = next((each for each in self.shown if not each.is_hidden and len(each.curve.samples)), None)
         if time_s is None or first is None:
             return False
-        beside = first.curve.samples.time_at_step(time_s, steps)
-        if beside is not None:
-            self._set_cursor(self._last_cursor, beside)
+        target_s = first.curve.samples.time_at_step(time_s, steps)
+        if target_s is not None:
+            self._set_cursor(self._last_cursor, target_s)
         return True
 
     # -- keys and drops -----------------------------------------------------------------------------------
@@ -438,24 +438,24 @@ class PlotPanel(PanelWidget):
     def _handle_key(self, event: QKeyEvent) -> bool:
         if event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier):
             return False
-        far = 10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
+        steps = 10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
         replay = self.session.replay  # Space controls an open recording
-        does: dict[int, Callable[[], object]] = {
+        actions: dict[int, Callable[[], object]] = {
             Qt.Key.Key_C: self.focus_filter,
             Qt.Key.Key_M: self.cursors.toggle,
             Qt.Key.Key_A: lambda: self._set_cursor_at_mouse("A"),
             Qt.Key.Key_B: lambda: self._set_cursor_at_mouse("B"),
             Qt.Key.Key_Space: self.freeze.toggle if replay is None else replay.toggle,
-            Qt.Key.Key_Left: lambda: self._handle_arrow(-far),
-            Qt.Key.Key_Right: lambda: self._handle_arrow(far),
+            Qt.Key.Key_Left: lambda: self._handle_arrow(-steps),
+            Qt.Key.Key_Right: lambda: self._handle_arrow(steps),
             Qt.Key.Key_Plus: lambda: self._zoom(1 / 1.5, self._middle_s()),
             Qt.Key.Key_Minus: lambda: self._zoom(1.5, self._middle_s()),
             Qt.Key.Key_0: self._show_all,
         }
-        wanted = does.get(event.key())
-        if wanted is None or (event.key() != Qt.Key.Key_C and not self.shown):
+        action = actions.get(event.key())
+        if action is None or (event.key() != Qt.Key.Key_C and not self.shown):
             return False
-        wanted()
+        action()
         return True
 
     def _middle_s(self) -> float:
@@ -472,8 +472,8 @@ class PlotPanel(PanelWidget):
 
     def _set_cursor_at_mouse(self, name: str) -> None:
         # Places the cursor under the mouse, or in the middle if the mouse is elsewhere.
-        here = self.canvas.mouse_s
-        self._set_cursor(name, self._middle_s() if here is None else here)
+        mouse_s = self.canvas.mouse_s
+        self._set_cursor(name, self._middle_s() if mouse_s is None else mouse_s)
 
     def focus_filter(self) -> bool:
         self.add.prompt(self.add.text())
@@ -484,24 +484,24 @@ class PlotPanel(PanelWidget):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        found = dropped_field(event.mimeData())
-        if found is not None:
+        field = dropped_field(event.mimeData())
+        if field is not None:
             event.acceptProposedAction()
-            self.plot_field(*found)
+            self.plot_field(*field)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         self._show_menu(event.globalPos())
 
-    def _show_menu(self, at: QPoint) -> None:
+    def _show_menu(self, position: QPoint) -> None:
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addActions(self.more_actions())
-        menu.popup(at)
+        menu.popup(position)
 
     # -- export -------------------------------------------------------------------------------------------
 
     def more_actions(self) -> list[QAction]:
-        made = []
+        actions = []
         rows: tuple[tuple[str, str, Callable[[], object]], ...] = (
             (_("Add a curve"), "plus", self.focus_filter),
             (_("Show everything"), "maximize", self._show_all),
@@ -509,15 +509,15 @@ class PlotPanel(PanelWidget):
             (_("Export image (PNG)"), "image", lambda: self.exporter.prompt_file(PNG_KIND)),
             (_("Export vector image (SVG)"), "spline", lambda: self.exporter.prompt_file(SVG_KIND)),
         )
-        for words, icon, does in rows:
-            action = QAction(self.theme.icon(icon), words, self)
-            action.triggered.connect(lambda _on=False, does=does: does())
-            action.setEnabled(bool(self.shown) or does == self.focus_filter)
-            made.append(action)
+        for text, icon, callback in rows:
+            action = QAction(self.theme.icon(icon), text, self)
+            action.triggered.connect(lambda _on=False, does=callback: does())
+            action.setEnabled(bool(self.shown) or callback == self.focus_filter)
+            actions.append(action)
         for old in self._menu_actions:
             old.deleteLater()
-        self._menu_actions = made
-        return made
+        self._menu_actions = actions
+        return actions
 
     _menu_actions: Sequence[QAction] = ()
 
@@ -527,9 +527,9 @@ class PlotPanel(PanelWidget):
         canvas, xy, lanes = self.canvas, self.xy, self.lanes
 
         def paint_curves(painter: QPainter, box: QRectF) -> None:
-            shown = xy if self.is_xy else canvas
-            shown.render(painter, box, shown.viewport().rect())
-            if shown is xy:
+            widget = xy if self.is_xy else canvas
+            widget.render(painter, box, widget.viewport().rect())
+            if widget is xy:
                 xy.paint_marks(painter)
             else:
                 canvas.paint_cursors(painter)
@@ -554,10 +554,10 @@ class PlotPanel(PanelWidget):
         }
 
     def restore_state(self, state: Mapping[str, object]) -> None:
-        kept = state.get("curves")
-        for each in kept[:MAX_CURVES] if isinstance(kept, list) else ():
-            if isinstance(each, Mapping):
-                self._restore_curve(each)
+        curves = state.get("curves")
+        for saved in curves[:MAX_CURVES] if isinstance(curves, list) else ():
+            if isinstance(saved, Mapping):
+                self._restore_curve(saved)
         span = state.get("span")
         if isinstance(span, (int, float)) and 0 <= span <= 1e8:
             self.view.set_span(float(span))
@@ -568,18 +568,18 @@ class PlotPanel(PanelWidget):
 
     def _restore_curve(self, saved: Mapping[str, object]) -> None:
         topic, path, text, topics = (saved.get(name) for name in ("topic", "path", "text", "topics"))
-        known = [each for each in topics if isinstance(each, str)] if isinstance(topics, list) else []
+        topic_names = [each for each in topics if isinstance(each, str)] if isinstance(topics, list) else []
         try:
             if isinstance(topic, str) and isinstance(path, str):
-                made = self.curves.add_field(topic, FieldPath.parse(path))
+                curves = self.curves.add_field(topic, FieldPath.parse(path))
             else:
-                made = self.curves.add(text if isinstance(text, str) else "", known)
+                curves = self.curves.add(text if isinstance(text, str) else "", topic_names)
         except CurveError:
             return
-        for curve in made:
-            shown = PlotCurve(curve, parse_look(saved, next_look(self.shown)))
-            shown.right, shown.is_hidden = saved.get("right") is True, saved.get("hidden") is True
-            self.shown.append(shown)
+        for curve in curves:
+            plot_curve = PlotCurve(curve, parse_look(saved, next_look(self.shown)))
+            plot_curve.right, plot_curve.is_hidden = saved.get("right") is True, saved.get("hidden") is True
+            self.shown.append(plot_curve)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -597,5 +597,5 @@ class PlotPanel(PanelWidget):
 
 
 def _as_sentence(error: CurveError) -> str:
-    words = str(error)
-    return f"{words[:1].upper()}{words[1:]}" if words.endswith("?") else f"{words[:1].upper()}{words[1:]}."
+    text = str(error)
+    return f"{text[:1].upper()}{text[1:]}" if text.endswith("?") else f"{text[:1].upper()}{text[1:]}."

@@ -40,7 +40,7 @@ class PlotCurve:
     def to_json(self) -> dict[str, object]:
         """Return the state for the layout."""
         source = self.curve.source
-        kept: dict[str, object] = {
+        state: dict[str, object] = {
             "text": self.name,
             "right": self.right,
             "hidden": self.is_hidden,
@@ -48,8 +48,8 @@ class PlotCurve:
             "pattern": self.look.pattern,
         }
         if isinstance(source, FieldSource):
-            kept |= {"topic": source.topic, "path": str(source.path)}
-        return kept
+            state |= {"topic": source.topic, "path": str(source.path)}
+        return state
 
 
 def parse_look(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
@@ -89,8 +89,8 @@ def number_text(value: float) -> str:
     if size and not 1e-4 <= size < 1e7:
         return number(value, ".1e").replace("-", MINUS)
     digits = 0 if not size else 4 if size < 0.1 else 3 if size < 100 else 1 if size < 10_000 else 0
-    words = number(round(value, digits) + 0.0, f".{digits}f")
-    return words.replace("-", MINUS)
+    text = number(round(value, digits) + 0.0, f".{digits}f")
+    return text.replace("-", MINUS)
 
 
 def _to_float(value: int) -> float:

@@ -40,13 +40,17 @@ class TimeView:
             return min(oldest_s, end_s - MIN_SPAN_S), end_s
         return end_s - self.span_s, end_s
 
-    def pause(self, shown: tuple[float, float]) -> None:
+    def pause(self, visible_range: tuple[float, float]) -> None:
         """Fix the range, so that it no longer follows new data.
 
         Args:
-            shown: Start and end of the range in s.
+            visible_range: Start and end of the range in s.
         """
-        self.span_s, self.is_all, self.paused_end_s = _clamp_span(shown[1] - shown[0]), False, shown[1]
+        self.span_s, self.is_all, self.paused_end_s = (
+            _clamp_span(visible_range[1] - visible_range[0]),
+            False,
+            visible_range[1],
+        )
 
     def resume(self) -> None:
         """Follow new data again. The length of the range stays the same."""
@@ -62,29 +66,29 @@ class TimeView:
         if span_s > 0:
             self.span_s = span_s
 
-    def zoom(self, factor: float, at_s: float, shown: tuple[float, float]) -> None:
+    def zoom(self, factor: float, at_s: float, visible_range: tuple[float, float]) -> None:
         """Scale the length of the range.
 
         Args:
             factor: Factor by which the length is multiplied.
             at_s: Time in s that stays at its place. While the range follows new data, this is the end
                 instead.
-            shown: Start and end of the visible range in s.
+            visible_range: Start and end of the visible range in s.
         """
-        span_s = _clamp_span((shown[1] - shown[0]) * factor)
-        share = (shown[1] - at_s) / max(MIN_SPAN_S, shown[1] - shown[0])
+        span_s = _clamp_span((visible_range[1] - visible_range[0]) * factor)
+        share = (visible_range[1] - at_s) / max(MIN_SPAN_S, visible_range[1] - visible_range[0])
         self.span_s, self.is_all = span_s, False
         if self.paused_end_s is not None:
             self.paused_end_s = at_s + share * span_s
 
-    def move(self, by_s: float, shown: tuple[float, float]) -> None:
+    def move(self, by_s: float, visible_range: tuple[float, float]) -> None:
         """Shift the range and fix it.
 
         Args:
             by_s: Shift in s.
-            shown: Start and end of the visible range in s.
+            visible_range: Start and end of the visible range in s.
         """
-        self.pause((shown[0] + by_s, shown[1] + by_s))
+        self.pause((visible_range[0] + by_s, visible_range[1] + by_s))
 
     def selected_span(self) -> str:
         """Return the key in `SPANS` for the current length, or "" if the length is not one of them."""

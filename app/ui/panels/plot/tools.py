@@ -64,12 +64,12 @@ class FieldCatalog:
 
     def _candidate_topics(self) -> list[Topic]:
         topics = [*self._session.topics.existing_topics(), *self._session.networks.topics]
-        fitting = [
+        candidates = [
             topic
             for topic in topics
             if topic.codec not in {"image", "bytes"} and (topic.bandwidth_Bps or 0.0) <= MAX_BYTES_PER_S
         ]
-        return fitting[:MAX_TOPICS]
+        return candidates[:MAX_TOPICS]
 
     def names(self) -> list[str]:
         """Return the keys of all topics."""
@@ -79,17 +79,17 @@ class FieldCatalog:
 
     def fields(self) -> Iterable[tuple[str, PlottableField]]:
         """Yield the fields that can be plotted, each with the expression that plots it."""
-        told = 0
+        count = 0
         for key in self._watches:
             topic = self._session.topic(key)
             newest = topic.newest if topic is not None else None
             if newest is None or newest.size_bytes > LARGE_BYTES:
                 continue
             reading = read(newest)
-            for found in fields_of(reading.value, 400) if reading.error is None else ():
-                yield str(FieldSource(key, found.path)), found
-                told += 1
-                if told >= MAX_FIELDS:
+            for field in fields_of(reading.value, 400) if reading.error is None else ():
+                yield str(FieldSource(key, field.path)), field
+                count += 1
+                if count >= MAX_FIELDS:
                     return
 
 
@@ -193,14 +193,14 @@ class AddCurveField(SearchField):
             self.end(False)  # the focus selected everything; typing would replace it
         self._search()
 
-    def show_error(self, sentence: str) -> None:
+    def show_error(self, message: str) -> None:
         """Show why the text is not a valid curve. The text stays in the field.
 
         Args:
-            sentence: Reason; "" removes the message.
+            message: Reason; "" removes the message.
         """
-        self.sentence = sentence
-        self.setProperty("wrong", "true" if sentence else "false")
+        self.sentence = message
+        self.setProperty("wrong", "true" if message else "false")
         self.style().unpolish(self)
         self.style().polish(self)
         self._update_footer(0)
@@ -213,46 +213,48 @@ class AddCurveField(SearchField):
         before = len(self._known)
         self._read_fields()
         if len(self._known) != before:
-            self._search(keep=True)
+            self._search(keep_selection=True)
             return
-        shown = self.matches.list
-        for line in list(shown.lines.lines):
-            found = None if isinstance(line, Heading) else self._known.get(line.entry.text)
-            if found is not None and not isinstance(line, Heading):
-                shown.update_entry(line.entry.id, _value_note(found))
+        match_list = self.matches.list
+        for line in list(match_list.lines.lines):
+            field = None if isinstance(line, Heading) else self._known.get(line.entry.text)
+            if field is not None and not isinstance(line, Heading):
+                match_list.update_entry(line.entry.id, _value_note(field))
 
     def _read_fields(self) -> None:
         self._known = dict(self.offers.fields())
 
-    def _search(self, *_text: object, keep: bool = False) -> None:
+    def _search(self, *_text: object, keep_selection: bool = False) -> None:
         if not self.hasFocus():
             return
-        if not keep:
+        if not keep_selection:
             if self.sentence:
                 self.show_error("")
             self._read_fields()
         typed = self.text().strip()
         lines, count = self._lines(typed)
         matches = self.matches
-        chosen = matches.list.entry if keep else None
-        matches.list.show_lines(lines, chosen.id if chosen is not None else "")
+        selected = matches.list.entry if keep_selection else None
+        matches.list.show_lines(lines, selected.id if selected is not None else "")
         self._update_footer(count)
         self._position_matches(bool(lines))
 
     def _lines(self, typed: str) -> tuple[list[Line], int]:
         fields = [
-            Entry(f"topic:{text}", text, ICONS[found.kind], _value_note(found))
-            for text, found in self._known.items()
+            Entry(f"topic:{text}", text, ICONS[matches.kind], _value_note(matches))
+            for text, matches in self._known.items()
         ]
         if typed:
-            found, count = Finder(fields).find(typed, MAX_SHOWN)
+            matches, count = Finder(fields).find(typed, MAX_SHOWN)
         else:
-            found, count = [Match(entry) for entry in fields[:MAX_SHOWN]], len(fields)
-        lines: list[Line] = [Heading(_("Fields")), *found] if found else []
+            matches, count = [Match(entry) for entry in fields[:MAX_SHOWN]], len(fields)
+        lines: list[Line] = [Heading(_("Fields")), *matches] if matches else []
         names = [example.split("(")[0] for example in EXAMPLE_EXPRESSIONS]
-        of = next(iter(self._plotted()), None) or (found[0].entry.text if found else "/odom.speed")
+        example_field = next(iter(self._plotted()), None) or (
+            matches[0].entry.text if matches else "/odom.speed"
+        )
         calculated = [
-            Entry(f"topic:{example.format(of)}", example.format(of), "square-function")
+            Entry(f"topic:{example.format(example_field)}", example.format(example_field), "square-function")
             for name, example in zip(names, EXAMPLE_EXPRESSIONS, strict=True)
             if not typed or name.startswith(typed.partition("(")[0])
         ]
@@ -263,27 +265,32 @@ class AddCurveField(SearchField):
     def _update_footer(self, count: int) -> None:
         if self._matches is None:
             return
-        words = _("Tab completes; Enter adds to the left axis, Shift+Enter to the right one")
+        hint = _("Tab completes; Enter adds to the left axis, Shift+Enter to the right one")
         fit = ngettext("{count} field", "{count} fields", count).format(count=count)
-        self._matches.foot.setText(self.sentence or f"{words} · {fit}")
+        self._matches.foot.setText(self.sentence or f"{hint} · {fit}")
         self._matches.foot.setProperty("role", "error" if self.sentence else "textTertiary")
         self._matches.foot.style().unpolish(self._matches.foot)
         self._matches.foot.style().polish(self._matches.foot)
 
-    def _position_matches(self, shown: bool) -> None:
+    def _position_matches(self, has_lines: bool) -> None:
         matches = self.matches
-        if not shown and not self.sentence:
+        if not has_lines and not self.sentence:
             matches.hide()
             return
         window = self.window()
-        at = self.mapTo(window, QPoint(0, self.height() + 4))
-        foot = matches.foot.sizeHint()
-        wide = min(max(round(self._theme.scaled(MATCHES_WIDTH)), foot.width() + 4), window.width() - 8)
-        high = min(
-            matches.list.content_height() + foot.height() + 12, round(self._theme.scaled(MATCHES_HEIGHT))
+        position = self.mapTo(window, QPoint(0, self.height() + 4))
+        footer_size = matches.foot.sizeHint()
+        width = min(
+            max(round(self._theme.scaled(MATCHES_WIDTH)), footer_size.width() + 4), window.width() - 8
         )
-        high = min(high, window.height() - at.y() - 4)
-        matches.setGeometry(min(at.x(), window.width() - wide - 4), at.y(), wide, max(60, high))
+        height = min(
+            matches.list.content_height() + footer_size.height() + 12,
+            round(self._theme.scaled(MATCHES_HEIGHT)),
+        )
+        height = min(height, window.height() - position.y() - 4)
+        matches.setGeometry(
+            min(position.x(), window.width() - width - 4), position.y(), width, max(60, height)
+        )
         matches.show()
         matches.raise_()
 
@@ -307,15 +314,15 @@ class AddCurveField(SearchField):
         typed = self.text()
         if not typed:
             return typed
-        head = max(typed.rfind(sign) for sign in "( ,+*") + 1
-        before, last = typed[:head], typed[head:]
-        known = [
+        start = max(typed.rfind(sign) for sign in "( ,+*") + 1
+        before, last = typed[:start], typed[start:]
+        candidates = [
             *self._known,
             *self.offers.names(),
             *(f"{name}(" for name in (*FUNCTIONS, *WINDOW_FUNCTIONS)),
         ]
-        longer = complete(last, known) if last else last
-        if longer == last and self._matches is not None and not head:
+        longer = complete(last, candidates) if last else last
+        if longer == last and self._matches is not None and not start:
             entry = self._matches.list.entry
             if entry is not None and last and entry.text != last and match(last, entry.text) is not None:
                 return entry.text
@@ -348,10 +355,10 @@ class AddCurveField(SearchField):
             self.add_requested.emit(text, right)
 
 
-def _value_note(found: PlottableField) -> str:
-    if found.kind == "list":
-        return ngettext("{count} curve", "{count} curves", found.count).format(count=found.count)
-    return value_text(found.value)
+def _value_note(field: PlottableField) -> str:
+    if field.kind == "list":
+        return ngettext("{count} curve", "{count} curves", field.count).format(count=field.count)
+    return value_text(field.value)
 
 
 SPAN_LABELS = {"12": lazy("12 s"), "60": lazy("1 min"), "300": lazy("5 min"), "all": lazy("All")}

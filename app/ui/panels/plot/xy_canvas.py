@@ -26,11 +26,11 @@ ARROW_SIZE = 7.0
 Path = tuple[PlotCurve, PlotCurve, Floats, Floats, Floats]
 
 
-def path_of(across: PlotCurve, up: PlotCurve, begin_s: float, end_s: float) -> tuple[Floats, Floats, Floats]:
+def path_of(x_curve: PlotCurve, up: PlotCurve, begin_s: float, end_s: float) -> tuple[Floats, Floats, Floats]:
     """Return the points of one curve against another.
 
     Args:
-        across: Curve with the x coordinates; its times are used.
+        x_curve: Curve with the x coordinates; its times are used.
         up: Curve with the y coordinates.
         begin_s: Start of the time range in s.
         end_s: End of the time range in s.
@@ -38,7 +38,7 @@ def path_of(across: PlotCurve, up: PlotCurve, begin_s: float, end_s: float) -> t
     Returns:
         Times, x and y coordinates of at most `MAX_POINTS` points.
     """
-    samples = across.curve.samples
+    samples = x_curve.curve.samples
     first, end = samples.index_range(begin_s, end_s)
     step = max(1, math.ceil((end - first) / MAX_POINTS))
     part = slice(first, end, step)
@@ -100,17 +100,17 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
             begin_s: Start of the time range in s.
             end_s: End of the time range in s.
         """
-        self._paths = [(across, up, *path_of(across, up, begin_s, end_s)) for across, up in pairs]
-        used = 0
+        self._paths = [(x_curve, up, *path_of(x_curve, up, begin_s, end_s)) for x_curve, up in pairs]
+        count = 0
         for _across, up, times, xs, ys in self._paths:
             for shade in range(SHADE_COUNT):
                 first = shade * len(times) // SHADE_COUNT
                 last = (shade + 1) * len(times) // SHADE_COUNT + 1
-                ink = up.look.line_colour(self.theme)
-                ink.setAlphaF(MIN_ALPHA + (1 - MIN_ALPHA) * (shade + 1) / SHADE_COUNT)
-                self._line(used).setData(xs[first:last], ys[first:last], pen=pg.mkPen(ink, width=1.75))
-                used += 1
-        for line in self._lines[used:]:
+                colour = up.look.line_colour(self.theme)
+                colour.setAlphaF(MIN_ALPHA + (1 - MIN_ALPHA) * (shade + 1) / SHADE_COUNT)
+                self._line(count).setData(xs[first:last], ys[first:last], pen=pg.mkPen(colour, width=1.75))
+                count += 1
+        for line in self._lines[count:]:
             line.setData([], [])
         self._fit()
         self.viewport().update()
@@ -122,13 +122,15 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
         return self._lines[number]
 
     def _fit(self) -> None:
-        found = [
-            (xs[good], ys[good]) for _a, _u, _t, xs, ys in self._paths if (good := _finite_mask(xs, ys)).any()
+        points = [
+            (xs[finite], ys[finite])
+            for _a, _u, _t, xs, ys in self._paths
+            if (finite := _finite_mask(xs, ys)).any()
         ]
-        if not found:
+        if not points:
             return
         edges = [
-            (min(float(each[axis].min()) for each in found), max(float(each[axis].max()) for each in found))
+            (min(float(each[axis].min()) for each in points), max(float(each[axis].max()) for each in points))
             for axis in (0, 1)
         ]
         (left, right), (low, high) = ((a, b) if b > a else (a - 1, b + 1) for a, b in edges)
@@ -149,8 +151,8 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
 
     @staticmethod
     def _point_at(path: Path, time_s: float) -> tuple[float, float] | None:
-        across, up = path[0].curve.samples.at(time_s), path[1].curve.samples.at(time_s)
-        return (across[1], up[1]) if across is not None and up is not None else None
+        x_sample, up = path[0].curve.samples.at(time_s), path[1].curve.samples.at(time_s)
+        return (x_sample[1], up[1]) if x_sample is not None and up is not None else None
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
@@ -175,15 +177,16 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
 
     def _paint_arrow(self, painter: QPainter, path: Path) -> None:
         _across, up, _times, xs, ys = path
-        (good,) = np.nonzero(_finite_mask(xs, ys))
-        if len(good) < 2:
+        (finite,) = np.nonzero(_finite_mask(xs, ys))
+        if len(finite) < 2:
             return
-        tip = self.position_of(float(xs[good[-1]]), float(ys[good[-1]]))
+        tip = self.position_of(float(xs[finite[-1]]), float(ys[finite[-1]]))
         before = next(
             (
-                place
-                for index in reversed(good[-60:-1].tolist())
-                if _distance_between(place := self.position_of(float(xs[index]), float(ys[index])), tip) > 3
+                position
+                for index in reversed(finite[-60:-1].tolist())
+                if _distance_between(position := self.position_of(float(xs[index]), float(ys[index])), tip)
+                > 3
             ),
             None,
         )
@@ -191,8 +194,8 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
             return
         angle = math.atan2(tip.y() - before.y(), tip.x() - before.x())
         corners = [
-            tip + QPointF(length * math.cos(angle + turn), length * math.sin(angle + turn))
-            for length, turn in (
+            tip + QPointF(length * math.cos(angle + rotation), length * math.sin(angle + rotation))
+            for length, rotation in (
                 (ARROW_SIZE, 0.0),
                 (ARROW_SIZE, 2.5),
                 (ARROW_SIZE * 0.35, math.pi),
@@ -208,5 +211,5 @@ def _finite_mask(xs: Floats, ys: Floats) -> np.ndarray:
     return np.isfinite(xs) & np.isfinite(ys)
 
 
-def _distance_between(one: QPointF, other: QPointF) -> float:
-    return math.hypot(one.x() - other.x(), one.y() - other.y())
+def _distance_between(point: QPointF, other: QPointF) -> float:
+    return math.hypot(point.x() - other.x(), point.y() - other.y())

@@ -61,9 +61,9 @@ class TopicEdit(QLineEdit):
 
     def set_completions(self, names: Sequence[str]) -> None:
         """Set the names offered as completions."""
-        some = list(names[:MAX_COMPLETIONS])
-        if some != self._offered.stringList():
-            self._offered.setStringList(some)
+        completions = list(names[:MAX_COMPLETIONS])
+        if completions != self._offered.stringList():
+            self._offered.setStringList(completions)
 
 
 class MessageForm(QWidget):
@@ -150,8 +150,8 @@ class MessageForm(QWidget):
         self.repeat.clicked.connect(self.repeat_requested)
 
     def _update_rate_hint(self, problem: str) -> None:
-        said = _("0.1 to 50 per second; stops when disarmed")
-        self.rate_hint.setText(problem or said)
+        hint = _("0.1 to 50 per second; stops when disarmed")
+        self.rate_hint.setText(problem or hint)
 
     def _arrange(self) -> None:
         fields = QGridLayout()
@@ -165,17 +165,17 @@ class MessageForm(QWidget):
             (_make_name_label(_("Topic")), self.topic),
             (_make_name_label(_("Type")), self.kind),
         )
-        for place, (words, field) in enumerate((*rows, (self._value_words, self.values))):
+        for index, (name_label, field) in enumerate((*rows, (self._value_words, self.values))):
             if isinstance(field, QLineEdit):
-                words.setBuddy(field)
-            fields.addWidget(words, place, 0, Qt.AlignmentFlag.AlignTop)
-            fields.addWidget(field, place, 1)
-        head = QHBoxLayout()
-        head.setSpacing(4)
-        head.addWidget(label(_("Message"), "small", role="textSecondary"))
-        head.addStretch(1)
-        head.addWidget(self.template)
-        head.addWidget(self.tidy)
+                name_label.setBuddy(field)
+            fields.addWidget(name_label, index, 0, Qt.AlignmentFlag.AlignTop)
+            fields.addWidget(field, index, 1)
+        header = QHBoxLayout()
+        header.setSpacing(4)
+        header.addWidget(label(_("Message"), "small", role="textSecondary"))
+        header.addStretch(1)
+        header.addWidget(self.template)
+        header.addWidget(self.tidy)
         fault = QHBoxLayout()
         fault.setSpacing(6)
         fault.addWidget(self.fault_icon, 0, Qt.AlignmentFlag.AlignTop)
@@ -185,24 +185,27 @@ class MessageForm(QWidget):
         column.setContentsMargins(12, 10, 12, 10)
         column.setSpacing(8)
         column.addLayout(fields)
-        column.addLayout(head)
+        column.addLayout(header)
         column.addWidget(self.edit, 1)
         column.addLayout(fault)
         column.addWidget(Separator(self._theme))
         column.addLayout(self._sending_rows())
 
     def _sending_rows(self) -> QVBoxLayout:
-        once, again = QHBoxLayout(), QHBoxLayout()
-        for row, parts in ((once, (self.send, self.last)), (again, (self.repeat, self.rate, self.count))):
+        send_row, repeat_row = QHBoxLayout(), QHBoxLayout()
+        for row, parts in (
+            (send_row, (self.send, self.last)),
+            (repeat_row, (self.repeat, self.rate, self.count)),
+        ):
             row.setSpacing(10)
             for part in parts:
                 row.addWidget(part, 1 if isinstance(part, ElidedLabel) else 0)
-        for words in (self.last, self.count):
-            words.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        for status_label in (self.last, self.count):
+            status_label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         rows = QVBoxLayout()
         rows.setSpacing(8)
-        rows.addLayout(once)
-        rows.addLayout(again)
+        rows.addLayout(send_row)
+        rows.addLayout(repeat_row)
         rows.addWidget(self.rate_hint)
         return rows
 
@@ -246,9 +249,9 @@ class MessageForm(QWidget):
     def show_problem(self, problem: str) -> None:
         """Show the reason why the message can't be sent; "" hides the reason."""
         fault = self.read.fault
-        words = _("{problem} The message can't be sent yet.").format(problem=problem) if problem else ""
-        if words != self.sentence.text():
-            self.sentence.setText(words)
+        message = _("{problem} The message can't be sent yet.").format(problem=problem) if problem else ""
+        if message != self.sentence.text():
+            self.sentence.setText(message)
         self.fault_icon.setVisible(bool(problem))
         self.sentence.setVisible(bool(problem))
         self.fix.setVisible(fault is not None and fault.fix is not None)
@@ -266,10 +269,10 @@ class MessageForm(QWidget):
         if self._is_showing:
             return
         topic = text.strip()
-        known = self._type_of(topic)
-        if known and known != self.kind.text():
-            self.kind.setText(known)
-            self._update_message(topic=topic, msg_type=known)
+        msg_type = self._type_of(topic)
+        if msg_type and msg_type != self.kind.text():
+            self.kind.setText(msg_type)
+            self._update_message(topic=topic, msg_type=msg_type)
         else:
             self._update_message(topic=topic)
 
@@ -308,7 +311,7 @@ class MessageForm(QWidget):
             self.edit.setFocus(Qt.FocusReason.OtherFocusReason)
 
 
-def _make_name_label(words: str) -> QLabel:
-    made = label(words, "body", role="textSecondary")
-    made.setMinimumHeight(26)
-    return made
+def _make_name_label(text: str) -> QLabel:
+    widget = label(text, "body", role="textSecondary")
+    widget.setMinimumHeight(26)
+    return widget

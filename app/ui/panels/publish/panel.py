@@ -112,9 +112,9 @@ class PublishPanel(PanelWidget):
         self.strip.refresh()
         self._poll_peek()
         acting, topics = self.acting, self.session.live.topics
-        facts = (acting.shelf.revision, acting.revision, acting.arming.revision, topics.revision)
-        if facts != self._seen:
-            self._seen = facts
+        state = (acting.shelf.revision, acting.revision, acting.arming.revision, topics.revision)
+        if state != self._seen:
+            self._seen = state
             self._rebuild()
             self.form.topic.set_completions(sorted(topic.name for topic in topics.existing_topics()))
         elif self._ticks % STATE_UPDATE_TICKS == 0:
@@ -127,26 +127,26 @@ class PublishPanel(PanelWidget):
 
     def _rebuild(self) -> None:
         messages = self.acting.shelf.messages
-        words = self.filter.text().casefold().split()
+        keywords = self.filter.text().casefold().split()
         rows = [
             each
             for each in messages
             if each.id == self._wanted
-            or all(word in f"{each.name} {each.topic}".casefold() for word in words)
+            or all(keyword in f"{each.name} {each.topic}".casefold() for keyword in keywords)
         ]
-        chosen = self._wanted or self.list.selected_key() or ""
+        selected = self._wanted or self.list.selected_key() or ""
         model = self.list.model()
         model.set_rows(rows)  # type: ignore[attr-defined]  # always a TableModel
         if rows:
-            known = {each.id for each in rows}
-            wanted = chosen if chosen in known else rows[0].id
-            if self.list.selected_key() != wanted:
-                self.list.select_key(wanted)
+            ids = {each.id for each in rows}
+            target = selected if selected in ids else rows[0].id
+            if self.list.selected_key() != target:
+                self.list.select_key(target)
         self._wanted = ""
         self.list.refresh_visible()
         self.pages.setCurrentIndex(1 if messages else 0)
-        said = ngettext("{count} saved message", "{count} saved messages", len(messages))
-        self.count.setText(said.format(count=len(messages)) if messages else "")
+        text = ngettext("{count} saved message", "{count} saved messages", len(messages))
+        self.count.setText(text.format(count=len(messages)) if messages else "")
         self._show_selected()
 
     @property
@@ -191,36 +191,38 @@ class PublishPanel(PanelWidget):
         return _("last at {time}: {what}").format(time=clock.lstrip("0"), what=result_text(result))
 
     def _count_text(self, message: SavedMessage) -> str:
-        going = self.acting.outbox.repeated(message.id)
-        if going is None:
+        repeated = self.acting.outbox.repeated(message.id)
+        if repeated is None:
             return ""
-        said = ngettext("{count} sent, {rate}/s", "{count} sent, {rate}/s", going.count)
-        return said.format(count=group_digits(going.count), rate=rate_text(going.measured_hz))
+        text = ngettext("{count} sent, {rate}/s", "{count} sent, {rate}/s", repeated.count)
+        return text.format(count=group_digits(repeated.count), rate=rate_text(repeated.measured_hz))
 
     def _type_of(self, topic: str) -> str:
-        known = self.session.live.topics.get(topic)
-        return known.msg_type if known is not None else ""
+        entry = self.session.live.topics.get(topic)
+        return entry.msg_type if entry is not None else ""
 
     def badge(self) -> tuple[str, str] | None:
-        going = len(self.acting.outbox.repeated_messages)
-        return (str(going), "warn") if going else None
+        count = len(self.acting.outbox.repeated_messages)
+        return (str(count), "warn") if count else None
 
     # -- user actions -------------------------------------------------------------------------------------
 
     def open_for(self, key: str) -> None:
         """Select a saved message for the topic, or create one from the topic's last message."""
         _network, topic = split_key(key)
-        kept = [each for each in self.acting.shelf.messages if topic and each.topic == topic]
+        saved = [each for each in self.acting.shelf.messages if topic and each.topic == topic]
         msg_type = self._type_of(topic) or "json"
-        made = kept[-1] if kept else self.acting.new_message(topic, msg_type, format_empty_message(msg_type))
-        if made is None:
-            said = _("You have {count} saved messages, the maximum. Delete one first.")
-            self.context.show_toast(said.format(count=MAX_MESSAGES))
+        message = (
+            saved[-1] if saved else self.acting.new_message(topic, msg_type, format_empty_message(msg_type))
+        )
+        if message is None:
+            text = _("You have {count} saved messages, the maximum. Delete one first.")
+            self.context.show_toast(text.format(count=MAX_MESSAGES))
             return
-        self._wanted = made.id
+        self._wanted = message.id
         self.filter.clear()
         self._rebuild()
-        if not kept and topic:
+        if not saved and topic:
             self.insert_template()
         field = self.form.edit if topic else self.form.topic
         field.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -293,16 +295,16 @@ class PublishPanel(PanelWidget):
         else:
             self._show_reason(self.acting.send(message, rate_hz=message.rate_hz))
 
-    def _show_reason(self, why_not: str) -> None:
-        if why_not:
-            self.context.show_toast(why_not)
+    def _show_reason(self, reason: str) -> None:
+        if reason:
+            self.context.show_toast(reason)
         self.refresh()
 
     def copy(self, id: str) -> None:
         """Duplicate a message."""
-        made = self.acting.shelf.copy(id)
-        if made is not None:
-            self._wanted = made.id
+        duplicate = self.acting.shelf.copy(id)
+        if duplicate is not None:
+            self._wanted = duplicate.id
             self._rebuild()
 
     def delete(self, id: str) -> None:
@@ -310,8 +312,8 @@ class PublishPanel(PanelWidget):
         self.acting.stop_sending(id)
         removed = self.acting.shelf.remove(id)
         if removed is not None:
-            said = _("Deleted “{name}”").format(name=removed.name)
-            self.context.show_toast(said, _("Undo"), self._undo_delete)
+            text = _("Deleted “{name}”").format(name=removed.name)
+            self.context.show_toast(text, _("Undo"), self._undo_delete)
             self._rebuild()
 
     def _undo_delete(self) -> None:
@@ -323,19 +325,19 @@ class PublishPanel(PanelWidget):
     def menu_of(self, id: str) -> Menu:
         """Return the context menu of a message."""
         is_going = self.acting.outbox.is_sending(id)
-        words = _("Stop sending") if is_going else _("Start sending")
+        text = _("Stop sending") if is_going else _("Start sending")
         actions = [
             RowAction(_("Send"), "send", self.send),
-            RowAction(words, "square" if is_going else "repeat", self.repeat),
+            RowAction(text, "square" if is_going else "repeat", self.repeat),
             RowAction(_("Duplicate"), "copy", lambda: self.copy(id)),
             RowAction(_("Delete"), "trash-2", lambda: self.delete(id)),
         ]
         return fill_menu(Menu(self.theme, self), self.theme, actions)
 
-    def _show_menu(self, id: str, at: QPoint) -> None:
+    def _show_menu(self, id: str, position: QPoint) -> None:
         menu = self.menu_of(id)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.popup(at)
+        menu.popup(position)
 
     # -- overrides ----------------------------------------------------------------------------------------
 

@@ -88,10 +88,10 @@ class ShelfList(TableView[SavedMessage]):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key, pressed = self.selected_key(), event.key()
-        held = event.modifiers() == Qt.KeyboardModifier.ControlModifier
-        if key is not None and held and pressed in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+        has_ctrl = event.modifiers() == Qt.KeyboardModifier.ControlModifier
+        if key is not None and has_ctrl and pressed in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.send_requested.emit(key)
-        elif key is not None and held and pressed == Qt.Key.Key_D:
+        elif key is not None and has_ctrl and pressed == Qt.Key.Key_D:
             self.copy_requested.emit(key)
         elif key is not None and is_plain_key(event) and pressed == Qt.Key.Key_Delete:
             self.delete_requested.emit(key)

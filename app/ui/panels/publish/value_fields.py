@@ -50,7 +50,7 @@ class ValueFields(QWidget):
             value = values.get(name, "")
             if field.text() != value:
                 field.setText(value)
-            self._set_invalid(field, wrong=not value.strip())
+            self._set_invalid(field, is_invalid=not value.strip())
 
     def _rebuild(self, names: Sequence[str]) -> None:
         focused = next((name for name, field in self.fields.items() if field.hasFocus()), "")
@@ -69,7 +69,7 @@ class ValueFields(QWidget):
         row = QHBoxLayout(part)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
-        words = label(name, "mono", role="accentText")
+        name_label = label(name, "mono", role="accentText")
         field = QLineEdit()
         field.setMinimumWidth(round(self._theme.scaled(FIELD_WIDTH_PX)))
         field.setAccessibleName(_("Value of {name}").format(name=name))
@@ -81,16 +81,16 @@ class ValueFields(QWidget):
         field.setProperty("focusRadius", self._theme.radius("control"))
         ContextMenuFilter(self._theme, field)
         field.textEdited.connect(lambda text, name=name: self.typed.emit(name, text))
-        words.setBuddy(field)
-        row.addWidget(words)
+        name_label.setBuddy(field)
+        row.addWidget(name_label)
         row.addWidget(field)
         self._flow.addWidget(part)
         self._parts.append(part)
         self.fields[name] = field
 
     @staticmethod
-    def _set_invalid(field: QLineEdit, *, wrong: bool) -> None:
-        if (field.property("wrong") == "true") != wrong:
-            field.setProperty("wrong", "true" if wrong else "false")
+    def _set_invalid(field: QLineEdit, *, is_invalid: bool) -> None:
+        if (field.property("wrong") == "true") != is_invalid:
+            field.setProperty("wrong", "true" if is_invalid else "false")
             field.style().unpolish(field)
             field.style().polish(field)

@@ -30,24 +30,24 @@ BADGES = {
 """Text, status and icon of each badge, by key."""
 
 
-def badge_of(facts: RecordingInfo, being_written: bool) -> str:
+def badge_of(info: RecordingInfo, being_written: bool) -> str:
     """Return the key in `BADGES` of a recording's badge, or "" for no badge.
 
     Args:
-        facts: Properties of the recording.
+        info: Properties of the recording.
         being_written: True for the recording in progress.
     """
     if being_written:
         return "recording"
-    if facts.problem:
+    if info.problem:
         return "unreadable"
-    if not facts.is_read:
+    if not info.is_read:
         return ""
-    if facts.is_repaired:
+    if info.is_repaired:
         return "repaired"
-    if not facts.is_complete:
+    if not info.is_complete:
         return "cut"
-    return "kept" if facts.is_from_flight_recorder else ""
+    return "kept" if info.is_from_flight_recorder else ""
 
 
 @dataclass(frozen=True)
@@ -70,41 +70,49 @@ class RecordingMark:
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
         side = theme.scaled(1.0)
-        place = QRectF(box.left(), 0, THUMBNAIL_SIZE.width() * side, THUMBNAIL_SIZE.height() * side)
-        place.moveCenter(QPointF(place.center().x(), box.center().y()))
-        self._paint_picture(painter, place, theme)
-        words = QRectF(box)
-        words.setLeft(place.right() + GAP)
+        picture_rect = QRectF(box.left(), 0, THUMBNAIL_SIZE.width() * side, THUMBNAIL_SIZE.height() * side)
+        picture_rect.moveCenter(QPointF(picture_rect.center().x(), box.center().y()))
+        self._paint_picture(painter, picture_rect, theme)
+        text_rect = QRectF(box)
+        text_rect.setLeft(picture_rect.right() + GAP)
         name, small = theme.font("label"), theme.font("small")
         name.setWeight(name.Weight.DemiBold)
-        high, low = paint.height_of(name), paint.height_of(small)
-        top = box.center().y() - (high + (low if self.note else 0)) / 2
+        name_height, low = paint.height_of(name), paint.height_of(small)
+        top = box.center().y() - (name_height + (low if self.note else 0)) / 2
         chip = self._chip_width(theme)
-        room = max(0.0, words.width() - (chip + 8 if chip else 0))
-        wide = min(paint.width_of(name, self.name) + 1, room)
-        paint.text_line(painter, QRectF(words.left(), top, wide, high), self.name, name, theme.colour("text"))
+        room = max(0.0, text_rect.width() - (chip + 8 if chip else 0))
+        name_width = min(paint.width_of(name, self.name) + 1, room)
+        paint.text_line(
+            painter,
+            QRectF(text_rect.left(), top, name_width, name_height),
+            self.name,
+            name,
+            theme.colour("text"),
+        )
         if chip:
-            middle = QRectF(words.left() + wide + 8, top + high / 2 - CHIP_HEIGHT / 2, chip, CHIP_HEIGHT)
+            middle = QRectF(
+                text_rect.left() + name_width + 8, top + name_height / 2 - CHIP_HEIGHT / 2, chip, CHIP_HEIGHT
+            )
             self._paint_chip(painter, middle, theme)
         if self.note:
-            line = QRectF(words.left(), top + high, words.width(), low)
+            line = QRectF(text_rect.left(), top + name_height, text_rect.width(), low)
             paint.text_line(painter, line, self.note, small, theme.colour("textSecondary"))
 
-    def _paint_picture(self, painter: QPainter, place: QRectF, theme: Theme) -> None:
+    def _paint_picture(self, painter: QPainter, rect: QRectF, theme: Theme) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         radius = theme.radius("key")
-        paint.box(painter, place, radius, theme.colour("sunken"))
+        paint.box(painter, rect, radius, theme.colour("sunken"))
         if self.picture is None:
             icon = QRectF(0, 0, 18, 18)
-            icon.moveCenter(place.center())
+            icon.moveCenter(rect.center())
             paint_icon(painter, icon, "chart-line", theme.colour("textTertiary"))
             return
         edge = QPainterPath()
-        edge.addRoundedRect(place, radius, radius)
+        edge.addRoundedRect(rect, radius, radius)
         painter.save()
         painter.setClipPath(edge)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        painter.drawImage(place, self.picture)
+        painter.drawImage(rect, self.picture)
         painter.restore()
 
     def _chip_width(self, theme: Theme) -> float:
@@ -113,30 +121,32 @@ class RecordingMark:
         return paint.width_of(theme.font("caption"), _(BADGES[self.badge][0])) + 2 * CHIP_PADDING + 16
 
     def _paint_chip(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
-        words, status_name, icon = BADGES[self.badge]
+        text, status_name, icon = BADGES[self.badge]
         status = theme.status(status_name)
-        ink = theme.colour("textSecondary" if status_name == "off" else status.colour)
+        colour = theme.colour("textSecondary" if status_name == "off" else status.colour)
         paint.box(painter, box, box.height() / 2, theme.colour(status.tint or "sunken"))
-        paint_icon(painter, QRectF(box.left() + CHIP_PADDING - 2, box.center().y() - 6, 12, 12), icon, ink)
-        inside = box.adjusted(CHIP_PADDING + 13, 0, -2, 0)
-        paint.text_line(painter, inside, _(words), theme.font("caption"), ink)
+        paint_icon(painter, QRectF(box.left() + CHIP_PADDING - 2, box.center().y() - 6, 12, 12), icon, colour)
+        text_rect = box.adjusted(CHIP_PADDING + 13, 0, -2, 0)
+        paint.text_line(painter, text_rect, _(text), theme.font("caption"), colour)
 
 
 def crop_to_thumbnail(image: QImage) -> QImage:
     """Crop an image to the aspect ratio of thumbnails, at twice their size for high-DPI screens."""
-    wide, high = image.width(), image.height()
-    if not wide or not high:
+    width, height = image.width(), image.height()
+    if not width or not height:
         return image
     share = THUMBNAIL_SIZE.width() / THUMBNAIL_SIZE.height()
-    across = min(wide, round(high * share))
-    down = min(high, round(wide / share))
-    middle = image.copy((wide - across) // 2, (high - down) // 2, max(1, across), max(1, down))
+    crop_width = min(width, round(height * share))
+    crop_height = min(height, round(width / share))
+    middle = image.copy(
+        (width - crop_width) // 2, (height - crop_height) // 2, max(1, crop_width), max(1, crop_height)
+    )
     return middle.scaled(2 * THUMBNAIL_SIZE.width(), 2 * THUMBNAIL_SIZE.height())
 
 
-def note_of(facts: RecordingInfo) -> str:
+def note_of(info: RecordingInfo) -> str:
     """Return the second line of a row: the error, the note, or the names of the first topics."""
-    return facts.problem or facts.scan_problem or facts.note or ", ".join(facts.topics[:3])
+    return info.problem or info.scan_problem or info.note or ", ".join(info.topics[:3])
 
 
 def columns(
@@ -152,29 +162,29 @@ def columns(
         now: Returns the current local time.
     """
 
-    def name(facts: RecordingInfo) -> Cell:
-        image = picture(facts)
-        badge = badge_of(facts, is_written(facts))
-        note = note_of(facts)
-        mark = RecordingMark(facts.path.stem, note, badge, image.cacheKey() if image else 0, image)
-        said = ", ".join(filter(None, (facts.path.stem, _(BADGES[badge][0]) if badge else "", note)))
-        return Cell(mark=mark, accessible_text=said)
+    def name(info: RecordingInfo) -> Cell:
+        image = picture(info)
+        badge = badge_of(info, is_written(info))
+        note = note_of(info)
+        mark = RecordingMark(info.path.stem, note, badge, image.cacheKey() if image else 0, image)
+        text = ", ".join(filter(None, (info.path.stem, _(BADGES[badge][0]) if badge else "", note)))
+        return Cell(mark=mark, accessible_text=text)
 
-    def date_cell(facts: RecordingInfo) -> Cell:
-        seconds = facts.start_ns / 1e9 if facts.start_ns else facts.changed_s
-        then = dt.datetime.fromtimestamp(min(max(seconds, 0.0), 4e10), tz=dt.timezone.utc).astimezone()
-        return Cell(date_time_text(then, now()))
+    def date_cell(info: RecordingInfo) -> Cell:
+        seconds = info.start_ns / 1e9 if info.start_ns else info.changed_s
+        date = dt.datetime.fromtimestamp(min(max(seconds, 0.0), 4e10), tz=dt.timezone.utc).astimezone()
+        return Cell(date_time_text(date, now()))
 
-    def length(facts: RecordingInfo) -> Cell:
-        return Cell(length_text(facts.duration_s) if facts.message_count else "")
+    def length(info: RecordingInfo) -> Cell:
+        return Cell(length_text(info.duration_s) if info.message_count else "")
 
-    def lost(facts: RecordingInfo) -> Cell:
-        if facts.lost is None:
+    def lost(info: RecordingInfo) -> Cell:
+        if info.lost is None:
             return Cell()
         return Cell(
-            group_digits(facts.lost),
-            "triangle-alert" if facts.lost else None,
-            "warn" if facts.lost else "text",
+            group_digits(info.lost),
+            "triangle-alert" if info.lost else None,
+            "warn" if info.lost else "text",
         )
 
     return (

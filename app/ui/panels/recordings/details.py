@@ -58,13 +58,13 @@ class RecordingDetails(QWidget):
         super().__init__()
         self._theme = theme
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
-        self.name = ElidedLabel("title", "text", least=60)
+        self.name = ElidedLabel("title", "text", min_width=60)
         self.counts = label("", "small", role="textSecondary", wrap=True)
         self.open = Button(theme, _("Open"), "play", size="small")
         self.rename = Button(theme, _("Rename"), "pencil", size="small")
         self.show_file = Button(theme, _("Show the file"), "folder-open", size="small")
         self.delete = Button(theme, _("Delete"), "trash-2", size="small")
-        formats = [(kind, _(words), None) for kind, words in FORMAT_LABELS.items()]
+        formats = [(kind, _(text), None) for kind, text in FORMAT_LABELS.items()]
         self.format = Segments(theme, formats, size="small", name=_("Export as"), wraps=True)
         self._make_export_fields()
         self.export = Button(theme, _("Export"), "download", size="small")
@@ -95,13 +95,13 @@ class RecordingDetails(QWidget):
         self.times.changed.connect(lambda value: self.strip.set_clock_mode(value == "clock"))
         self.part_words = label("", "small", role="textSecondary", wrap=True)
         self.about = label("", "small", role="textSecondary", wrap=True)
-        what = _("Size of the messages. The files can be smaller or larger.")
-        self.about.setToolTip(plain.tip(what))
+        tooltip = _("Size of the messages. The files can be smaller or larger.")
+        self.about.setToolTip(plain.tip(tooltip))
         self.format.changed.connect(lambda _kind: self._update_part())
         self._recording: Path | None = None
         self.folder: Path | None = None
         """Folder for exports chosen by the user, or None for the folder of the recording."""
-        self.into = ElidedLabel("body", "text", least=60)
+        self.into = ElidedLabel("body", "text", min_width=60)
         self.files = label("", "small", role="textSecondary")
         self.choose = Button(theme, _("Choose"), "folder-open", size="small")
         self.choose.setAccessibleName(_("Choose the export folder"))
@@ -117,54 +117,59 @@ class RecordingDetails(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addWidget(Separator(self._theme))
-        inside = QVBoxLayout()
-        inside.setContentsMargins(12, 8, 12, 10)
-        inside.setSpacing(8)
-        inside.addLayout(acts)
-        inside.addWidget(self.strip)
-        inside.addLayout(self._form())
-        column.addLayout(inside)
+        content = QVBoxLayout()
+        content.setContentsMargins(12, 8, 12, 10)
+        content.setSpacing(8)
+        content.addLayout(acts)
+        content.addWidget(self.strip)
+        content.addLayout(self._form())
+        column.addLayout(content)
 
     def _form(self) -> QGridLayout:
         # One row per choice; rows wrap in a narrow panel.
-        kinds, topics, times, places = (Flow(gap=8, row_gap=6) for _row in range(4))
+        kinds, topics, times, folder_row = (Flow(gap=8, row_gap=6) for _row in range(4))
         kinds.addWidget(self.format)
         topics.add_elastic(self.topics, greedy=True)
         topics.addWidget(self.pick)
         times.addWidget(self.times)
-        for row, words in ((kinds, self.about), (times, self.part_words)):
+        for row, description in ((kinds, self.about), (times, self.part_words)):
             row.push()
-            row.addWidget(words)
-        places.add_elastic(self.into, greedy=True)
+            row.addWidget(description)
+        folder_row.add_elastic(self.into, greedy=True)
         for widget in (self.files, self.choose, self.export, self.bar, self.progress):
-            places.addWidget(widget)
+            folder_row.addWidget(widget)
         form = QGridLayout()
         form.setHorizontalSpacing(12)
         form.setVerticalSpacing(8)
         form.setColumnStretch(1, 1)
-        rows = ((_("Export as"), kinds), (_("Topics"), topics), (_("Count"), times), (_("Save in"), places))
-        for place, (title, row) in enumerate(rows):
+        rows = (
+            (_("Export as"), kinds),
+            (_("Topics"), topics),
+            (_("Count"), times),
+            (_("Save in"), folder_row),
+        )
+        for index, (title, row) in enumerate(rows):
             name = label(title, "small", role="textSecondary")
-            form.addWidget(name, 2 * place, 0, Qt.AlignmentFlag.AlignTop)
+            form.addWidget(name, 2 * index, 0, Qt.AlignmentFlag.AlignTop)
             name.setMinimumHeight(self.format.sizeHint().height())
-            form.addLayout(row, 2 * place, 1)
+            form.addLayout(row, 2 * index, 1)
         form.addWidget(self.list, 3, 1)
         return form
 
-    def show_recording(self, facts: RecordingInfo, being_written: bool) -> None:
+    def show_recording(self, info: RecordingInfo, being_written: bool) -> None:
         """Show the properties of a recording and enable the possible actions.
 
         Args:
-            facts: Properties of the recording.
+            info: Properties of the recording.
             being_written: True for the recording in progress.
         """
-        self.name.setText(facts.path.stem)
-        self._recording = facts.path
+        self.name.setText(info.path.stem)
+        self._recording = info.path
         self._update_export_path()
-        topics, count = len(facts.topics), facts.message_count
+        topics, count = len(info.topics), info.message_count
         self.counts.setText(
-            facts.problem
-            or facts.scan_problem
+            info.problem
+            or info.scan_problem
             or _("{topics}, {messages}").format(
                 topics=ngettext("{count} topic", "{count} topics", topics).format(count=group_digits(topics)),
                 messages=ngettext("{count} message", "{count} messages", count).format(
@@ -172,20 +177,20 @@ class RecordingDetails(QWidget):
                 ),
             )
         )
-        can_read = not being_written and not facts.problem
+        can_read = not being_written and not info.problem
         self.open.setEnabled(can_read)
-        self.export.setEnabled(self._is_exporting or (can_read and facts.is_read))
+        self.export.setEnabled(self._is_exporting or (can_read and info.is_read))
         self.rename.setEnabled(not being_written)
         self.delete.setEnabled(not being_written)
 
-    def show_strip(self, look: FilmStripPreview | None, images: Sequence[QImage | None] = ()) -> None:
+    def show_strip(self, preview: FilmStripPreview | None, images: Sequence[QImage | None] = ()) -> None:
         """Show another recording on the film strip and select all of it for export.
 
         Args:
-            look: Contents of the film strip; None while they are loading.
+            preview: Contents of the film strip; None while they are loading.
             images: Images of the film strip; None for images that are not loaded.
         """
-        self.strip.show_preview(look, images)
+        self.strip.show_preview(preview, images)
         self.topics.show_patterns((), ())
         self._is_none_chosen = False
         self.set_folder(None)
@@ -206,7 +211,8 @@ class RecordingDetails(QWidget):
         strip, name = self.strip, self._recording.stem
         if not strip.is_all_selected and strip.look is not None:
             times = [
-                duration_text(at - strip.look.start_ns, digits=1) for at in (strip.begin_ns, strip.end_ns)
+                duration_text(time_ns - strip.look.start_ns, digits=1)
+                for time_ns in (strip.begin_ns, strip.end_ns)
             ]
             begin, end = (each.replace(":", ".") for each in times)
             name = _("{name}, {begin} to {end}").format(name=name, begin=begin, end=end)
@@ -214,9 +220,9 @@ class RecordingDetails(QWidget):
         return (self.folder or self._recording.parent) / file_stem(f"{name}, {kind}")
 
     def _update_export_path(self) -> None:
-        place = self.export_path()
-        self.into.setText(f"{place.parent.name}/{place.name}" if place is not None else "")
-        self.into.setToolTip(plain.tip(str(place or "")))
+        path = self.export_path()
+        self.into.setText(f"{path.parent.name}/{path.name}" if path is not None else "")
+        self.into.setToolTip(plain.tip(str(path or "")))
 
     def _patterns_edited(self) -> None:
         self._is_none_chosen = False
@@ -224,80 +230,86 @@ class RecordingDetails(QWidget):
 
     def part(self) -> Part | None:
         """Return the part to export; None if no topic is selected or a pattern is invalid."""
-        look = self.strip.look
-        if look is None:
+        preview = self.strip.look
+        if preview is None:
             return FULL_RECORDING
         if self._is_none_chosen:
             return None
-        wanted, unwanted = self.topics.patterns()
+        included, unwanted = self.topics.patterns()
         try:
-            made = select_part(look, self.strip.begin_ns, self.strip.end_ns, wanted, unwanted)
+            made = select_part(preview, self.strip.begin_ns, self.strip.end_ns, included, unwanted)
         except BadTopicError:
             return None
         return made if made.topics is None or made.topics else None
 
-    def _set_list_visible(self, shown: bool) -> None:
-        self.list.setVisible(shown)
+    def _set_list_visible(self, is_visible: bool) -> None:
+        self.list.setVisible(is_visible)
         self._update_part()
 
     def _topics_checked(self, names: Sequence[str]) -> None:
         # Called when topics are checked or unchecked in the list.
-        look = self.strip.look
+        preview = self.strip.look
         self._is_none_chosen = not names
-        if look is not None and names:
-            self.topics.show_patterns(*shortest_choice(look.topics, names))
+        if preview is not None and names:
+            self.topics.show_patterns(*shortest_choice(preview.topics, names))
         self._update_part()
 
     def _update_part(self) -> None:
         # Time range, number of topics and size.
-        look, part = self.strip.look, self.part()
-        if look is not None and not self.list.isHidden():
-            chosen = [each.name for each in look.topics] if part is not None and part.topics is None else ()
-            names = chosen if part is None else part.topics or chosen
-            self.list.show_topics(look.topics, names, look.size_of)
+        preview, part = self.strip.look, self.part()
+        if preview is not None and not self.list.isHidden():
+            all_names = (
+                [each.name for each in preview.topics] if part is not None and part.topics is None else ()
+            )
+            names = all_names if part is None else part.topics or all_names
+            self.list.show_topics(preview.topics, names, preview.size_of)
         self.topics.set_invalid(part is None)
         set_role(self.part_words, "error" if part is None else "textSecondary")
-        self._update_size(look, part)
+        self._update_size(preview, part)
         self._update_export_path()
-        if look is None:
+        if preview is None:
             self.part_words.setText("")
             return
         if part is None:
             self.part_words.setText(_("No matching topics in this recording"))
             return
-        count = len(look.topics if part.topics is None else part.topics)
-        said = ngettext("{count} of {all} topics", "{count} of {all} topics", len(look.topics))
-        words = said.format(count=group_digits(count), all=group_digits(len(look.topics)))
+        count = len(preview.topics if part.topics is None else part.topics)
+        template = ngettext("{count} of {all} topics", "{count} of {all} topics", len(preview.topics))
+        text = template.format(count=group_digits(count), all=group_digits(len(preview.topics)))
         if not self.strip.is_all_selected:
-            ends = (self.strip.begin_ns, self.strip.end_ns)
-            begin, end = (self.strip.time_text(at_ns, digits=1) for at_ns in ends)
-            words = _("{begin} to {end}, {topics}").format(begin=begin, end=end, topics=words)
-        self.part_words.setText(words)
+            times_ns = (self.strip.begin_ns, self.strip.end_ns)
+            begin, end = (self.strip.time_text(at_ns, digits=1) for at_ns in times_ns)
+            text = _("{begin} to {end}, {topics}").format(begin=begin, end=end, topics=text)
+        self.part_words.setText(text)
 
-    def _update_size(self, look: FilmStripPreview | None, part: Part | None) -> None:
+    def _update_size(self, preview: FilmStripPreview | None, part: Part | None) -> None:
         # Estimated from the topics that the format supports.
-        words, count = "", 0
-        if look is not None and part is not None:
+        text, count = "", 0
+        if preview is not None and part is not None:
             names = {
                 each.name
-                for each in look.topics
+                for each in preview.topics
                 if (part.topics is None or each.name in part.topics)
                 and can_export(self.format.value, each.codec)
             }
-            words = self._size_text(look, names) if names else _("This value can't be converted to this type")
+            text = (
+                self._size_text(preview, names) if names else _("This value can't be converted to this type")
+            )
             count = min(len(names), 1) if self.format.value == "mcap" else len(names)
-        self.about.setText(words)
+        self.about.setText(text)
         self.files.setText(ngettext("{count} file", "{count} files", count).format(count=group_digits(count)))
         self.files.setVisible(count > 0)
 
-    def _size_text(self, look: FilmStripPreview, names: Collection[str]) -> str:
-        exact, size = look.about(self.strip.begin_ns, self.strip.end_ns, names)
+    def _size_text(self, preview: FilmStripPreview, names: Collection[str]) -> str:
+        exact, size = preview.about(self.strip.begin_ns, self.strip.end_ns, names)
         count = round(exact if self.strip.is_all_selected else float(f"{exact:.2g}"))
         messages = ngettext("{count} message", "{count} messages", count).format(count=group_digits(count))
         if size is None:
             return messages if self.strip.is_all_selected else _("about {messages}").format(messages=messages)
-        words = _("{messages}, about {size}") if self.strip.is_all_selected else _("about {messages}, {size}")
-        return words.format(messages=messages, size=size_text(size))
+        template = (
+            _("{messages}, about {size}") if self.strip.is_all_selected else _("about {messages}, {size}")
+        )
+        return template.format(messages=messages, size=size_text(size))
 
     def show_export(self, job: RecordingExport | None) -> None:
         """Show the progress of an export, or hide it if `job` is None."""
@@ -311,8 +323,8 @@ class RecordingDetails(QWidget):
             self.export.setEnabled(not job.was_cancelled)
             share = job.progress
             self.bar.set_fraction(share)
-            words = _("Exporting") if share is None else _("Exporting, {percent} %")
-            self.progress.setText(words.format(percent=round(100 * (share or 0.0))))
+            template = _("Exporting") if share is None else _("Exporting, {percent} %")
+            self.progress.setText(template.format(percent=round(100 * (share or 0.0))))
 
     def _press(self) -> None:
         if self._is_exporting:

@@ -41,8 +41,8 @@ class StripHandle(QWidget):
         self.setProperty("focusRadius", theme.radius("small"))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        far = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
-        step = BIG_STEP_NS if far else STEP_NS
+        is_big_step = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+        step = BIG_STEP_NS if is_big_step else STEP_NS
         if event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
             self.moved.emit(-step if event.key() == Qt.Key.Key_Left else step)
         elif event.key() in {Qt.Key.Key_Home, Qt.Key.Key_End}:
@@ -103,16 +103,16 @@ class FilmStrip(QWidget):
 
     # -- display ------------------------------------------------------------------------------------------
 
-    def show_preview(self, look: FilmStripPreview | None, images: Sequence[QImage | None] = ()) -> None:
+    def show_preview(self, preview: FilmStripPreview | None, images: Sequence[QImage | None] = ()) -> None:
         """Show a recording and select all of it.
 
         Args:
-            look: Contents of the film strip; None hides the film strip.
+            preview: Contents of the film strip; None hides the film strip.
             images: Images of the film strip; None for images that are not loaded.
         """
-        self.look, self._images = look, images
+        self.look, self._images = preview, images
         self.select_all()
-        self.setVisible(look is not None)
+        self.setVisible(preview is not None)
 
     def select_all(self) -> None:
         """Select the whole recording."""
@@ -126,11 +126,11 @@ class FilmStrip(QWidget):
             begin_ns: Start in ns since 1970. Both times are limited to the recording and to each other.
             end_ns: End in ns since 1970.
         """
-        look = self.look
-        if look is None:
+        preview = self.look
+        if preview is None:
             return
-        begin_ns = max(look.start_ns, min(begin_ns, look.end_ns))
-        end_ns = max(look.start_ns, min(end_ns, look.end_ns))
+        begin_ns = max(preview.start_ns, min(begin_ns, preview.end_ns))
+        end_ns = max(preview.start_ns, min(end_ns, preview.end_ns))
         if begin_ns > end_ns:  # each handle stops at the other one
             begin_ns, end_ns = (end_ns, end_ns) if begin_ns != self.begin_ns else (begin_ns, begin_ns)
         self.begin_ns, self.end_ns = begin_ns, end_ns
@@ -159,8 +159,8 @@ class FilmStrip(QWidget):
     @property
     def is_all_selected(self) -> bool:
         """True if the whole recording is selected."""
-        look = self.look
-        return look is None or (self.begin_ns, self.end_ns) == (look.start_ns, look.end_ns)
+        preview = self.look
+        return preview is None or (self.begin_ns, self.end_ns) == (preview.start_ns, preview.end_ns)
 
     # -- geometry -----------------------------------------------------------------------------------------
 
@@ -172,28 +172,30 @@ class FilmStrip(QWidget):
 
     def _film_rect(self) -> QRectF:
         # Leaves room for the handles at both ends.
-        high = self._theme.scaled(FILM_HEIGHT)
-        return QRectF(HANDLE_WIDTH, 0, max(1.0, self.width() - 2 * HANDLE_WIDTH), high)
+        height = self._theme.scaled(FILM_HEIGHT)
+        return QRectF(HANDLE_WIDTH, 0, max(1.0, self.width() - 2 * HANDLE_WIDTH), height)
 
     def _x_of(self, at_ns: int) -> float:
-        film, look = self._film_rect(), self.look
-        if look is None or look.end_ns <= look.start_ns:
+        film, preview = self._film_rect(), self.look
+        if preview is None or preview.end_ns <= preview.start_ns:
             return film.left()
-        return film.left() + (at_ns - look.start_ns) / (look.end_ns - look.start_ns) * film.width()
+        return film.left() + (at_ns - preview.start_ns) / (preview.end_ns - preview.start_ns) * film.width()
 
     def _time_at(self, x: float) -> int:
-        film, look = self._film_rect(), self.look
-        if look is None:
+        film, preview = self._film_rect(), self.look
+        if preview is None:
             return 0
-        return look.start_ns + round((x - film.left()) / film.width() * (look.end_ns - look.start_ns))
+        return preview.start_ns + round(
+            (x - film.left()) / film.width() * (preview.end_ns - preview.start_ns)
+        )
 
     def _arrange(self) -> None:
-        high = round(self._film_rect().height())
+        height = round(self._film_rect().height())
         begin, end = self._x_of(self.begin_ns), self._x_of(self.end_ns)
         if self.look is not None and self.look.end_ns <= self.look.start_ns:
             end = self._film_rect().right()
-        self.begin.setGeometry(round(begin) - HANDLE_WIDTH, 0, HANDLE_WIDTH, high)
-        self.end.setGeometry(round(end), 0, HANDLE_WIDTH, high)
+        self.begin.setGeometry(round(begin) - HANDLE_WIDTH, 0, HANDLE_WIDTH, height)
+        self.end.setGeometry(round(end), 0, HANDLE_WIDTH, height)
         self.updateGeometry()
         self.update()
 
@@ -219,15 +221,15 @@ class FilmStrip(QWidget):
     # -- painting -----------------------------------------------------------------------------------------
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        look, theme = self.look, self._theme
-        if look is None:
+        preview, theme = self.look, self._theme
+        if preview is None:
             return
         painter, film = QPainter(self), self._film_rect()
         painter.fillRect(film, theme.colour("sunken"))
         if any(image is not None for image in self._images):
             self._paint_pictures(painter, film)
         else:
-            self._paint_counts(painter, film, look.counts)
+            self._paint_counts(painter, film, preview.counts)
         veil = QColor(theme.colour("panel"))
         veil.setAlphaF(1.0 - UNSELECTED_OPACITY)
         begin, end = float(self.begin.geometry().right() + 1), float(self.end.geometry().left())
@@ -236,50 +238,58 @@ class FilmStrip(QWidget):
         if not self.is_all_selected:
             for y in (0.0, film.height() - 2):
                 painter.fillRect(QRectF(begin, y, max(0.0, end - begin), 2), theme.colour("accent"))
-        self._paint_labels(painter, film, look)
+        self._paint_labels(painter, film, preview)
         painter.end()
 
     def _paint_pictures(self, painter: QPainter, film: QRectF) -> None:
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         count = len(self._images)
-        for place, image in enumerate(self._images):
+        for index, image in enumerate(self._images):
             if image is None or image.isNull():
                 continue
-            wide = film.width() / count
-            box = QRectF(film.left() + place * wide, 0, wide - 1, film.height())
+            frame_width = film.width() / count
+            box = QRectF(film.left() + index * frame_width, 0, frame_width - 1, film.height())
             share = box.width() / box.height()
-            across = min(float(image.width()), image.height() * share)
-            down = min(float(image.height()), image.width() / share)
-            middle = QRectF((image.width() - across) / 2, (image.height() - down) / 2, across, down)
+            crop_width = min(float(image.width()), image.height() * share)
+            crop_height = min(float(image.height()), image.width() / share)
+            middle = QRectF(
+                (image.width() - crop_width) / 2, (image.height() - crop_height) / 2, crop_width, crop_height
+            )
             painter.drawImage(box, image, middle)
 
     def _paint_counts(self, painter: QPainter, film: QRectF, counts: Sequence[int]) -> None:
         peak = max(counts, default=0)
         if not peak:
             return
-        wide, colour = film.width() / len(counts), self._theme.colour("textTertiary")
-        for place, count in enumerate(counts):
-            high = count / peak * (film.height() - 8)
+        bar_width, colour = film.width() / len(counts), self._theme.colour("textTertiary")
+        for index, count in enumerate(counts):
+            bar_height = count / peak * (film.height() - 8)
             painter.fillRect(
-                QRectF(film.left() + place * wide, film.height() - 4 - high, max(1.0, wide - 1), high), colour
+                QRectF(
+                    film.left() + index * bar_width,
+                    film.height() - 4 - bar_height,
+                    max(1.0, bar_width - 1),
+                    bar_height,
+                ),
+                colour,
             )
 
-    def _paint_labels(self, painter: QPainter, film: QRectF, look: FilmStripPreview) -> None:
+    def _paint_labels(self, painter: QPainter, film: QRectF, preview: FilmStripPreview) -> None:
         # Labels of the ends and of the selection, as far as they don't overlap.
         theme, font = self._theme, self._theme.font("small")
-        high = theme.scaled(LABEL_HEIGHT)
-        taken: list[tuple[float, float]] = []
-        digits = 0 if look.end_ns - look.start_ns > STEP_NS else 3
+        height = theme.scaled(LABEL_HEIGHT)
+        occupied: list[tuple[float, float]] = []
+        digits = 0 if preview.end_ns - preview.start_ns > STEP_NS else 3
         for at_ns, role in (
             (self.begin_ns, "accentText"), (self.end_ns, "accentText"),
-            (look.start_ns, "textSecondary"), (look.end_ns, "textSecondary"),
+            (preview.start_ns, "textSecondary"), (preview.end_ns, "textSecondary"),
         ):  # fmt: skip
-            words = self.time_text(at_ns, digits=digits)
-            wide = paint.width_of(font, words) + 2
-            left = max(0.0, min(self.width() - wide, self._x_of(at_ns) - wide / 2))
-            if any(left < end + 6 and left + wide > begin - 6 for begin, end in taken):
+            text = self.time_text(at_ns, digits=digits)
+            width = paint.width_of(font, text) + 2
+            left = max(0.0, min(self.width() - width, self._x_of(at_ns) - width / 2))
+            if any(left < end + 6 and left + width > begin - 6 for begin, end in occupied):
                 continue
-            taken.append((left, left + wide))
-            is_end = at_ns in {look.start_ns, look.end_ns}
-            ink = theme.colour("textSecondary" if is_end else role)
-            paint.text_line(painter, QRectF(left, film.height(), wide, high), words, font, ink)
+            occupied.append((left, left + width))
+            is_end = at_ns in {preview.start_ns, preview.end_ns}
+            colour = theme.colour("textSecondary" if is_end else role)
+            paint.text_line(painter, QRectF(left, film.height(), width, height), text, font, colour)

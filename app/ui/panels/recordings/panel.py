@@ -97,8 +97,8 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         details.choose.clicked.connect(self._select_folder)
 
     def make_model(self) -> TableModel[RecordingInfo]:
-        made = columns(self._picture, self._is_being_written, lambda: dt.datetime.now().astimezone())
-        return TableModel(made, lambda facts: str(facts.path))
+        table_columns = columns(self._picture, self._is_being_written, lambda: dt.datetime.now().astimezone())
+        return TableModel(table_columns, lambda facts: str(facts.path))
 
     def make_table(self, model: TableModel[RecordingInfo]) -> RecordingTable:
         return RecordingTable(self.theme, model)
@@ -112,15 +112,15 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             self._folder.close()
             self._folder = RecordingFolder(recordings.folder, recordings.new_opener())
             self._ticks = FIRST_SCAN_TICK
-        seen = recordings.client.revision
-        is_new = seen != self._recorder_seen
+        revision = recordings.client.revision
+        is_new = revision != self._recorder_seen
         if self._ticks % SCAN_INTERVAL_TICKS == FIRST_SCAN_TICK:
             self._folder.start_scan(recordings.client.state.path if recordings.is_recording else None)
-        found = self._folder.pop_result()
-        if found is not None:
-            self._look, self._has_looked = found, True
-        if found is not None or is_new:
-            self._recorder_seen = seen
+        scan = self._folder.pop_result()
+        if scan is not None:
+            self._look, self._has_looked = scan, True
+        if scan is not None or is_new:
+            self._recorder_seen = revision
             self.rebuild()
         if self._collect_thumbnails():
             self.table.refresh_visible()
@@ -128,41 +128,41 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         self._poll_export()
 
     def rebuild(self) -> None:
-        words = self.filter_words()
-        known = [self._with_live_state(each) for each in self._look.files]
-        rows = [each for each in known if all(word in _haystack(each) for word in words)]
+        keywords = self.filter_words()
+        recordings = [self._with_live_state(each) for each in self._look.files]
+        rows = [each for each in recordings if all(keyword in _haystack(each) for keyword in keywords)]
         self.model.set_rows(self.table.order.sort(rows))
         self.table.refresh_visible()
         if self._wanted and self.model.index_of(self._wanted).isValid():
             self.table.select_key(self._wanted)
             self._wanted = ""
-        self._update_counts(known)
-        self.show_table(bool(rows), bool(words) and bool(known))
+        self._update_counts(recordings)
+        self.show_table(bool(rows), bool(keywords) and bool(recordings))
         self._show_details()
 
-    def _with_live_state(self, facts: RecordingInfo) -> RecordingInfo:
+    def _with_live_state(self, info: RecordingInfo) -> RecordingInfo:
         # Size and duration of a recording in progress come from the recorder.
-        if not self._is_being_written(facts):
-            return facts
+        if not self._is_being_written(info):
+            return info
         state = self._recordings.client.state
         return replace(
-            facts,
-            size_bytes=max(facts.size_bytes, state.size_bytes),
+            info,
+            size_bytes=max(info.size_bytes, state.size_bytes),
             duration_s=state.duration_s,
             message_count=state.message_count,
             lost=state.lost + state.unwritten_count,
             topics=tuple(sorted(state.topics))[:3],
         )
 
-    def _is_being_written(self, facts: RecordingInfo) -> bool:
+    def _is_being_written(self, info: RecordingInfo) -> bool:
         state = self._recordings.client.state
-        return bool(state.phase) and facts.path == state.path
+        return bool(state.phase) and info.path == state.path
 
-    def _update_counts(self, known: Sequence[RecordingInfo]) -> None:
-        count = len(known) + self._look.omitted_count
-        words = ngettext("{count} recording, {size}", "{count} recordings, {size}", count)
-        size = size_text(sum(each.size_bytes for each in known))
-        self.count.setText(words.format(count=group_digits(count), size=size) if count else "")
+    def _update_counts(self, recordings: Sequence[RecordingInfo]) -> None:
+        count = len(recordings) + self._look.omitted_count
+        template = ngettext("{count} recording, {size}", "{count} recordings, {size}", count)
+        size = size_text(sum(each.size_bytes for each in recordings))
+        self.count.setText(template.format(count=group_digits(count), size=size) if count else "")
         self.filter.setVisible(count > 0)
         left_out = self._look.omitted_count
         older = ngettext(
@@ -183,68 +183,66 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         folder = self._recordings.folder
         is_own = bool(self.session.settings.get(FOLDER_KEY, ""))
         if not self._has_looked:
-            said = _("Recordings in this folder appear here in a moment.")
-            self.empty.set_texts(_("Reading the folder"), said, "folder-open")
+            text = _("Recordings in this folder appear here in a moment.")
+            self.empty.set_texts(_("Reading the folder"), text, "folder-open")
             self.empty.set_actions([])
         elif self._look.problem and is_own:
-            said = _("{folder}: {reason}.").format(folder=folder, reason=self._look.problem)
-            self.empty.set_texts(_("The recordings folder doesn't exist"), said, "folder-open")
+            text = _("{folder}: {reason}.").format(folder=folder, reason=self._look.problem)
+            self.empty.set_texts(_("The recordings folder doesn't exist"), text, "folder-open")
             choose = EmptyAction(_("Choose a folder"), lambda: self.context.run("recording.folder"), "folder")
             self.empty.set_actions([choose])
         else:
-            said = _("Start recording, or save the last seconds after something has happened.")
-            self.empty.set_texts(_("No recordings yet"), said, "film")
+            text = _("Start recording, or save the last seconds after something has happened.")
+            self.empty.set_texts(_("No recordings yet"), text, "film")
             record = EmptyAction(
                 _("Record"), lambda: self.context.run("recording.toggle"), "circle-dot", is_primary=True
             )
             self.empty.set_actions([record, self.doctor_action()])
 
     def _show_details(self) -> None:
-        facts = self._selected()
-        self._below.setVisible(facts is not None)
-        if facts is not None:
-            self.details.show_recording(facts, self._is_being_written(facts))
-        self._request_strip(facts)
+        info = self._selected()
+        self._below.setVisible(info is not None)
+        if info is not None:
+            self.details.show_recording(info, self._is_being_written(info))
+        self._request_strip(info)
 
     def _selected(self) -> RecordingInfo | None:
         return self.model.row_at(self.table.currentIndex())
 
     # -- pictures -----------------------------------------------------------------------------------------
 
-    def _picture(self, facts: RecordingInfo) -> QImage | None:
+    def _picture(self, info: RecordingInfo) -> QImage | None:
         # Missing thumbnails are requested from a background thread.
-        if not facts.is_read or facts.problem or facts.scan_problem:
+        if not info.is_read or info.problem or info.scan_problem:
             return None
-        mark = (facts.path, facts.changed_s, facts.size_bytes)
+        mark = (info.path, info.changed_s, info.size_bytes)
         if mark in self._pictures:
             self._pictures.move_to_end(mark)
             return self._pictures[mark]
-        owner = str(facts.path)
+        owner = str(info.path)
         if self._asked.get(owner) != mark:
             self._asked[owner] = mark
-            self._artist.submit(owner, lambda: (_load_thumbnail(facts.path, self._opener),))
+            self._artist.submit(owner, lambda: (_load_thumbnail(info.path, self._opener),))
         return None
 
     def _collect_thumbnails(self) -> bool:
         is_any = False
         for owner, mark in list(self._asked.items()):
-            made = self._artist.pop_result(owner)
-            if made is not None:
+            result = self._artist.pop_result(owner)
+            if result is not None:
                 is_any = True
                 del self._asked[owner]
-                self._pictures[mark] = made[0]
+                self._pictures[mark] = result[0]
         while len(self._pictures) > MAX_CACHED_PICTURES:
             self._pictures.popitem(last=False)
         return is_any
 
     # -- film strip ---------------------------------------------------------------------------------------
 
-    def _request_strip(self, facts: RecordingInfo | None) -> None:
+    def _request_strip(self, info: RecordingInfo | None) -> None:
         # Loads the film strip in a background thread.
-        can_read = (
-            facts is not None and facts.is_read and not facts.problem and not self._is_being_written(facts)
-        )
-        mark = (facts.path, facts.changed_s, facts.size_bytes) if facts is not None and can_read else None
+        can_read = info is not None and info.is_read and not info.problem and not self._is_being_written(info)
+        mark = (info.path, info.changed_s, info.size_bytes) if info is not None and can_read else None
         if mark == self._strip_of:
             return
         self._strip_of, self._loop = mark, None
@@ -255,15 +253,15 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
 
     def _poll_strip(self) -> None:
         # Shows the film strip once it is loaded; a loop on the timeline becomes the selected part.
-        made = self._strips.pop_result("strip")
-        if made is not None:
-            look, images = made
-            if look is not None and self._strip_of is not None and look.path == self._strip_of[0]:
-                self.details.show_strip(look, images)
+        result = self._strips.pop_result("strip")
+        if result is not None:
+            preview, images = result
+            if preview is not None and self._strip_of is not None and preview.path == self._strip_of[0]:
+                self.details.show_strip(preview, images)
                 self._loop = None
-        replay, look = self.session.replay, self.details.strip.look
+        replay, preview = self.session.replay, self.details.strip.look
         player = replay.player if replay is not None else None
-        if look is None or replay is None or player is None or replay.path != look.path:
+        if preview is None or replay is None or player is None or replay.path != preview.path:
             return
         loop = player.loop if player.is_looping else None
         if loop != self._loop:
@@ -273,10 +271,10 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def _run_on_selected(self, do: Callable[[str], object]) -> None:
-        facts = self._selected()
-        if facts is not None:
-            do(str(facts.path))
+    def _run_on_selected(self, action: Callable[[str], object]) -> None:
+        info = self._selected()
+        if info is not None:
+            action(str(info.path))
 
     def open_row(self, key: str) -> None:
         self.context.run(f"recording.open:{key}")
@@ -300,13 +298,13 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         return self.model.row_at(self.model.index_of(key))
 
     def _rename(self, key: str) -> None:
-        facts = self._facts_of(key)
-        if facts is None or self._is_being_written(facts):
+        info = self._facts_of(key)
+        if info is None or self._is_being_written(info):
             self.context.show_toast(_("A recording can be renamed after it has ended"))
             return
         table = self.table
         if isinstance(table, RecordingTable):
-            table.rename(key, facts.path.stem, lambda name: self._apply_name(facts.path, name))
+            table.rename(key, info.path.stem, lambda name: self._apply_name(info.path, name))
 
     def _apply_name(self, path: Path, name: str) -> bool:
         stem = file_stem(name)
@@ -328,13 +326,13 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
     def _move_files(self, path: Path, new: Path) -> bool:
         try:
             replace_file(path, new)
-            beside = path.with_name(path.name + SIDECAR_SUFFIX)
-            if beside.exists():
-                replace_file(beside, new.with_name(new.name + SIDECAR_SUFFIX))
+            sidecar = path.with_name(path.name + SIDECAR_SUFFIX)
+            if sidecar.exists():
+                replace_file(sidecar, new.with_name(new.name + SIDECAR_SUFFIX))
         except OSError as error:
-            words = _("Can't rename {file}: {reason}")
+            message = _("Can't rename {file}: {reason}")
             self.context.show_toast(
-                words.format(file=path.name, reason=(error.strerror or str(error)).lower())
+                message.format(file=path.name, reason=(error.strerror or str(error)).lower())
             )
             return False
         return True
@@ -351,34 +349,34 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         self.rebuild()
 
     def _delete(self, key: str) -> None:
-        facts = self._facts_of(key)
-        if facts is None or self._is_being_written(facts):
+        info = self._facts_of(key)
+        if info is None or self._is_being_written(info):
             self.context.show_toast(_("A recording can be deleted after it has ended"))
             return
-        path = facts.path
+        path = info.path
         bin_file = QFile(str(path))
         if not bin_file.moveToTrash():
-            words = _("Can't move {file} to the bin: {reason}")
-            self.context.show_toast(words.format(file=path.name, reason=bin_file.errorString().lower()))
+            message = _("Can't move {file} to the bin: {reason}")
+            self.context.show_toast(message.format(file=path.name, reason=bin_file.errorString().lower()))
             return
         self._update_listing(path, None)
         self.table.setFocus(Qt.FocusReason.OtherFocusReason)
-        there = Path(bin_file.fileName())
-        words = _("Moved “{name}” to the bin").format(name=path.stem)
-        if there != path and there.is_file():
-            self.context.show_toast(words, _("Undo"), lambda: self._restore_deleted(there, path))
+        trash_path = Path(bin_file.fileName())
+        message = _("Moved “{name}” to the bin").format(name=path.stem)
+        if trash_path != path and trash_path.is_file():
+            self.context.show_toast(message, _("Undo"), lambda: self._restore_deleted(trash_path, path))
         else:
-            self.context.show_toast(words)
+            self.context.show_toast(message)
 
-    def _restore_deleted(self, there: Path, path: Path) -> None:
+    def _restore_deleted(self, trash_path: Path, path: Path) -> None:
         try:
-            replace_file(there, free(path))
-            about = there.parent.parent / "info" / f"{there.name}.trashinfo"
+            replace_file(trash_path, free(path))
+            about = trash_path.parent.parent / "info" / f"{trash_path.name}.trashinfo"
             about.unlink(missing_ok=True)
         except OSError as error:
-            words = _("Can't restore {file}: {reason}")
+            message = _("Can't restore {file}: {reason}")
             self.context.show_toast(
-                words.format(file=path.name, reason=(error.strerror or str(error)).lower())
+                message.format(file=path.name, reason=(error.strerror or str(error)).lower())
             )
             return
         self._wanted = str(path)
@@ -392,21 +390,21 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
     # -- export -------------------------------------------------------------------------------------------
 
     def _export(self, kind: str) -> None:
-        facts, part = self._selected(), self.details.part()
-        if facts is None or self._job is not None:
+        info, part = self._selected(), self.details.part()
+        if info is None or self._job is not None:
             return
         if part is None:
             self.context.show_toast(_("No matching topics in this recording"))
             return
-        folder = free(self.details.export_path() or facts.path.with_suffix(""), is_folder=True)
-        self._job = RecordingExport(facts.path, kind, folder, part, self._recordings.new_opener())
+        folder = free(self.details.export_path() or info.path.with_suffix(""), is_folder=True)
+        self._job = RecordingExport(info.path, kind, folder, part, self._recordings.new_opener())
         self.details.show_export(self._job)
 
     def _select_folder(self) -> None:
-        facts = self._selected()
-        if facts is not None:
-            place = self.details.folder or facts.path.parent
-            self.context.files.select_folder(str(place), self.details.set_folder)
+        info = self._selected()
+        if info is not None:
+            folder = self.details.folder or info.path.parent
+            self.context.files.select_folder(str(folder), self.details.set_folder)
 
     def _cancel_export(self) -> None:
         if self._job is not None:
@@ -474,28 +472,28 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
 
 def _load_thumbnail(path: Path, opener: RecordingOpener) -> QImage | None:
     # Runs in a background thread.
-    found = read_picture(path, (2 * THUMBNAIL_SIZE.width(), 2 * THUMBNAIL_SIZE.height()), opener)
-    return crop_to_thumbnail(_convert_picture(found)).copy() if found is not None else None
+    picture = read_picture(path, (2 * THUMBNAIL_SIZE.width(), 2 * THUMBNAIL_SIZE.height()), opener)
+    return crop_to_thumbnail(_convert_picture(picture)).copy() if picture is not None else None
 
 
 def _convert_picture(picture: Picture) -> QImage:
     pixels = picture.bgra
-    high, wide = pixels.shape[:2]
-    return QImage(pixels.tobytes(), wide, high, wide * 4, QImage.Format.Format_RGB32).copy()
+    height, width = pixels.shape[:2]
+    return QImage(pixels.tobytes(), width, height, width * 4, QImage.Format.Format_RGB32).copy()
 
 
 def _load_strip(
     path: Path, opener: RecordingOpener
 ) -> tuple[FilmStripPreview | None, Sequence[QImage | None]]:
     # Runs in a background thread.
-    look = film_strip(path, STRIP_PICTURES, STRIP_BARS, STRIP_SIZE, opener)
-    if look is None:
+    preview = film_strip(path, STRIP_PICTURES, STRIP_BARS, STRIP_SIZE, opener)
+    if preview is None:
         return None, ()
-    return look, [_convert_picture(each) if each is not None else None for each in look.pictures]
+    return preview, [_convert_picture(each) if each is not None else None for each in preview.pictures]
 
 
-def _haystack(facts: RecordingInfo) -> str:
-    return " ".join((facts.path.stem, facts.note, *facts.topics)).casefold()
+def _haystack(info: RecordingInfo) -> str:
+    return " ".join((info.path.stem, info.note, *info.topics)).casefold()
 
 
 PANEL = Panel("recordings", TABLE_TEXTS.title, "film", (), RecordingsPanel)

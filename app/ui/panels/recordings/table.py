@@ -61,27 +61,27 @@ class RecordingTable(TableView[RecordingInfo]):
         else:
             super().keyPressEvent(event)
 
-    def rename(self, key: str, name: str, take: Callable[[str], bool]) -> None:
+    def rename(self, key: str, name: str, on_rename: Callable[[str], bool]) -> None:
         """Start editing the name of a recording in place.
 
         Args:
             key: Key of the recording.
             name: Current name.
-            take: Receives the new name and returns False if it is invalid.
+            on_rename: Receives the new name and returns False if it is invalid.
         """
         self.select_key(key)
         index = self.currentIndex()
         self.scrollTo(index)
         row = self.visualRect(self.model().index(index.row(), 0))
         left = row.left() + EDGE + round(self.theme.scaled(THUMBNAIL_SIZE.width())) + GAP - 8
-        high = min(row.height() - 8, round(self.theme.scaled(32)))
-        rect = QRect(left, row.center().y() - high // 2, max(80, row.right() - left - 8), high)
-        said = _("Recording name")
-        self.field = RenameField(self.theme, self.viewport(), rect, name, take, said)
+        height = min(row.height() - 8, round(self.theme.scaled(32)))
+        rect = QRect(left, row.center().y() - height // 2, max(80, row.right() - left - 8), height)
+        accessible_name = _("Recording name")
+        self.field = RenameField(self.theme, self.viewport(), rect, name, on_rename, accessible_name)
         self.field.closed.connect(self._rename_finished)
 
     def _rename_finished(self) -> None:
-        had = self.field is not None and self.field.hasFocus()
+        had_focus = self.field is not None and self.field.hasFocus()
         self.field = None
-        if had:
+        if had_focus:
             self.setFocus(Qt.FocusReason.OtherFocusReason)

@@ -38,9 +38,9 @@ class TopicList(QWidget):
         self.filter.textChanged.connect(self._show_rows)
         self.all = Button(theme, _("All"), "check", size="small")
         self.none = Button(theme, _("None"), "minus", size="small")
-        self.all.clicked.connect(lambda: self._set_matching_selected(wanted=True))
-        self.none.clicked.connect(lambda: self._set_matching_selected(wanted=False))
-        self.count = ElidedLabel("small", "textSecondary", least=60)
+        self.all.clicked.connect(lambda: self._set_matching_selected(is_selected=True))
+        self.none.clicked.connect(lambda: self._set_matching_selected(is_selected=False))
+        self.count = ElidedLabel("small", "textSecondary", min_width=60)
         self.model: TableModel[RecordedTopic] = TableModel(self._columns(), lambda topic: topic.name)
         self.table: TableView[RecordedTopic] = TableView(theme, self.model, "topic")
         self.table.setAccessibleName(_("Topics to export"))
@@ -92,28 +92,28 @@ class TopicList(QWidget):
     def show_topics(
         self,
         topics: Sequence[RecordedTopic],
-        chosen: Collection[str],
+        checked: Collection[str],
         size_of: Callable[[RecordedTopic], float | None],
     ) -> None:
         """Replace the topics.
 
         Args:
             topics: Topics of the recording.
-            chosen: Names of checked topics.
+            checked: Names of checked topics.
             size_of: Returns the size of a topic's messages in bytes, or None if it is unknown.
         """
-        self._names, self._size_of = frozenset(chosen), size_of
+        self._names, self._size_of = frozenset(checked), size_of
         if topics is not self._topics:
             self._topics = topics
             self.filter.clear()
         self._show_rows()
 
     def _matching_topics(self) -> list[RecordedTopic]:
-        words = self.filter.text().casefold().split()
+        keywords = self.filter.text().casefold().split()
         return [
             topic
             for topic in self._topics
-            if all(word in f"{topic.name} {topic.msg_type}".casefold() for word in words)
+            if all(keyword in f"{topic.name} {topic.msg_type}".casefold() for keyword in keywords)
         ]
 
     def _show_rows(self) -> None:
@@ -121,16 +121,16 @@ class TopicList(QWidget):
         self.table.refresh_visible()
         self.table.viewport().update()
         count = sum(topic.message_count for topic in self._topics if topic.name in self._names)
-        words = ngettext("{count} message", "{count} messages", count)
-        self.count.setText(words.format(count=group_digits(count)))
+        template = ngettext("{count} message", "{count} messages", count)
+        self.count.setText(template.format(count=group_digits(count)))
 
     def _toggle(self, name: str) -> None:
         self._set_selection(self._names ^ {name})
 
-    def _set_matching_selected(self, *, wanted: bool) -> None:
+    def _set_matching_selected(self, *, is_selected: bool) -> None:
         # Topics that match the filter.
-        shown = {topic.name for topic in self._matching_topics()}
-        self._set_selection(self._names | shown if wanted else self._names - shown)
+        matching = {topic.name for topic in self._matching_topics()}
+        self._set_selection(self._names | matching if is_selected else self._names - matching)
 
     def _set_selection(self, names: frozenset[str]) -> None:
         self._names = names
@@ -151,6 +151,6 @@ def shortest_choice(
         Names of the included topics, and names of the excluded topics. One of them is empty; if both are
         empty, all topics are selected.
     """
-    wanted = tuple(topic.name for topic in topics if topic.name in names)
+    included = tuple(topic.name for topic in topics if topic.name in names)
     unwanted = tuple(topic.name for topic in topics if topic.name not in names)
-    return ((), unwanted) if len(unwanted) < len(wanted) else (wanted, ())
+    return ((), unwanted) if len(unwanted) < len(included) else (included, ())

@@ -25,9 +25,9 @@ class LargeRoom(QWidget):
     closed = Signal()
 
     def __init__(self, theme: Theme, panel: QWidget, stage: QWidget, tools: Sequence[QWidget] = ()) -> None:
-        over = _workbench_of(panel)
-        super().__init__(over)
-        self._theme, self._over = theme, over
+        workbench = _workbench_of(panel)
+        super().__init__(workbench)
+        self._theme, self._over = theme, workbench
         self.filled = False
         self.setAccessibleName(_("Large room"))
         self.screen_button = Button(theme, _("Full screen"), "fullscreen", size="small")
@@ -46,13 +46,13 @@ class LargeRoom(QWidget):
         column.setSpacing(0)
         column.addLayout(row)
         column.addWidget(stage, 1)
-        over.installEventFilter(self)
-        self._top = over.window()  # receives Esc while the run bar has the focus
+        workbench.installEventFilter(self)
+        self._top = workbench.window()  # receives Esc while the run bar has the focus
         self._top.installEventFilter(self)
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.focusChanged.connect(self._retain_focus)
-        self.setGeometry(over.rect())
+        self.setGeometry(workbench.rect())
         stage.show()
         self.show()
         self.raise_()

@@ -170,8 +170,10 @@ class RobotPanel(OneRobotPanel):
             action.triggered.connect(lambda _on=False, name=link.name: self.session.fleet.select(name))
         if self._robot in self.session.launcher.wanted:
             menu.addSeparator()
-            away = menu.addAction(plain.escape_menu_text(_("Remove {robot}").format(robot=self._robot)))
-            away.triggered.connect(
+            remove_action = menu.addAction(
+                plain.escape_menu_text(_("Remove {robot}").format(robot=self._robot))
+            )
+            remove_action.triggered.connect(
                 lambda _on=False, name=self._robot: self.context.run(f"robot.end_virtual:{name}")
             )
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -198,10 +200,10 @@ class RobotPanel(OneRobotPanel):
 
     def _awaited_values(self, event: Event, name: str) -> Sequence[str]:
         # Values used in the active behaviour come first.
-        link, shown = self.session.fleet.link(self._robot), self.session.document
+        link, active = self.session.fleet.link(self._robot), self.session.document
         if link is None:
             return ()
-        documents = [shown, *(each for each in self.session.documents if each is not shown)]
+        documents = [active, *(each for each in self.session.documents if each is not active)]
         return awaited_values((each.workspace for each in documents), link.robot, event, name)
 
     def _toggle_sound(self) -> None:
@@ -217,11 +219,11 @@ class RobotPanel(OneRobotPanel):
             return
         self._sound_shown = (on, problem)
         self.sound.set_icon("volume-2" if on and not problem else "volume-x")
-        words = _("Mute the robots") if on else _("Unmute the robots")
-        self.sound.set_name(words)
+        text = _("Mute the robots") if on else _("Unmute the robots")
+        self.sound.set_name(text)
         self.sound.setAccessibleDescription(problem if on else "")
         if on and problem:
-            self.sound.setToolTip(plain.tip(f"{words}\n{problem}"))
+            self.sound.setToolTip(plain.tip(f"{text}\n{problem}"))
 
     # -- room ---------------------------------------------------------------------------------------------
 
@@ -246,28 +248,32 @@ class RobotPanel(OneRobotPanel):
     def _speech_caption(self) -> str:
         # Caption of speech that is still playing after its bubble disappeared, or of words that a robot
         # heard.
-        said = self.session.voices.current
+        speech = self.session.voices.current
         robots = [(self._robot, self.view.state), *self.view.others]
-        if said is not None and said.text not in {state.speech for _name, state in robots}:
-            return f"{said.robot}: {said.text}"
-        heard = [(name, state.heard_text) for name, state in robots if state.heard_text]
-        return _("{robot} heard “{words}”").format(robot=heard[0][0], words=heard[0][1]) if heard else ""
+        if speech is not None and speech.text not in {state.speech for _name, state in robots}:
+            return f"{speech.robot}: {speech.text}"
+        heard_texts = [(name, state.heard_text) for name, state in robots if state.heard_text]
+        return (
+            _("{robot} heard “{words}”").format(robot=heard_texts[0][0], words=heard_texts[0][1])
+            if heard_texts
+            else ""
+        )
 
     def _watch_other_robots(self, link: RobotLink) -> list[RobotLink]:
         # Every other virtual robot is watched while the panel is visible.
         fleet = self.session.fleet
-        there = [each for each in fleet.connected if each.is_virtual and each.name != link.name]
-        names = {each.name for each in there}
+        other_links = [each for each in fleet.connected if each.is_virtual and each.name != link.name]
+        names = {each.name for each in other_links}
         for name in self._looks.keys() - names:
             self._looks.pop(name).close()
         for name in names - self._looks.keys():
             self._looks[name] = fleet.watch_sensors(name)
-        return there
+        return other_links
 
     def _move_thing(self, name: str, x: float, y: float) -> None:
         if self.view.state.is_room_shared:
             states = [self.view.state, *(state for _name, state in self.view.others)]
-            robots = {str(at): (each.x, each.y, radius_of(each)) for at, each in enumerate(states)}
+            robots = {str(index): (each.x, each.y, radius_of(each)) for index, each in enumerate(states)}
             self.session.room.move(name, x, y, robots)
         else:
             self._change_world({"move": name, "x": round(x, 3), "y": round(y, 3)})
@@ -278,17 +284,17 @@ class RobotPanel(OneRobotPanel):
         for name in ("", *(name for name, _state in self.view.others)):
             self._change_world({"reset": True}, name)
 
-    def _show_room_menu(self, thing: str, place: QPoint | None, button: QWidget | None = None) -> None:
+    def _show_room_menu(self, thing: str, position: QPoint | None, button: QWidget | None = None) -> None:
         # Opens at a position (context menu), or below a button.
         menu = Menu(self.theme, self)
         if thing:
-            words = plain.escape_menu_text(_("Remove {thing}").format(thing=thing))
-            action = menu.addAction(self.theme.icon("trash-2"), words)
+            text = plain.escape_menu_text(_("Remove {thing}").format(thing=thing))
+            action = menu.addAction(self.theme.icon("trash-2"), text)
             action.triggered.connect(lambda: self.session.room.remove(thing))
             menu.addSeparator()
         if self.view.state.is_room_shared:
-            for kind, (words, icon) in ADDABLE_THINGS.items():
-                action = menu.addAction(self.theme.icon(icon), _(words))
+            for kind, (text, icon) in ADDABLE_THINGS.items():
+                action = menu.addAction(self.theme.icon(icon), _(text))
                 action.triggered.connect(lambda _on=False, kind=kind: self._add_thing(kind))
             menu.addSeparator()
         menu.addAction(self.theme.icon("rotate-cw"), _("Reset room")).triggered.connect(self._reset_room)
@@ -297,10 +303,10 @@ class RobotPanel(OneRobotPanel):
         start.setChecked(self.session.fleet.resets_at_start)
         start.triggered.connect(lambda: self.context.run("run.from_start"))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        if place is None:
+        if position is None:
             open_below(menu, button or self.add)
         else:
-            menu.popup(place)
+            menu.popup(position)
 
     def _add_thing(self, kind: str) -> None:
         # Adds a thing at a free place in front of the first robot.

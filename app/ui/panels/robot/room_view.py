@@ -47,8 +47,8 @@ def split(part: str) -> tuple[str, str]:
 
     The name is "" for the main robot.
     """
-    name, _slash, of = part.rpartition("/")
-    return name, of
+    name, _slash, part_name = part.rpartition("/")
+    return name, part_name
 
 
 class RoomView(QWidget):
@@ -92,12 +92,12 @@ class RoomView(QWidget):
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(_("Robots in their room"))
-        words = _(
+        tooltip = _(
             "Click a robot's head or hand, or a small robot, to touch it. Drag robots and objects to "
             "move them. Double-click to enlarge the room.\nKeys: Tab selects, the arrow keys move, "
             "Space touches, H, L and R touch the head and the hands"
         )
-        self.setToolTip(plain.tip(words))
+        self.setToolTip(plain.tip(tooltip))
         theme.changed.connect(self.update)
 
     # -- display ------------------------------------------------------------------------------------------
@@ -115,10 +115,10 @@ class RoomView(QWidget):
             others: Names and states of the other robots in the room.
             things: Things to draw; None for the things in the state of the main robot.
         """
-        told = (id(data), [(name, id(each)) for name, each in others], things)
-        if told == self._data:
+        state_key = (id(data), [(name, id(each)) for name, each in others], things)
+        if state_key == self._data:
             return
-        self._data = told
+        self._data = state_key
         self._kept = (data, others)  # keeps the objects alive, so that their ids are not reused
         state = RobotState.parse(data)
         if things is not None:
@@ -136,10 +136,10 @@ class RoomView(QWidget):
             self.setAccessibleDescription(self._description())
             self.update()
 
-    def set_caption(self, words: str) -> None:
+    def set_caption(self, text: str) -> None:
         """Show the text that a robot has heard as a caption below the drawing; "" removes the caption."""
-        if words != self.heard:
-            self.heard = words
+        if text != self.heard:
+            self.heard = text
             self.update()
 
     def _description(self) -> str:
@@ -155,8 +155,8 @@ class RoomView(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         state = replace(self.state, speech=None, sound="", is_moving=False) if self.stale else self.state
-        chosen = self.chosen if self.hasFocus() else None
-        marks = Marks(self._hovered, chosen, self._theme.colour("focus"))
+        selected = self.chosen if self.hasFocus() else None
+        marks = Marks(self._hovered, selected, self._theme.colour("focus"))
         area = QRectF(self.rect())
         self._drawing.paint(painter, area, state, self.others, marks=marks, dark=self._theme.dark)
         if self.stale:
@@ -171,19 +171,19 @@ class RoomView(QWidget):
         return self._drawing.part_at(position, QRectF(self.rect()), self.state, self.others)
 
     def _thing(self, part: str | None) -> Thing | None:
-        found = (thing for thing in self.state.objects if part in {thing.name, thing.kind})
-        return next(found, None) if part else None
+        matches = (thing for thing in self.state.objects if part in {thing.name, thing.kind})
+        return next(matches, None) if part else None
 
     def _robot(self, part: str | None) -> RobotState | None:
         # Returns the robot that has this part as its body.
-        name, of = split(part or "")
-        return ({"": self.state} | dict(self.others)).get(name) if of == BODY else None
+        name, part_name = split(part or "")
+        return ({"": self.state} | dict(self.others)).get(name) if part_name == BODY else None
 
     def _position_m(self, part: str | None) -> tuple[float, float] | None:
         # Returns the position in m of an item that can be moved.
-        found = self._robot(part) or self._thing(part)
-        movable = found is not None and (isinstance(found, RobotState) or self._is_movable(found))
-        return (found.x, found.y) if found is not None and movable else None
+        item = self._robot(part) or self._thing(part)
+        movable = item is not None and (isinstance(item, RobotState) or self._is_movable(item))
+        return (item.x, item.y) if item is not None and movable else None
 
     def _is_movable(self, thing: Thing) -> bool:
         return self.state.is_room_shared or thing.kind in {"ball", "person"}
@@ -203,14 +203,14 @@ class RoomView(QWidget):
             self._part_at(event.position()) if event.button() == Qt.MouseButton.LeftButton else None
         )
         self._pressed_at, self._dragging = event.position(), False
-        where = self._position_m(self._pressed)
+        position_m = self._position_m(self._pressed)
         if self._pressed is not None and split(self._pressed)[1] in TOUCHABLE_PARTS:
             self.touched.emit(*split(self._pressed), True)
-        elif where is not None:
+        elif position_m is not None:
             self.chosen = self._pressed
             self.update()
-            foot = self._drawing.pixel_of(*where, QRectF(self.rect()), self.state)
-            self._offset = foot - event.position()
+            pixel = self._drawing.pixel_of(*position_m, QRectF(self.rect()), self.state)
+            self._offset = pixel - event.position()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._pressed is None:
@@ -282,23 +282,25 @@ class RoomView(QWidget):
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         if event.reason() == QContextMenuEvent.Reason.Mouse:
-            part, place = self._part_at(QPointF(event.pos())), event.globalPos()
+            part, position = self._part_at(QPointF(event.pos())), event.globalPos()
         else:
             part = self.chosen
-            place = self.mapToGlobal(
+            position = self.mapToGlobal(
                 (self.position_of(part or "") or QPointF(self.rect().center())).toPoint()
             )
         thing = self._thing(part)
-        self.menu_requested.emit(thing.name if thing is not None and self._is_movable(thing) else "", place)
+        self.menu_requested.emit(
+            thing.name if thing is not None and self._is_movable(thing) else "", position
+        )
 
     # -- keyboard -----------------------------------------------------------------------------------------
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         choices = self.selectable_items()
-        at = choices.index(self.chosen) if self.chosen in choices else -1 if forward else len(choices)
-        at += 1 if forward else -1
-        if 0 <= at < len(choices):
-            self.chosen = choices[at]
+        index = choices.index(self.chosen) if self.chosen in choices else -1 if forward else len(choices)
+        index += 1 if forward else -1
+        if 0 <= index < len(choices):
+            self.chosen = choices[index]
             thing = self._thing(self.chosen)
             name = split(self.chosen)[0] or self.robot_name
             paint.announce(self, thing.name if thing is not None else name)
@@ -309,12 +311,12 @@ class RoomView(QWidget):
         return super().focusNextPrevChild(forward)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, where = Qt.Key(event.key()), self._position_m(self.chosen)
-        if key in ARROW_DIRECTIONS and where is not None and self.chosen is not None:
+        key, position_m = Qt.Key(event.key()), self._position_m(self.chosen)
+        if key in ARROW_DIRECTIONS and position_m is not None and self.chosen is not None:
             small = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
             step = SMALL_STEP_M if small else STEP_M
-            ahead, aside = ARROW_DIRECTIONS[key]
-            self._move(self.chosen, where[0] + ahead * step, where[1] + aside * step)
+            dx, aside = ARROW_DIRECTIONS[key]
+            self._move(self.chosen, position_m[0] + dx * step, position_m[1] + aside * step)
         elif key in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and self._thing(self.chosen) is not None:
             self.removed.emit(self.chosen)
         elif key in PRESS_KEYS and self._has_bumper(self._keyboard_target()) and has_no_modifiers(event):
@@ -340,11 +342,11 @@ class RoomView(QWidget):
     def keyReleaseEvent(self, event: QKeyEvent) -> None:
         if event.isAutoRepeat():
             return
-        held = self._keys.pop(event.key(), None)
-        if held is None:
+        touch = self._keys.pop(event.key(), None)
+        if touch is None:
             event.ignore()
         else:
-            self.touched.emit(*held, False)
+            self.touched.emit(*touch, False)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         # The key release goes to the newly focused widget, so end all touches here.

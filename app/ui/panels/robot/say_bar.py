@@ -48,10 +48,10 @@ class SayField(SearchField):
     def sizeHint(self) -> QSize:
         return QSize(120, super().sizeHint().height())
 
-    def submit(self, words: str) -> None:
+    def submit(self, text: str) -> None:
         """Emit a text as `submitted` and clear the field; ignored if the text is blank."""
-        if words.strip():
-            self._last = words.strip()
+        if text.strip():
+            self._last = text.strip()
             self.clear()
             self.submitted.emit(self._last)
 
@@ -111,9 +111,9 @@ class SayBar(QWidget):
         """Switch to another robot."""
         self._robot = robot
         hears = robot.event(HEARD_EVENT) is not None
-        words = _("Say something to {robot}").format(robot=robot.name)
-        self.field.setPlaceholderText(words)
-        self.field.setAccessibleName(words)
+        text = _("Say something to {robot}").format(robot=robot.name)
+        self.field.setPlaceholderText(text)
+        self.field.setAccessibleName(text)
         self.field.setVisible(hears)
         self.words.setVisible(hears)
         self.events.setVisible(any(True for _entry in self.simulated_events()))
@@ -129,9 +129,9 @@ class SayBar(QWidget):
     def show_suggestions(self) -> None:
         """Show a menu of the words that programs react to; selecting one says it."""
         menu = Menu(self._theme, self)
-        for word in self.suggestions():
-            menu.addAction(plain.escape_menu_text(word)).triggered.connect(
-                lambda _on=False, word=word: self.field.submit(word)
+        for suggestion in self.suggestions():
+            menu.addAction(plain.escape_menu_text(suggestion)).triggered.connect(
+                lambda _on=False, word=suggestion: self.field.submit(word)
             )
         if menu.isEmpty():
             menu.addAction(_("No program is waiting for speech")).setEnabled(False)
@@ -149,8 +149,8 @@ class SayBar(QWidget):
     def show_event_menu(self) -> None:
         """Show the menu of events."""
         menu = Menu(self._theme, self)
-        for words, icon, happening in list(self.simulated_events())[:MAX_ENTRIES]:
-            action = menu.addAction(self._theme.icon(icon), plain.escape_menu_text(words))
+        for text, icon, happening in list(self.simulated_events())[:MAX_ENTRIES]:
+            action = menu.addAction(self._theme.icon(icon), plain.escape_menu_text(text))
             action.triggered.connect(lambda _on=False, told=happening: self.event_simulated.emit(told))
         self._pop_up(menu, self.events)
 
@@ -176,7 +176,7 @@ def _entries(event: Event, awaited: AwaitedValuesGetter) -> Iterator[tuple[str, 
 
 def _event_text(event: Event, values: dict[str, str]) -> str:
     # Text of the event's block without the robot, such as "Sees something red".
-    words = event.text.partition("%robot")[2].strip() or event.title
+    text = event.text.partition("%robot")[2].strip() or event.title
     for name, title in values.items():
-        words = words.replace(f"%{name}", title)
-    return words[:1].upper() + words[1:]
+        text = text.replace(f"%{name}", title)
+    return text[:1].upper() + text[1:]

@@ -97,21 +97,21 @@ class ActionCard(Card):
         self.show_invocation(None)
 
     def _lay_out(self, theme: Theme) -> None:
-        head = Flow()
+        header = Flow()
         before: tuple[QWidget, ...] = (Tile(theme, self.action.icon), self.title, self.risk)
         after: tuple[QWidget, ...] = (self.left, self.result, self.past, self.try_button, self.fold)
         below: tuple[QWidget, ...] = (self.form, self.error, self.progress, self.tries)
         for widget in before:
-            head.addWidget(widget)
-        head.add_elastic(self.summary)
-        head.push()
-        head.add_elastic(self.words)
+            header.addWidget(widget)
+        header.add_elastic(self.summary)
+        header.push()
+        header.add_elastic(self.words)
         for widget in after:
-            head.addWidget(widget)
+            header.addWidget(widget)
         column = QVBoxLayout(self)
         column.setContentsMargins(16, 13, 16, 13)
         column.setSpacing(8)
-        column.addLayout(head)
+        column.addLayout(header)
         for widget in below:
             column.addWidget(widget)
 
@@ -148,8 +148,10 @@ class ActionCard(Card):
             self.try_requested.emit(dict(self._given))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier)
-        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and held and not self._running:
+        has_ctrl = event.modifiers() & (
+            Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier
+        )
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and has_ctrl and not self._running:
             self._press()
         else:
             super().keyPressEvent(event)
@@ -157,10 +159,10 @@ class ActionCard(Card):
     def _set_tries_visible(self, on: bool) -> None:
         self.tries.setVisible(on)
 
-    def _reuse_input(self, given: Mapping[str, object]) -> None:
+    def _reuse_input(self, input_values: Mapping[str, object]) -> None:
         # Puts the input of an earlier try into the form.
         self.set_collapsed(False)
-        self.form.set_input(given)
+        self.form.set_input(input_values)
         self.form.show_problems(())
 
     def show_problems(self, problems: Sequence[InputProblem]) -> None:
@@ -189,29 +191,29 @@ class ActionCard(Card):
             self.try_button.set_label(_("Cancel"), "x")
         else:
             self.try_button.set_label(_("Try"), "play")
-        said = _("Cancel {action}") if can_cancel else _("Try {action}")
-        self.try_button.setAccessibleName(said.format(action=self.action.title))
+        template = _("Cancel {action}") if can_cancel else _("Try {action}")
+        self.try_button.setAccessibleName(template.format(action=self.action.title))
         self.try_button.setEnabled(can_cancel or not self._running)
         self.set_highlighted(self.border == "accent")
-        share, words, left = None, "", ""
+        share, text, remaining = None, "", ""
         if invocation is not None and self._running:
             share = progress_of(self.action, self._given or invocation.input, invocation.feedback)
-            words = state_text(self.action, invocation, self._title_of)
-            left = remaining_text(invocation)
+            text = state_text(self.action, invocation, self._title_of)
+            remaining = remaining_text(invocation)
         self.progress.setVisible(share is not None)
         self.progress.set_fraction(share)
-        self.words.setText(words)
-        self.left.setText(left)
-        self.left.setVisible(bool(left))
+        self.words.setText(text)
+        self.left.setText(remaining)
+        self.left.setVisible(bool(remaining))
         self._show_result(None if self._running else invocation, may_move)
 
     def _show_result(self, invocation: Invocation | None, may_move: bool) -> None:
-        said, status, sentence = ("", "ok", "")
+        chip_text, status, message = ("", "ok", "")
         if invocation is not None:
-            said, status, sentence = result_texts(invocation, may_move=may_move)
-        self.result.set(said, status)
+            chip_text, status, message = result_texts(invocation, may_move=may_move)
+        self.result.set(chip_text, status)
         if invocation is not None and invocation.state == "succeeded":
             self.words.setText(output_text(self.action, invocation.output))
         set_role(self.error, "textSecondary" if status == "off" else "error")
-        self.error.setText(sentence)
-        self.error.setVisible(bool(sentence))
+        self.error.setText(message)
+        self.error.setVisible(bool(message))

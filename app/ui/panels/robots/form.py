@@ -81,22 +81,22 @@ class ActionForm(QWidget):
     def _add_row(self, parameter: Parameter, options: Sequence[str]) -> None:
         control = control_for(self._theme, parameter, options, self._pictures)
         # not plain text: with a buddy, "&" would define a mnemonic
-        words = plain.escape_menu_text(sentence_case(parameter.title))
-        name = label(words, "bodyLarge", role="textSecondary", wrap=True)
+        title = plain.escape_menu_text(sentence_case(parameter.title))
+        name = label(title, "bodyLarge", role="textSecondary", wrap=True)
         name.setBuddy(control.widget)
-        wrong = label("", "small", role="error", wrap=True)
-        wrong.hide()
+        error_label = label("", "small", role="error", wrap=True)
+        error_label.hide()
         cell = QWidget()
-        inside = QVBoxLayout(cell)
-        inside.setContentsMargins(0, 0, 0, 0)
-        inside.setSpacing(4)
-        inside.addWidget(control.widget)
-        inside.addWidget(wrong)
+        layout = QVBoxLayout(cell)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(4)
+        layout.addWidget(control.widget)
+        layout.addWidget(error_label)
         control.widget.setMinimumHeight(ROW_HEIGHT)
         self._heights[name] = max(ROW_HEIGHT, min(MIN_TALL_ROW_HEIGHT, control.widget.sizeHint().height()))
         self._position_row(2 * len(self._rows), name, cell)
         self.controls[parameter.name] = control
-        self._sentences[parameter.name] = wrong
+        self._sentences[parameter.name] = error_label
         self._rows[parameter.name] = (name, cell)
         control.changed(self._control_changed)
         control.finished(lambda: self._validate_field(parameter))
@@ -105,19 +105,21 @@ class ActionForm(QWidget):
 
     def _fit(self) -> None:
         # Labels are beside the controls if all controls fit there, else above them.
-        beside = round(self._theme.scaled(LABEL_WIDTH))
-        stacked = self.width() < beside + self._grid.horizontalSpacing() + self._control_width()
-        self._grid.setColumnMinimumWidth(0, 0 if stacked else beside)
+        label_width = round(self._theme.scaled(LABEL_WIDTH))
+        stacked = self.width() < label_width + self._grid.horizontalSpacing() + self._control_width()
+        self._grid.setColumnMinimumWidth(0, 0 if stacked else label_width)
         if stacked != self._stacked:
             self._stacked = stacked
-            for place, (name, cell) in enumerate(self._rows.values()):
-                self._position_row(2 * place, name, cell)
+            for index, (name, cell) in enumerate(self._rows.values()):
+                self._position_row(2 * index, name, cell)
 
     def _control_width(self) -> int:
         # Wrapping controls count with the width that they need for a single row.
-        each = [one.widget for one in self.controls.values()]
-        in_one_row = (one.sizeHint().width() for one in each if isinstance(one, Segments | ColourChoice))
-        return max((*in_one_row, *(one.minimumSizeHint().width() for one in each)), default=0)
+        each = [control.widget for control in self.controls.values()]
+        in_one_row = (
+            control.sizeHint().width() for control in each if isinstance(control, Segments | ColourChoice)
+        )
+        return max((*in_one_row, *(control.minimumSizeHint().width() for control in each)), default=0)
 
     def _position_row(self, row: int, name: QWidget, cell: QWidget) -> None:
         for widget in (name, cell):
@@ -136,8 +138,8 @@ class ActionForm(QWidget):
 
     def minimumSizeHint(self) -> QSize:
         # Minimum width with labels above the controls.
-        least = max((cell.minimumSizeHint().width() for _name, cell in self._rows.values()), default=0)
-        return QSize(least, super().minimumSizeHint().height())
+        min_width = max((cell.minimumSizeHint().width() for _name, cell in self._rows.values()), default=0)
+        return QSize(min_width, super().minimumSizeHint().height())
 
     def _control_changed(self) -> None:
         self.show_problems(())
@@ -146,9 +148,9 @@ class ActionForm(QWidget):
     def _validate_field(self, parameter: Parameter) -> None:
         # Validates when a field loses the focus, so that errors are shown before a try.
         value = self.controls[parameter.name].value()
-        wrong = None if value is None else value_problem(parameter, value)
-        said = [] if wrong is None else [wrong]
-        self._show_errors_of(parameter, said)
+        problem = None if value is None else value_problem(parameter, value)
+        problems = [] if problem is None else [problem]
+        self._show_errors_of(parameter, problems)
 
     def _show_advanced(self, on: bool) -> None:
         if on:
@@ -162,12 +164,12 @@ class ActionForm(QWidget):
 
     def input(self) -> dict[str, object]:
         """Return the input for the action; empty fields are omitted."""
-        given = {name: control.value() for name, control in self.controls.items()}
-        return {name: value for name, value in given.items() if value is not None}
+        values = {name: control.value() for name, control in self.controls.items()}
+        return {name: value for name, value in values.items() if value is not None}
 
-    def set_input(self, given: Mapping[str, object]) -> None:
+    def set_input(self, values: Mapping[str, object]) -> None:
         """Fill the form with an input, such as the input of an earlier try."""
-        for name, value in given.items():
+        for name, value in values.items():
             if name in self.controls:
                 self.controls[name].show_value(value)
 
@@ -180,31 +182,31 @@ class ActionForm(QWidget):
         rows = {parameter.name for parameter in self.action.parameters}
         self._set_errors(self.problem, [each.message for each in problems if each.parameter not in rows])
 
-    def _show_errors_of(self, parameter: Parameter, said: Sequence[str]) -> None:
+    def _show_errors_of(self, parameter: Parameter, problems: Sequence[str]) -> None:
         control = self.controls[parameter.name]
-        self._set_errors(self._sentences[parameter.name], () if control.error_text else said)
-        self._set_invalid(control.widget, wrong=bool(said or control.error_text))
-        if said and parameter.advanced:
+        self._set_errors(self._sentences[parameter.name], () if control.error_text else problems)
+        self._set_invalid(control.widget, is_invalid=bool(problems or control.error_text))
+        if problems and parameter.advanced:
             self.more.setChecked(True)
 
-    def _set_errors(self, place: QLabel, sentences: Sequence[str]) -> None:
-        place.setText(" ".join(f"{sentence_case(one)}." for one in sentences))
-        place.setVisible(bool(sentences))
+    def _set_errors(self, error_label: QLabel, messages: Sequence[str]) -> None:
+        error_label.setText(" ".join(f"{sentence_case(message)}." for message in messages))
+        error_label.setVisible(bool(messages))
 
-    def _set_invalid(self, widget: QWidget, *, wrong: bool) -> None:
+    def _set_invalid(self, widget: QWidget, *, is_invalid: bool) -> None:
         if isinstance(widget, LongTextField):
-            widget.set_invalid(wrong=wrong)
+            widget.set_invalid(is_invalid=is_invalid)
             return
         for field in [widget, *widget.findChildren(QLineEdit)]:
-            if isinstance(field, QLineEdit) and (field.property("wrong") == "true") != wrong:
-                field.setProperty("wrong", "true" if wrong else "false")
+            if isinstance(field, QLineEdit) and (field.property("wrong") == "true") != is_invalid:
+                field.setProperty("wrong", "true" if is_invalid else "false")
                 field.style().unpolish(field)
                 field.style().polish(field)
 
     def summary(self) -> str:
         """Return a short description of the input, such as "happy, for 2 s"."""
-        given = {name: control.value() for name, control in self.controls.items()}
-        return input_summary(self.action, given, texts=False)
+        values = {name: control.value() for name, control in self.controls.items()}
+        return input_summary(self.action, values, texts=False)
 
     def dispose(self) -> None:
         """Release the resources of all controls."""

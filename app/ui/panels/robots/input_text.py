@@ -12,18 +12,18 @@ UNITS = {"s": "seconds", "min": "minutes"}
 MAX_TEXT_LENGTH = 32
 
 
-def input_summary(action: Action, given: Mapping[str, object], *, texts: bool = True) -> str:
+def input_summary(action: Action, values: Mapping[str, object], *, texts: bool = True) -> str:
     """Format the most important values of an input, in the order of the parameters.
 
     Args:
         action: Action with the parameters.
-        given: Input by parameter name.
+        values: Input by parameter name.
         texts: False to omit texts, which are formatted in quotation marks.
     """
-    found = (
-        _value_text(parameter, given.get(parameter.name), texts=texts) for parameter in action.parameters
+    parts = (
+        _value_text(parameter, values.get(parameter.name), texts=texts) for parameter in action.parameters
     )
-    return ", ".join(words for words in found if words)
+    return ", ".join(text for text in parts if text)
 
 
 def is_unit(title: str, unit: str | None) -> bool:
@@ -37,11 +37,11 @@ def _value_text(parameter: Parameter, value: object, *, texts: bool) -> str:
     if title is not None:
         return title
     if parameter.kind in NUMBER_KINDS and isinstance(value, (int, float)):
-        said = number(value) if isinstance(value, float) else str(value)
-        said += f"{'' if parameter.unit in {'°', None} else ' '}{parameter.unit or ''}"
+        amount = number(value) if isinstance(value, float) else str(value)
+        amount += f"{'' if parameter.unit in {'°', None} else ' '}{parameter.unit or ''}"
         if is_unit(parameter.title, parameter.unit):
-            return _("for {duration}").format(duration=said)
-        return f"{parameter.title} {said}"
+            return _("for {duration}").format(duration=amount)
+        return f"{parameter.title} {amount}"
     if not texts:
         return ""
     if parameter.kind == "image" and value:
@@ -50,8 +50,8 @@ def _value_text(parameter: Parameter, value: object, *, texts: bool) -> str:
         text = " ".join(value.split())
         return f"“{text if len(text) <= MAX_TEXT_LENGTH else text[: MAX_TEXT_LENGTH - 1] + '…'}”"
     if parameter.kind in ("list", "object") and value:
-        words = format_for_editing(value)
-        return words if len(words) <= MAX_TEXT_LENGTH else f"{words[: MAX_TEXT_LENGTH - 1]}…"
+        formatted = format_for_editing(value)
+        return formatted if len(formatted) <= MAX_TEXT_LENGTH else f"{formatted[: MAX_TEXT_LENGTH - 1]}…"
     return str(value) if parameter.kind == "colour" and value else ""
 
 

@@ -58,34 +58,34 @@ class RobotItem(PaintedButton):
         row.addStretch(1)
         row.addWidget(self.chip)
 
-    def show_link(self, link: RobotLink, seen: str = "") -> None:
+    def show_link(self, link: RobotLink, last_seen: str = "") -> None:
         """Show the state of a robot of this session.
 
         Args:
             link: Link to the robot.
-            seen: Text with the time when the robot was last seen, shown while it is disconnected.
+            last_seen: Text with the time when the robot was last seen, shown while it is disconnected.
         """
-        where = _("virtual, this computer") if link.is_virtual else link.robot.title
-        away = not link.is_connected
-        self._show(link.state, seen if away and seen else where, away=away)
+        location = _("virtual, this computer") if link.is_virtual else link.robot.title
+        is_away = not link.is_connected
+        self._show(link.state, last_seen if is_away and last_seen else location, is_away=is_away)
         self.may_be_forgotten = self._away and not link.is_virtual
 
-    def show_disconnected(self, seen: str) -> None:
+    def show_disconnected(self, last_seen: str) -> None:
         """Show a robot of an earlier session that is not connected. A click opens its context menu.
 
         Args:
-            seen: Text with the time when the robot was last seen.
+            last_seen: Text with the time when the robot was last seen.
         """
         self.setAutoExclusive(False)
         self.setCheckable(False)
-        self._show("away", seen, away=True)
+        self._show("away", last_seen, is_away=True)
         self.may_be_forgotten = True
 
-    def _show(self, state: str, where: str, *, away: bool) -> None:
-        said = _(STATE_LABELS[state])
-        self.chip.set(said, STATUS_BY_ROBOT_STATE[state])
-        self.where, self._away = where, away
-        self.setAccessibleName(f"{self.name}, {where}, {said}")
+    def _show(self, state: str, location: str, *, is_away: bool) -> None:
+        state_label = _(STATE_LABELS[state])
+        self.chip.set(state_label, STATUS_BY_ROBOT_STATE[state])
+        self.where, self._away = location, is_away
+        self.setAccessibleName(f"{self.name}, {location}, {state_label}")
         self.update()
 
     def sizeHint(self) -> QSize:
@@ -108,12 +108,14 @@ class RobotItem(PaintedButton):
         paint_icon(painter, tile.adjusted(9, 9, -9, -9), "bot", icon)
         bold = theme.font("bodyLarge")
         bold.setWeight(bold.Weight.DemiBold)
-        ink = theme.colour("selectedText" if self.isChecked() else "textTertiary" if quiet else "text")
-        high = max(19.0, paint.height_of(bold) - 2)
-        words = QRectF(60, rect.center().y() - high, rect.width() - 66 - self.chip.width() - 12, high)
-        paint.text_line(painter, words, self.name, bold, ink)
-        where = theme.colour("textTertiary" if quiet else "textSecondary")
-        paint.text_line(painter, words.translated(0, high), self.where, theme.font("small"), where)
+        colour = theme.colour("selectedText" if self.isChecked() else "textTertiary" if quiet else "text")
+        height = max(19.0, paint.height_of(bold) - 2)
+        text_rect = QRectF(60, rect.center().y() - height, rect.width() - 66 - self.chip.width() - 12, height)
+        paint.text_line(painter, text_rect, self.name, bold, colour)
+        location_colour = theme.colour("textTertiary" if quiet else "textSecondary")
+        paint.text_line(
+            painter, text_rect.translated(0, height), self.where, theme.font("small"), location_colour
+        )
 
 
 class RobotList(QWidget):
@@ -150,8 +152,8 @@ class RobotList(QWidget):
         column.setContentsMargins(14, 12, 14, 12)
         column.setSpacing(6)
         column.addWidget(label(_("Is your robot missing?"), "label"))
-        said = _("Check that it is switched on and that its driver is running.")
-        column.addWidget(label(said, "body", role="textSecondary", wrap=True))
+        text = _("Check that it is switched on and that its driver is running.")
+        column.addWidget(label(text, "body", role="textSecondary", wrap=True))
         self.why = Button(self._theme, _("Find the cause"), "stethoscope", size="small")
         self.why.clicked.connect(lambda: run("help.doctor"))
         self.turtle = Button(self._theme, _("Use a virtual Turtle"), "bot", kind="ghost", size="small")
@@ -184,18 +186,18 @@ class RobotList(QWidget):
         """Return the text with the time when a robot was last seen; "" for unknown and virtual robots."""
         return seen_text(self._known[name].last_connected_s) if name in self._known else ""
 
-    def _show(self, links: Sequence[RobotLink], away: Sequence[KnownRobot]) -> None:
-        gone = {robot.name: robot for robot in away}
+    def _show(self, links: Sequence[RobotLink], away_robots: Sequence[KnownRobot]) -> None:
+        away_by_name = {robot.name: robot for robot in away_robots}
         for name in [name for name in self.items if name not in {link.name for link in links}]:
             self._remove_item(self.items.pop(name))
-        for name in [name for name in self.away if name not in gone]:
+        for name in [name for name in self.away if name not in away_by_name]:
             self._remove_item(self.away.pop(name))
         for link in links:
             if link.name not in self.items:
                 item = self._make_item(link.name, len(self.items))
                 item.clicked.connect(lambda _on=False, name=link.name: self.selected.emit(name))
                 self.items[link.name] = item
-        for robot in away:
+        for robot in away_robots:
             if robot.name not in self.away:
                 item = self._make_item(robot.name, len(self.items) + len(self.away))
                 item.clicked.connect(partial(self._open_menu_below, item))
@@ -205,10 +207,10 @@ class RobotList(QWidget):
             not any(link.robot.model == TURTLE_KIND and link.is_connected for link in links)
         )
 
-    def _make_item(self, name: str, place: int) -> RobotItem:
+    def _make_item(self, name: str, index: int) -> RobotItem:
         item = RobotItem(self._theme, name)
         item.menu_requested.connect(lambda at: self._open_menu(item, at))
-        self._column.insertWidget(place, item)
+        self._column.insertWidget(index, item)
         return item
 
     def _remove_item(self, item: RobotItem) -> None:
@@ -221,10 +223,10 @@ class RobotList(QWidget):
     def _open_menu_below(self, item: RobotItem) -> None:
         self._open_menu(item, item.mapToGlobal(item.rect().bottomLeft()))
 
-    def _open_menu(self, item: RobotItem, at: QPoint) -> None:
+    def _open_menu(self, item: RobotItem, position: QPoint) -> None:
         menu = self.menu_of(item)
         if menu is not None:
-            menu.popup(at)
+            menu.popup(position)
 
     def menu_of(self, item: RobotItem) -> Menu | None:
         """Return the context menu of a disconnected robot; None for connected and virtual robots."""

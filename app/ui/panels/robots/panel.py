@@ -90,18 +90,18 @@ class SessionImageSource:
 
     def open_stream(self, topic: str) -> ImageStream:
         """Subscribe to the images of a topic; the caller closes the stream."""
-        made = self._session.live.images.stream(topic)
-        self._opened = [*self.streams, made]
-        return made
+        stream = self._session.live.images.stream(topic)
+        self._opened = [*self.streams, stream]
+        return stream
 
-    def prompt_file(self, folder: str, take: Callable[[Path], None]) -> None:
+    def prompt_file(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Show the dialog for choosing an image file.
 
         Args:
             folder: Initial folder; "" for the user's pictures.
-            take: Receives the path of the file.
+            callback: Receives the path of the file.
         """
-        self._files.open_picture(folder, take)
+        self._files.open_picture(folder, callback)
 
 
 class RobotsPanel(OneRobotPanel):
@@ -139,12 +139,12 @@ class RobotsPanel(OneRobotPanel):
         self._list_line = Separator(theme, upright=True)
         right = QVBoxLayout()
         right.setSpacing(0)
-        self.head = head = RobotHeader(theme)
-        self.name, self.chip, self.about = head.name, head.chip, head.about
-        self.finder, self.stop = head.finder, head.stop
+        self.head = header = RobotHeader(theme)
+        self.name, self.chip, self.about = header.name, header.chip, header.about
+        self.finder, self.stop = header.finder, header.stop
         self.finder.textChanged.connect(self._apply_filter)
         self.stop.clicked.connect(lambda: self.session.runs.stop_robot(self._robot))
-        right.addWidget(head)
+        right.addWidget(header)
         right.addWidget(Separator(theme))
         right.addWidget(self._make_cards(), 1)
         robot = QWidget()
@@ -185,23 +185,29 @@ class RobotsPanel(OneRobotPanel):
         fleet, names = self.session.fleet, self._names
         if self._robot in names:
             return fleet.link(self._robot)
-        shown = fleet.current
-        return shown if shown is not None and shown.name in names else fleet.link(names[0]) if names else None
+        current = fleet.current
+        return (
+            current
+            if current is not None and current.name in names
+            else fleet.link(names[0])
+            if names
+            else None
+        )
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         for name, item in self.items.items():
-            its = self.session.fleet.link(name)
-            if its is not None and self._has_changed(name, its.state):
-                item.show_link(its, self.list.last_seen_text(name))
+            item_link = self.session.fleet.link(name)
+            if item_link is not None and self._has_changed(name, item_link.state):
+                item.show_link(item_link, self.list.last_seen_text(name))
         if link is not None:
             self._show_link(link)
         else:
             self._no_robot.set_starting(self.session.starting_robots)
 
-    def _has_changed(self, what: str, *now: object) -> bool:
+    def _has_changed(self, key: str, *now: object) -> bool:
         # Returns True if the value differs from the one that was shown last.
-        changed = self._seen.get(what) != now
-        self._seen[what] = now
+        changed = self._seen.get(key) != now
+        self._seen[key] = now
         return changed
 
     def discard(self, name: str) -> None:
@@ -228,26 +234,26 @@ class RobotsPanel(OneRobotPanel):
         link = self.session.fleet.link(self._robot)
         if link is None or not self._has_changed("cards", link.name, link.robot, self._offered_values(link)):
             return
-        kept = (
+        inputs = (
             {name: card.form.input() for name, card in self.cards.items()} if self._has_cards_of(link) else {}
         )
         self._remove_cards()
         actions = [action for action in link.robot.actions if action.name != link.robot.safe_stop.action]
         titles = {action.name: action.title for action in link.robot.actions}
-        for place, action in enumerate(actions):
+        for index, action in enumerate(actions):
             card = ActionCard(
                 self.theme,
                 action,
                 self._options,
-                folded=place >= EXPANDED_CARD_COUNT,
+                folded=index >= EXPANDED_CARD_COUNT,
                 pictures=self._pictures,
                 title_of=lambda name: titles.get(name, name.replace("_", " ")),
             )
-            card.form.set_input(kept.get(action.name, {}))
+            card.form.set_input(inputs.get(action.name, {}))
             card.try_requested.connect(lambda given, name=action.name: self.start_action(name, given))
             card.cancelled.connect(lambda name=action.name: self.session.fleet.cancel(self._robot, name))
             self.cards[action.name] = card
-            self._card_column.insertWidget(place, card)
+            self._card_column.insertWidget(index, card)
         self._cards_of = link.name
         self._set_highlighted(next(iter(self.cards.values()), None))
         self.name.setText(link.name)
@@ -270,12 +276,14 @@ class RobotsPanel(OneRobotPanel):
             self._card_column.removeWidget(card)
             card.deleteLater()
         self.cards = {}
-        self._seen = {what: seen for what, seen in self._seen.items() if not what.startswith("card ")}
+        self._seen = {key: value for key, value in self._seen.items() if not key.startswith("card ")}
 
     def _offered_values(self, link: RobotLink) -> tuple[object, ...]:
         # The forms are rebuilt when the offered values change.
-        named = {one.options_from for action in link.robot.actions for one in action.parameters}
-        return tuple((name, tuple(self._options(name))) for name in sorted(filter(None, named)))
+        option_sources = {
+            parameter.options_from for action in link.robot.actions for parameter in action.parameters
+        }
+        return tuple((name, tuple(self._options(name))) for name in sorted(filter(None, option_sources)))
 
     def _show_link(self, link: RobotLink) -> None:
         self._make_forms()
@@ -283,10 +291,14 @@ class RobotsPanel(OneRobotPanel):
             self.chip.set(link.state_label, STATUS_BY_ROBOT_STATE[link.state])
         may_move = link.state in {NOT_STOPPED, STOPPING}
         for name, card in self.cards.items():
-            made = link.invocations.get(name)
-            now = (made.id, made.state, made.feedback, int(made.elapsed_s * 5)) if made is not None else ()
+            invocation = link.invocations.get(name)
+            now = (
+                (invocation.id, invocation.state, invocation.feedback, int(invocation.elapsed_s * 5))
+                if invocation is not None
+                else ()
+            )
             if self._has_changed(f"card {name}", may_move, *now):
-                card.show_invocation(made, may_move=may_move)
+                card.show_invocation(invocation, may_move=may_move)
                 card.show_tries(tuple(link.past_invocations))
 
     def _options(self, name: str) -> Sequence[str]:
@@ -298,27 +310,27 @@ class RobotsPanel(OneRobotPanel):
         return self._told.get((self._robot, name), [])  # the last known values, while the watch is suspended
 
     def _apply_filter(self) -> None:
-        words = self.finder.text().casefold().split()
-        shown = 0
+        keywords = self.finder.text().casefold().split()
+        visible_count = 0
         for name, card in self.cards.items():
             text = f"{name} {card.action.title} {card.action.category}".casefold()
-            fits = all(word in text for word in words)
-            card.setVisible(fits)
-            shown += fits
-        self.none.setVisible(bool(self.cards) and not shown)
+            is_match = all(keyword in text for keyword in keywords)
+            card.setVisible(is_match)
+            visible_count += is_match
+        self.none.setVisible(bool(self.cards) and not visible_count)
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def start_action(self, action: str, given: Mapping[str, object]) -> None:
+    def start_action(self, action: str, values: Mapping[str, object]) -> None:
         """Start an action of the selected robot. Errors are shown in the card of the action.
 
         Args:
             action: Name of the action.
-            given: Input by parameter name.
+            values: Input by parameter name.
         """
         card = self.cards[action]
         try:
-            self.session.fleet.invoke(self._robot, action, given)
+            self.session.fleet.invoke(self._robot, action, values)
         except RobotInputError as error:
             card.show_problems(error.problems)
         except MayNotMoveError:
@@ -350,10 +362,10 @@ class RobotsPanel(OneRobotPanel):
         # In a narrow panel the description is hidden first, then the list.
         width = self.width() / self.theme.scaled(1.0)
         count = self.list.count
-        wide = count > 1 or (count == 1 and width >= LIST_MIN_WIDTH)
-        self.list.setVisible(wide)
-        self._list_line.setVisible(wide)
-        room = width - (LIST_WIDTH if wide else 0)
+        is_list_visible = count > 1 or (count == 1 and width >= LIST_MIN_WIDTH)
+        self.list.setVisible(is_list_visible)
+        self._list_line.setVisible(is_list_visible)
+        room = width - (LIST_WIDTH if is_list_visible else 0)
         self.finder.setVisible(room >= FINDER_MIN_WIDTH)
         self.about.setVisible(room >= ABOUT_MIN_WIDTH)
 

@@ -31,27 +31,27 @@ ROW_HEIGHT = 28
 MAX_TRIES = 5
 
 
-def fields_text(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
+def fields_text(fields: Sequence[DataField], values: Mapping[str, object]) -> str:
     """Format the values of fields, such as "0.3 m to go, moved 0.5 m".
 
     Args:
         fields: Descriptions of the fields.
-        told: Values by field name; missing values are omitted.
+        values: Values by field name; missing values are omitted.
     """
     parts = []
     for field in fields:
-        value = told.get(field.name)
+        value = values.get(field.name)
         if value is None or field.name in RATIO_FIELDS:
             continue
         if isinstance(value, bool):
             parts.append(f"{field.title} {yes_no_text(value)}")
         elif isinstance(value, (int, float)):
-            words = quantity_text(float(round(value, 2)), field.unit)
+            text = quantity_text(float(round(value, 2)), field.unit)
             if field.name == REMAINING_FIELD:
-                parts.append(f"{words} {field.title}")
+                parts.append(f"{text} {field.title}")
             else:
-                bare = is_unit(field.title, field.unit)
-                parts.append(words if bare else f"{field.title} {words}")
+                omit_title = is_unit(field.title, field.unit)
+                parts.append(text if omit_title else f"{field.title} {text}")
         else:
             parts.append(f"“{value}”")
     return ", ".join(parts)
@@ -64,18 +64,18 @@ def feedback_text(action: Action, feedback: Mapping[str, object]) -> str:
 
 def output_text(action: Action, output: Mapping[str, object]) -> str:
     """Format the output of an action, without its duration."""
-    told = [field for field in action.output if not is_unit(field.title, field.unit)]
-    return fields_text(told, output)
+    fields = [field for field in action.output if not is_unit(field.title, field.unit)]
+    return fields_text(fields, output)
 
 
-def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[str, object]) -> float | None:
+def progress_of(action: Action, values: Mapping[str, object], feedback: Mapping[str, object]) -> float | None:
     """Return the progress of an action from 0 to 1, or None if it is unknown.
 
     The progress is reported by the robot, or derived from a requested and a remaining amount.
 
     Args:
         action: Action with its parameters and feedback.
-        given: Input by parameter name.
+        values: Input by parameter name.
         feedback: Latest feedback by field name.
     """
     for name in RATIO_FIELDS:
@@ -88,79 +88,79 @@ def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[s
             continue
         if field.unit == "%" or field.name in PERCENT_FIELDS:
             return _clamp_ratio(value / 100)
-        asked = next(
+        target = next(
             (
-                _float_or_none(given.get(one.name))
-                for one in action.parameters
-                if field.unit and one.unit == field.unit
+                _float_or_none(values.get(parameter.name))
+                for parameter in action.parameters
+                if field.unit and parameter.unit == field.unit
             ),
             None,
         )
-        if asked:
-            done = abs(value / asked)
-            return _clamp_ratio(1.0 - done if field.name == REMAINING_FIELD else done)
+        if target:
+            ratio = abs(value / target)
+            return _clamp_ratio(1.0 - ratio if field.name == REMAINING_FIELD else ratio)
     return None
 
 
-def state_text(action: Action, made: Invocation, title_of: Callable[[str], str]) -> str:
+def state_text(action: Action, invocation: Invocation, title_of: Callable[[str], str]) -> str:
     """Format the current state of a running try, such as "sent" or its feedback.
 
     Args:
         action: Action of the try.
-        made: Running try.
+        invocation: Running try.
         title_of: Returns the title of another action by its name.
     """
-    if made.state == "sent":
+    if invocation.state == "sent":
         return _("sent")
-    if made.state == "accepted":
-        if made.awaited_actions:
+    if invocation.state == "accepted":
+        if invocation.awaited_actions:
             return _("waits for {actions}").format(
-                actions=format_list([title_of(name) for name in made.awaited_actions])
+                actions=format_list([title_of(name) for name in invocation.awaited_actions])
             )
-        if made.replaced_actions:
+        if invocation.replaced_actions:
             return _("replaces {actions}").format(
-                actions=format_list([title_of(name) for name in made.replaced_actions])
+                actions=format_list([title_of(name) for name in invocation.replaced_actions])
             )
         return _("sent")
-    took = _("for {duration}").format(duration=seconds_text(made.elapsed_s))
-    return feedback_text(action, made.feedback) or took
+    took = _("for {duration}").format(duration=seconds_text(invocation.elapsed_s))
+    return feedback_text(action, invocation.feedback) or took
 
 
-def remaining_text(made: Invocation) -> str:
+def remaining_text(invocation: Invocation) -> str:
     """Format the time until a running try reaches its time limit; "" without a time limit."""
-    left_s = made.remaining_s
-    if left_s is None or not made.is_running:
+    left_s = invocation.remaining_s
+    if left_s is None or not invocation.is_running:
         return ""
     return _("{seconds} s left").format(seconds=max(0, int(left_s + 0.999)))
 
 
-def result_texts(made: Invocation, *, may_move: bool = False) -> tuple[str, str, str]:
+def result_texts(invocation: Invocation, *, may_move: bool = False) -> tuple[str, str, str]:
     """Format the result of a try that has ended.
 
     Args:
-        made: Try that has ended.
+        invocation: Try that has ended.
         may_move: True if the robot may still be moving; the text then doesn't say "stopped".
 
     Returns:
         Text and status of the chip, and a sentence with the reason or "".
     """
-    took = seconds_text(made.elapsed_s)
-    if made.state == "succeeded":
+    took = seconds_text(invocation.elapsed_s)
+    if invocation.state == "succeeded":
         return _("done in {duration}").format(duration=took), "ok", ""
-    if made.state == "canceled":
-        reason = made.error if made.error and made.error != "stopped" else ""
-        said = _("ended after {duration}") if may_move else _("stopped after {duration}")
-        return said.format(duration=took), "off", _as_sentence(reason)
-    return _("failed"), "error", _as_sentence(made.error or _("The robot reported no reason"))
+    if invocation.state == "canceled":
+        reason = invocation.error if invocation.error and invocation.error != "stopped" else ""
+        template = _("ended after {duration}") if may_move else _("stopped after {duration}")
+        return template.format(duration=took), "off", _as_sentence(reason)
+    return _("failed"), "error", _as_sentence(invocation.error or _("The robot reported no reason"))
 
 
-def _as_sentence(words: str) -> str:
-    return f"{words[:1].upper()}{words[1:]}{'' if words.endswith('.') or not words else '.'}"
+def _as_sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith('.') or not text else '.'}"
 
 
 def _float_or_none(value: object) -> float | None:
-    good = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return float(value) if good else None  # type: ignore[arg-type]
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return float(value) if is_number else None  # type: ignore[arg-type]
 
 
 def _clamp_ratio(share: float) -> float:
@@ -170,18 +170,18 @@ def _clamp_ratio(share: float) -> float:
 class TryRow(PaintedButton):
     """Row of a try that has ended."""
 
-    def __init__(self, theme: Theme, action: Action, made: Invocation) -> None:
+    def __init__(self, theme: Theme, action: Action, invocation: Invocation) -> None:
         super().__init__(theme)
-        self.made = made
-        said, status, sentence = result_texts(made)
-        self.when = time.strftime("%H:%M:%S", time.localtime(made.sent_at_s))
-        self.given = input_summary(action, made.input)
-        told = output_text(action, made.output) if made.state == "succeeded" else ""
-        self.result = f"{said}, {told}" if told else sentence.rstrip(".") or said
+        self.made = invocation
+        text, status, reason = result_texts(invocation)
+        self.when = time.strftime("%H:%M:%S", time.localtime(invocation.sent_at_s))
+        self.given = input_summary(action, invocation.input)
+        output = output_text(action, invocation.output) if invocation.state == "succeeded" else ""
+        self.result = f"{text}, {output}" if output else reason.rstrip(".") or text
         self.status = status
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        said = _("{when}, {values}, {result}; use these values again")
-        self.setAccessibleName(said.format(when=self.when, values=self.given, result=self.result))
+        text = _("{when}, {values}, {result}; use these values again")
+        self.setAccessibleName(text.format(when=self.when, values=self.given, result=self.result))
         self.setToolTip(plain.tip(_("{result}. Click to use these values again").format(result=self.result)))
 
     def sizeHint(self) -> QSize:
@@ -194,17 +194,17 @@ class TryRow(PaintedButton):
         font = theme.font("body")
         quiet = theme.colour("textSecondary")
         left = rect.left() + 6
-        wide = paint.width_of(font, "00:00:00") + 14
+        time_width = paint.width_of(font, "00:00:00") + 14
         paint.text_line(
             painter,
-            QRectF(left, rect.top(), wide, rect.height()),
+            QRectF(left, rect.top(), time_width, rect.height()),
             self.when,
             font,
             theme.colour("textTertiary"),
         )
-        left += wide
-        shown = min(paint.width_of(font, self.result) + 2, (rect.right() - left) * 0.6)
-        right = QRectF(rect.right() - 6 - shown, rect.top(), shown, rect.height())
+        left += time_width
+        result_width = min(paint.width_of(font, self.result) + 2, (rect.right() - left) * 0.6)
+        right = QRectF(rect.right() - 6 - result_width, rect.top(), result_width, rect.height())
         status = theme.status(self.status)
         mark = QRectF(right.left() - 20, rect.center().y() - 7, 14, 14)
         paint_icon(painter, mark, status.icon, theme.colour(status.colour))
@@ -234,10 +234,12 @@ class TryList(QWidget):
         Args:
             tries: Tries of all actions, oldest first; running ones are ignored.
         """
-        ended = [made for made in tries if made.action == self._action.name and not made.is_running][
-            -MAX_TRIES:
-        ]
-        ids = tuple(made.id for made in ended)
+        ended = [
+            invocation
+            for invocation in tries
+            if invocation.action == self._action.name and not invocation.is_running
+        ][-MAX_TRIES:]
+        ids = tuple(invocation.id for invocation in ended)
         if ids == self._shown:
             return
         self._shown = ids
@@ -245,8 +247,8 @@ class TryList(QWidget):
             self._column.removeWidget(row)
             row.deleteLater()
         self.rows = []
-        for made in reversed(ended):
-            row = TryRow(self._theme, self._action, made)
-            row.clicked.connect(lambda _on=False, made=made: self.selected.emit(dict(made.given)))
+        for invocation in reversed(ended):
+            row = TryRow(self._theme, self._action, invocation)
+            row.clicked.connect(lambda _on=False, made=invocation: self.selected.emit(dict(made.given)))
             self._column.addWidget(row)
             self.rows.append(row)

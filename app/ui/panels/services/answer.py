@@ -48,22 +48,22 @@ class ReplyRow:
     text: str
 
 
-def reply_rows(answer: object) -> list[ReplyRow]:
+def reply_rows(reply: object) -> list[ReplyRow]:
     """Convert a reply to rows, with children below their parents.
 
     At most `MAX_ROWS` rows are returned, followed by a note if the reply has more.
     """
-    found: list[ReplyRow] = []
+    rows: list[ReplyRow] = []
     for row in (
-        _iter_rows("", 0, "", answer)
-        if _is_container(answer)
-        else [ReplyRow("", 0, _("reply"), _value_text(answer))]
+        _iter_rows("", 0, "", reply)
+        if _is_container(reply)
+        else [ReplyRow("", 0, _("reply"), _value_text(reply))]
     ):
-        if len(found) == MAX_ROWS:
-            found.append(ReplyRow("…", 0, "…", _("truncated; see the JSON for the rest")))
+        if len(rows) == MAX_ROWS:
+            rows.append(ReplyRow("…", 0, "…", _("truncated; see the JSON for the rest")))
             break
-        found.append(row)
-    return found
+        rows.append(row)
+    return rows
 
 
 def _is_container(value: object) -> bool:
@@ -75,10 +75,10 @@ def _iter_rows(path: str, depth: int, name: str, value: object) -> Iterator[Repl
         yield ReplyRow(path, depth - 1, name, _value_text(value))
     if depth >= MAX_DEPTH or not _is_container(value):
         return
-    inside = value.items() if isinstance(value, Mapping) else enumerate(value)  # type: ignore[arg-type]
-    for key, part in inside:
-        here = f"{path}[{key}]" if isinstance(key, int) else f"{path}.{key}" if path else str(key)
-        yield from _iter_rows(here, depth + 1, str(key), part)
+    entries = value.items() if isinstance(value, Mapping) else enumerate(value)  # type: ignore[arg-type]
+    for key, part in entries:
+        child_path = f"{path}[{key}]" if isinstance(key, int) else f"{path}.{key}" if path else str(key)
+        yield from _iter_rows(child_path, depth + 1, str(key), part)
 
 
 def _value_text(value: object) -> str:
@@ -106,8 +106,8 @@ def duration_cell(record: CallRecord) -> Cell:
 
 def clock_text(record: CallRecord) -> str:
     """Format the time of a call, such as "8:41:50"."""
-    then = dt.datetime.fromtimestamp(record.started_s, tz=dt.timezone.utc).astimezone()
-    return then.strftime("%H:%M:%S").lstrip("0")
+    started = dt.datetime.fromtimestamp(record.started_s, tz=dt.timezone.utc).astimezone()
+    return started.strftime("%H:%M:%S").lstrip("0")
 
 
 class ReplyView(QWidget):
@@ -156,20 +156,20 @@ class ReplyView(QWidget):
 
     def _make_header(self) -> QBoxLayout:
         # In a narrow panel the header wraps into two rows.
-        ended, shown = QHBoxLayout(), QHBoxLayout()
-        for row in (ended, shown):
+        ended, controls = QHBoxLayout(), QHBoxLayout()
+        for row in (ended, controls):
             row.setSpacing(8)
         ended.addWidget(label(_("Answer"), "title"))
         ended.addWidget(self.chip)
         ended.addWidget(self.facts, 1)
-        shown.addStretch(1)
-        shown.addWidget(self.way)
-        shown.addWidget(self.copy)
+        controls.addStretch(1)
+        controls.addWidget(self.way)
+        controls.addWidget(self.copy)
         self._head = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._head.setContentsMargins(12, 4, 8, 0)
         self._head.setSpacing(4)
         self._head.addLayout(ended, 1)
-        self._head.addLayout(shown)
+        self._head.addLayout(controls)
         return self._head
 
     def minimumSizeHint(self) -> QSize:
@@ -179,9 +179,9 @@ class ReplyView(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         is_narrow = self.width() < self._theme.scaled(ONE_ROW_WIDTH_PX)
-        way = QBoxLayout.Direction.TopToBottom if is_narrow else QBoxLayout.Direction.LeftToRight
-        if self._head.direction() != way:
-            self._head.setDirection(way)
+        direction = QBoxLayout.Direction.TopToBottom if is_narrow else QBoxLayout.Direction.LeftToRight
+        if self._head.direction() != direction:
+            self._head.setDirection(direction)
 
     def show_record(self, record: CallRecord | None, waited_s: float = 0.0) -> None:
         """Show a call and its reply.
@@ -225,12 +225,12 @@ class ReplyView(QWidget):
             size = size_text(len(record.text.encode("utf-8", "replace")))
             self.facts.setText(_("{time}, {size}").format(time=clock_text(record), size=size))
 
-    def _set_mode(self, way: str) -> None:
+    def _set_mode(self, mode: str) -> None:
         record = self.record
         if record is None or record.state != "answered" or not record.is_retained:
             self.pages.setCurrentIndex(0)
         else:
-            self.pages.setCurrentIndex(2 if way == "json" or record.is_truncated else 1)
+            self.pages.setCurrentIndex(2 if mode == "json" or record.is_truncated else 1)
 
     def _copy(self) -> None:
         if self.record is not None:

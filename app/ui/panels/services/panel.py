@@ -73,7 +73,7 @@ class ServicesPanel(PanelWidget):
 
     def _make_request(self) -> None:
         theme = self.theme
-        self.name = ElidedLabel("code", "text", least=60)
+        self.name = ElidedLabel("code", "text", min_width=60)
         self.way = Segments(
             theme, [("form", _("Form"), None), ("json", _("JSON"), None)], size="small", name=_("Request as")
         )
@@ -154,24 +154,24 @@ class ServicesPanel(PanelWidget):
         column.addWidget(self.pages, 1)
 
     def _make_right_side(self) -> QWidget:
-        head, fault, buttons = QHBoxLayout(), QHBoxLayout(), Flow(gap=10, row_gap=6)
-        head.addWidget(self.name, 1)
-        head.addWidget(self.way)
+        header, fault, buttons = QHBoxLayout(), QHBoxLayout(), Flow(gap=10, row_gap=6)
+        header.addWidget(self.name, 1)
+        header.addWidget(self.way)
         fault.addWidget(self.sentence, 1)
         fault.addWidget(self.fix, 0, Qt.AlignmentFlag.AlignTop)
         for button in (self.call_button, self.give_up):
             buttons.addWidget(button)
         limit = QWidget()
-        beside = QHBoxLayout(limit)
-        beside.setContentsMargins(0, 0, 0, 0)
-        beside.addWidget(label(_("time limit"), "small", role="textSecondary"))
-        beside.addWidget(self.seconds)
+        limit_row = QHBoxLayout(limit)
+        limit_row.setContentsMargins(0, 0, 0, 0)
+        limit_row.addWidget(label(_("time limit"), "small", role="textSecondary"))
+        limit_row.addWidget(self.seconds)
         buttons.addWidget(limit)
         self._asks = QWidget()
         request = QVBoxLayout(self._asks)
         request.setContentsMargins(12, 8, 12, 8)
         request.setSpacing(8)
-        request.addLayout(head)
+        request.addLayout(header)
         request.addWidget(self.requests, 1)
         request.addLayout(fault)
         request.addLayout(buttons)
@@ -179,7 +179,7 @@ class ServicesPanel(PanelWidget):
         self.calls.setMinimumHeight(round(self.theme.scaled(90)))
         scroll = ScrollColumn(_("Selected service"))
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        for place, (widget, stretch) in enumerate(
+        for index, (widget, stretch) in enumerate(
             (
                 (self._asks, 4),
                 (Separator(self.theme), 0),
@@ -188,8 +188,8 @@ class ServicesPanel(PanelWidget):
                 (self.calls, 2),
             )
         ):
-            scroll.column.insertWidget(place, widget)
-            scroll.column.setStretch(place, stretch)
+            scroll.column.insertWidget(index, widget)
+            scroll.column.setStretch(index, stretch)
         scroll.column.setStretch(scroll.column.count() - 1, 0)  # the reply takes the remaining height
         return scroll
 
@@ -199,15 +199,15 @@ class ServicesPanel(PanelWidget):
         self.strip.refresh()
         acting, view = self.acting, self.session.live.graph
         graph = (view.epoch, view.revision) if view is not None else None
-        facts = (
+        state = (
             graph,
             acting.revision,
             acting.calls.revision,
             acting.arming.revision,
             self.session.master.kind,
         )
-        if facts != self._seen:
-            self._seen = facts
+        if state != self._seen:
+            self._seen = state
             self._rebuild()
         elif acting.calls.in_flight is not None:
             self._update_call()
@@ -217,20 +217,20 @@ class ServicesPanel(PanelWidget):
 
     def _rebuild(self) -> None:
         services = offered_services(self.session.live.graph)
-        words = self.filter.text().casefold().split()
+        keywords = self.filter.text().casefold().split()
         rows = [
             each
             for each in services
             if each.name == self._wanted
-            or all(word in f"{each.name} {each.servers_text}".casefold() for word in words)
+            or all(keyword in f"{each.name} {each.servers_text}".casefold() for keyword in keywords)
         ]
-        chosen = self._wanted or self.list.selected_key() or self._shown
+        selected = self._wanted or self.list.selected_key() or self._shown
         self.list.model().set_rows(rows)  # type: ignore[attr-defined]  # always a TableModel
         names = [each.name for each in rows]
         if names:
-            wanted = chosen if chosen in names else names[0]
-            if self.list.selected_key() != wanted:
-                self.list.select_key(wanted)
+            target = selected if selected in names else names[0]
+            if self.list.selected_key() != target:
+                self.list.select_key(target)
             self._wanted = ""
         self.list.refresh_visible()
         self.count.setText(count_text(services))
@@ -247,8 +247,8 @@ class ServicesPanel(PanelWidget):
             start = self.session.launcher.ensure_master
             self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", is_primary=True)])
         else:
-            said = _("Services appear here as soon as a program offers one.")
-            self.empty.set_texts(_("No services available"), said, "spline")
+            text = _("Services appear here as soon as a program offers one.")
+            self.empty.set_texts(_("No services available"), text, "spline")
             self.empty.set_actions([self.doctor_action()])
 
     @property
@@ -297,9 +297,9 @@ class ServicesPanel(PanelWidget):
     def _validate(self) -> None:
         fault = self._parse_text().fault
         self.edit.mark_line(fault.line if fault is not None else 0)
-        said = fault.message if fault is not None else self._problem()
-        self.sentence.setText(said)
-        self.sentence.setVisible(bool(said))
+        message = fault.message if fault is not None else self._problem()
+        self.sentence.setText(message)
+        self.sentence.setVisible(bool(message))
         self.fix.setVisible(fault is not None and fault.fix is not None)
         self._update_call()
 
@@ -325,8 +325,8 @@ class ServicesPanel(PanelWidget):
         self.call_button.setEnabled(can_call and not self.session.is_replaying)
         is_armed = acting.arming.allows(Target("service", name))
         if is_mine:
-            said = _("Waiting {time}").format(time=seconds_text(acting.calls.elapsed_s))
-            self.call_button.set_label(said, "circle-dashed")
+            text = _("Waiting {time}").format(time=seconds_text(acting.calls.elapsed_s))
+            self.call_button.set_label(text, "circle-dashed")
         else:
             self.call_button.set_label(
                 _("Call") if is_armed else _("Arm and call"), "play" if is_armed else "lock"
@@ -337,9 +337,9 @@ class ServicesPanel(PanelWidget):
 
     def _displayed_record(self) -> CallRecord | None:
         records = [each for each in self.acting.calls.records if each.service == self.service]
-        chosen = self.calls.selected_key()
+        selected_key = self.calls.selected_key()
         return next(
-            (each for each in records if str(each.number) == chosen), records[-1] if records else None
+            (each for each in records if str(each.number) == selected_key), records[-1] if records else None
         )
 
     # -- user actions -------------------------------------------------------------------------------------
@@ -351,11 +351,11 @@ class ServicesPanel(PanelWidget):
         self._rebuild()
         self.call_button.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _set_mode(self, way: str) -> None:
-        if way == "form" and not self._can_show_form():
-            way = "json"  # the request can't be shown as fields
-        self.way.set_value(way)
-        self.requests.setCurrentIndex(1 if way == "json" else 0)
+    def _set_mode(self, mode: str) -> None:
+        if mode == "form" and not self._can_show_form():
+            mode = "json"  # the request can't be shown as fields
+        self.way.set_value(mode)
+        self.requests.setCurrentIndex(1 if mode == "json" else 0)
         self._validate()
 
     def _form_typed(self, request: object) -> None:
@@ -381,9 +381,9 @@ class ServicesPanel(PanelWidget):
             return
         self.calls.clearSelection()
         self.calls.setCurrentIndex(self.calls_model.index(-1, -1))
-        why_not = self.acting.call(self.service, self.text, self.timeout_s)
-        if why_not:
-            self.context.show_toast(why_not)
+        reason = self.acting.call(self.service, self.text, self.timeout_s)
+        if reason:
+            self.context.show_toast(reason)
         self.refresh()
 
     def _cancel_call(self) -> None:
@@ -397,16 +397,16 @@ class ServicesPanel(PanelWidget):
         self.acting.calls.clear()
         self.refresh()
 
-    def _show_menu(self, service: str, at: QPoint) -> None:
+    def _show_menu(self, service: str, position: QPoint) -> None:
         menu = fill_menu(Menu(self.theme, self), self.theme, self.service_actions(service))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.popup(at)
+        menu.popup(position)
 
     def service_actions(self, service: str) -> list[RowAction]:
         """Return the context menu actions of a service."""
         return [RowAction(_("Call"), "play", self.call), copy_action(self.context, service)]
 
-    def _show_call_menu(self, key: str, at: QPoint) -> None:
+    def _show_call_menu(self, key: str, position: QPoint) -> None:
         record = next((each for each in self.acting.calls.records if str(each.number) == key), None)
         if record is None:
             return
@@ -418,7 +418,7 @@ class ServicesPanel(PanelWidget):
         menu.addAction(
             self.theme.icon("copy"), _("Copy the request"), lambda: self._copy_request(record.request)
         )
-        menu.popup(at)
+        menu.popup(position)
 
     def _copy_request(self, text: str) -> None:
         QGuiApplication.clipboard().setText(text)
@@ -453,14 +453,14 @@ class ServicesPanel(PanelWidget):
 def _request_cell(record: CallRecord) -> Cell:
     # Formats a request in one line, such as "name Aiko, pictures 12".
     try:
-        asked = parse_json_text(record.request).fill({})
+        request = parse_json_text(record.request).fill({})
     except NepError:
-        asked = None
-    if isinstance(asked, Mapping):
-        words = ", ".join(f"{name} {_one_line(value)}" for name, value in asked.items()) or _("nothing")
+        request = None
+    if isinstance(request, Mapping):
+        text = ", ".join(f"{name} {_one_line(value)}" for name, value in request.items()) or _("nothing")
     else:
-        words = " ".join(record.request.split())
-    return Cell(shortened(words, MAX_REQUEST_CHARS))
+        text = " ".join(record.request.split())
+    return Cell(shortened(text, MAX_REQUEST_CHARS))
 
 
 def _one_line(value: object) -> str:

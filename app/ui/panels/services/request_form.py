@@ -74,24 +74,24 @@ class RequestForm(QWidget):
 
     def show_request(self, request: object) -> None:
         """Show a request. Only requests that are objects have fields."""
-        given = dict(request) if isinstance(request, Mapping) else {}
-        if given == self._request and self._kinds and not self.problems:
+        values = dict(request) if isinstance(request, Mapping) else {}
+        if values == self._request and self._kinds and not self.problems:
             return
-        some = dict(list(given.items())[:MAX_FIELDS])
-        kinds = {name: self._kind(name, value) for name, value in some.items()}
+        displayed = dict(list(values.items())[:MAX_FIELDS])
+        kinds = {name: self._kind(name, value) for name, value in displayed.items()}
         if kinds != self._kinds or list(kinds) != list(self.fields):
             self._rebuild(kinds)
-        self._request = given
-        for name, value in some.items():
+        self._request = values
+        for name, value in displayed.items():
             self._show_value(name, value)
         if not isinstance(request, Mapping):
             self.nothing.setText(_("The request must be an object with names and values. Edit it as JSON."))
-        elif not given:
-            said = _("This service doesn't describe its request. Studio sends {} or the JSON you write.")
-            self.nothing.setText(said)
-        elif len(given) > MAX_FIELDS:
+        elif not values:
+            hint = _("This service doesn't describe its request. Studio sends {} or the JSON you write.")
+            self.nothing.setText(hint)
+        elif len(values) > MAX_FIELDS:
             self.nothing.setText(_("Some fields aren't shown. Edit the request as JSON to see them all."))
-        self.nothing.setVisible(not given or len(given) > MAX_FIELDS)
+        self.nothing.setVisible(not values or len(values) > MAX_FIELDS)
 
     def _kind(self, name: str, value: object) -> str:
         # A field keeps its kind: a float field when an integer is typed, a JSON field for any value.
@@ -106,13 +106,13 @@ class RequestForm(QWidget):
         if isinstance(field, Switch):
             field.setChecked(value is True)
             return
-        words = value if isinstance(value, str) and kind == "str" else json.dumps(value, ensure_ascii=False)
+        text = value if isinstance(value, str) and kind == "str" else json.dumps(value, ensure_ascii=False)
         # don't replace "12" by "12.0" while the user types
-        if field.text() != words and not (
+        if field.text() != text and not (
             field.hasFocus() and self._parse_value(name, field.text()) == (value,)
         ):
-            field.setText(words)
-        self._set_invalid(field, wrong=False)
+            field.setText(text)
+        self._set_invalid(field, is_invalid=False)
 
     def _rebuild(self, kinds: Mapping[str, str]) -> None:
         while (item := self._grid.takeAt(0)) is not None:
@@ -122,12 +122,12 @@ class RequestForm(QWidget):
                 old.deleteLater()
         self.fields, self._kinds, self.problems = {}, dict(kinds), {}
         for row, (name, kind) in enumerate(kinds.items()):
-            words = label(name, "body", role="textSecondary", wrap=True)
-            words.setTextFormat(Qt.TextFormat.PlainText)
-            words.setMinimumHeight(26)
+            name_label = label(name, "body", role="textSecondary", wrap=True)
+            name_label.setTextFormat(Qt.TextFormat.PlainText)
+            name_label.setMinimumHeight(26)
             field = self._make_field(name, kind)
             field.setAccessibleName(name)
-            self._grid.addWidget(words, row, 0, Qt.AlignmentFlag.AlignTop)
+            self._grid.addWidget(name_label, row, 0, Qt.AlignmentFlag.AlignTop)
             self._grid.addWidget(field, row, 1)
             self.fields[name] = field
 
@@ -143,19 +143,19 @@ class RequestForm(QWidget):
         return line
 
     def _on_typed(self, name: str, text: str) -> None:
-        meant = self._parse_value(name, text)
+        parsed = self._parse_value(name, text)
         field = self.fields[name]
-        if meant is None:
-            said = TYPE_ERRORS["separators" if self._has_separators(name, text) else self._kinds[name]]
-            self.problems[name] = _(said).format(name=name, example="[1, 2]")
+        if parsed is None:
+            template = TYPE_ERRORS["separators" if self._has_separators(name, text) else self._kinds[name]]
+            self.problems[name] = _(template).format(name=name, example="[1, 2]")
             if isinstance(field, QLineEdit):
-                self._set_invalid(field, wrong=True)
+                self._set_invalid(field, is_invalid=True)
             self.typed.emit(dict(self._request))
         else:
             self.problems.pop(name, None)
             if isinstance(field, QLineEdit):
-                self._set_invalid(field, wrong=False)
-            self._set_value(name, meant[0])
+                self._set_invalid(field, is_invalid=False)
+            self._set_value(name, parsed[0])
 
     def _parse_value(self, name: str, text: str) -> tuple[object] | None:
         # Returns the value in a tuple, or None if the text is invalid.
@@ -186,8 +186,8 @@ class RequestForm(QWidget):
         self.typed.emit(dict(self._request))
 
     @staticmethod
-    def _set_invalid(field: QLineEdit, *, wrong: bool) -> None:
-        if (field.property("wrong") == "true") != wrong:
-            field.setProperty("wrong", "true" if wrong else "false")
+    def _set_invalid(field: QLineEdit, *, is_invalid: bool) -> None:
+        if (field.property("wrong") == "true") != is_invalid:
+            field.setProperty("wrong", "true" if is_invalid else "false")
             field.style().unpolish(field)
             field.style().polish(field)

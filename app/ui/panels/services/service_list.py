@@ -44,12 +44,12 @@ def offered_services(view: GraphView | None) -> list[OfferedService]:
     """
     if view is None:
         return []
-    found = []
+    services = []
     for name, info in sorted(view.services.items()):
         if info.servers and not name.startswith((INTERNAL_PREFIX, SURVEY_PREFIX)):
             nodes = [view.nodes[each.node_id].name for each in info.servers if each.node_id in view.nodes]
-            found.append(OfferedService(name, tuple(dict.fromkeys(nodes))))
-    return found
+            services.append(OfferedService(name, tuple(dict.fromkeys(nodes))))
+    return services
 
 
 def count_text(services: Sequence[OfferedService]) -> str:
@@ -57,9 +57,9 @@ def count_text(services: Sequence[OfferedService]) -> str:
     if not services:
         return ""
     nodes = len({name for each in services for name in each.nodes})
-    said = ngettext("{count} service", "{count} services", len(services)).format(count=len(services))
+    text = ngettext("{count} service", "{count} services", len(services)).format(count=len(services))
     by = ngettext("{count} node", "{count} nodes", nodes).format(count=nodes)
-    return _("{services} of {nodes}").format(services=said, nodes=by)
+    return _("{services} of {nodes}").format(services=text, nodes=by)
 
 
 class ServiceList(TableView[OfferedService]):
@@ -104,8 +104,8 @@ class ServiceList(TableView[OfferedService]):
         self.selected.emit(self.selected_key() or "")
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        held = event.modifiers() == Qt.KeyboardModifier.ControlModifier
-        if held and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+        has_ctrl = event.modifiers() == Qt.KeyboardModifier.ControlModifier
+        if has_ctrl and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.call_requested.emit()
         else:
             super().keyPressEvent(event)

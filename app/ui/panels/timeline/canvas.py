@@ -100,8 +100,10 @@ class TimelineCanvas(QAbstractScrollArea):
             self.field.close_field()
         self._replay = replay
         self._topics = tuple(replay.recorded_topics) if replay is not None else ()
-        there = replay is not None and replay.opened is not None
-        self.scale = TimeScale.full(replay.start_ns, replay.end_ns) if replay is not None and there else None
+        is_open = replay is not None and replay.opened is not None
+        self.scale = (
+            TimeScale.full(replay.start_ns, replay.end_ns) if replay is not None and is_open else None
+        )
         self._position_ns, self._loop, self._follows = 0, None, True
         self.update_scroll_range()
 
@@ -178,11 +180,11 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def _x_mapper(self, plot: QRectF) -> Callable[[int], float]:
         # Returns a closure for speed: each rendering maps thousands of times.
-        scale, left, wide = self.scale, plot.left(), plot.width()
+        scale, left, width = self.scale, plot.left(), plot.width()
         if scale is None:
             return lambda _at_ns: left
         share = scale.relative_position
-        return lambda at_ns: left + max(-1.0, min(2.0, share(at_ns))) * wide
+        return lambda at_ns: left + max(-1.0, min(2.0, share(at_ns))) * width
 
     def time_at(self, x: float) -> int:
         """Return the time at an x coordinate, in ns since 1970."""
@@ -193,8 +195,8 @@ class TimelineCanvas(QAbstractScrollArea):
         """Return the topic whose lane is at a y coordinate, or "" if there is none."""
         if y < self._lanes_top():
             return ""
-        place = int((y - self._lanes_top() + self.verticalScrollBar().value()) / self._row_height())
-        return self._topics[place] if 0 <= place < len(self._topics) else ""
+        index = int((y - self._lanes_top() + self.verticalScrollBar().value()) / self._row_height())
+        return self._topics[index] if 0 <= index < len(self._topics) else ""
 
     def show_topic(self, topic: str) -> None:
         """Scroll to the lane of a topic."""
@@ -241,50 +243,50 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def _render_lanes(self) -> QPixmap:
         ratio = self.viewport().devicePixelRatioF()
-        made = QPixmap(self.viewport().size() * ratio)
-        made.setDevicePixelRatio(ratio)
-        made.fill(self._theme.colour("panel"))
-        painter = QPainter(made)
+        pixmap = QPixmap(self.viewport().size() * ratio)
+        pixmap.setDevicePixelRatio(ratio)
+        pixmap.fill(self._theme.colour("panel"))
+        painter = QPainter(pixmap)
         plot = self._plot_rect()
         painter.save()
         painter.setClipRect(QRectF(0, self._lanes_top(), self.viewport().width(), self.viewport().height()))
         first = int(self.verticalScrollBar().value() / self._row_height())
-        shown = int((self.viewport().height() - self._lanes_top()) / self._row_height()) + 2
-        for place in range(first, min(len(self._topics), first + shown)):
-            self._paint_topic(painter, plot, place)
+        row_count = int((self.viewport().height() - self._lanes_top()) / self._row_height()) + 2
+        for index in range(first, min(len(self._topics), first + row_count)):
+            self._paint_topic(painter, plot, index)
         painter.restore()
         self._paint_ruler(painter, plot)
         self._paint_lanes(painter, plot)
         painter.end()
-        return made
+        return pixmap
 
     def _paint_ruler(self, painter: QPainter, plot: QRectF) -> None:
         theme, scale = self._theme, self.scale
         if scale is None:
             return
-        high = theme.scaled(RULER_HEIGHT)
-        most = max(2, int(plot.width() / theme.scaled(LABEL_SPACING_PX)))
-        digits = 0 if scale.mark_interval_s(most) >= 1 else 3
-        font, ink = theme.font("small"), theme.colour("textSecondary")
+        height = theme.scaled(RULER_HEIGHT)
+        max_marks = max(2, int(plot.width() / theme.scaled(LABEL_SPACING_PX)))
+        digits = 0 if scale.mark_interval_s(max_marks) >= 1 else 3
+        font, colour = theme.font("small"), theme.colour("textSecondary")
         painter.setPen(QPen(theme.colour("border"), 1))
-        for at_ns in scale.marks(most, by_clock=self.by_clock):
+        for at_ns in scale.marks(max_marks, by_clock=self.by_clock):
             x = self.x_of(at_ns)
             painter.setPen(QPen(theme.colour("controlBorder"), 1))
-            painter.drawLine(QPointF(x, high - 6), QPointF(x, high))
+            painter.drawLine(QPointF(x, height - 6), QPointF(x, height))
             from_start = duration_text(at_ns - scale.first_ns, digits=digits)
-            words = clock_text(at_ns, digits=digits) if self.by_clock else from_start
+            text = clock_text(at_ns, digits=digits) if self.by_clock else from_start
             # otherwise it would overlap the text at the right
-            if x + 3 + paint.width_of(font, words) <= plot.right():
+            if x + 3 + paint.width_of(font, text) <= plot.right():
                 paint.text_line(
-                    painter, QRectF(x + 3, 0, theme.scaled(LABEL_SPACING_PX), high - 4), words, font, ink
+                    painter, QRectF(x + 3, 0, theme.scaled(LABEL_SPACING_PX), height - 4), text, font, colour
                 )
         paint.hairline(
-            painter, QRectF(0, 0, self.viewport().width(), high), Qt.Edge.BottomEdge, theme.colour("border")
+            painter, QRectF(0, 0, self.viewport().width(), height), Qt.Edge.BottomEdge, theme.colour("border")
         )
-        right = QRectF(plot.right(), 0, self.viewport().width() - plot.right() - 10, high)
+        right = QRectF(plot.right(), 0, self.viewport().width() - plot.right() - 10, height)
         tertiary = theme.colour("textTertiary")
         if right.width() > theme.scaled(FIGURES_WIDTH) - 12:
-            half = QRectF(right.left(), 0, right.width() / 2, high)
+            half = QRectF(right.left(), 0, right.width() / 2, height)
             paint.text_line(painter, half, _("Messages"), font, tertiary, paint.RIGHT)
         paint.text_line(painter, right, _("Lost"), font, tertiary, paint.RIGHT)
 
@@ -294,15 +296,15 @@ class TimelineCanvas(QAbstractScrollArea):
         self._marks = []
         if replay is None:
             return
-        lanes, high = EventLanes(theme, painter, plot, self._x_mapper(plot)), theme.scaled(LANE_HEIGHT)
-        for place, lane in enumerate(visible_lanes(replay)):
-            top = theme.scaled(RULER_HEIGHT) + place * high
+        lanes, height = EventLanes(theme, painter, plot, self._x_mapper(plot)), theme.scaled(LANE_HEIGHT)
+        for index, lane in enumerate(visible_lanes(replay)):
+            top = theme.scaled(RULER_HEIGHT) + index * height
             icon, name = NAMES_OF_LANES[lane]
-            box = QRectF(0, top, plot.left(), high)
+            box = QRectF(0, top, plot.left(), height)
             self._paint_name(painter, box, icon, _(name), "textSecondary")
-            self._marks += lanes.paint(lane, replay, top, high)
-            whole = QRectF(0, 0, self.viewport().width(), top + high)
-            paint.hairline(painter, whole, Qt.Edge.BottomEdge, theme.colour("border"))
+            self._marks += lanes.paint(lane, replay, top, height)
+            rect = QRectF(0, 0, self.viewport().width(), top + height)
+            paint.hairline(painter, rect, Qt.Edge.BottomEdge, theme.colour("border"))
 
     def _paint_current_run(self, painter: QPainter) -> None:
         # Highlights the run at the playhead.
@@ -310,43 +312,45 @@ class TimelineCanvas(QAbstractScrollArea):
         lanes = visible_lanes(replay)
         if replay is None or replay.densities is None or RUNS not in lanes:
             return
-        plot, high = self._plot_rect(), theme.scaled(LANE_HEIGHT)
-        top = theme.scaled(RULER_HEIGHT) + lanes.index(RUNS) * high
+        plot, height = self._plot_rect(), theme.scaled(LANE_HEIGHT)
+        top = theme.scaled(RULER_HEIGHT) + lanes.index(RUNS) * height
         event_lanes = EventLanes(theme, painter, plot, self._x_mapper(plot))
         painter.save()
-        painter.setClipRect(QRectF(plot.left(), top, plot.width(), high))
+        painter.setClipRect(QRectF(plot.left(), top, plot.width(), height))
         for span in replay.densities.spans.runs:
             if span.start_ns <= at_ns < span.end_ns:
-                event_lanes.paint_run(span, event_lanes.bar_rect(span, top, high), "changedTint", "running")
+                event_lanes.paint_run(span, event_lanes.bar_rect(span, top, height), "changedTint", "running")
         painter.restore()
 
-    def _paint_name(self, painter: QPainter, box: QRectF, icon: str, words: str, role: str) -> None:
+    def _paint_name(self, painter: QPainter, box: QRectF, icon: str, text: str, role: str) -> None:
         theme = self._theme
         side = theme.scaled(14)
-        square = QRectF(12, box.center().y() - side / 2, side, side)
-        paint_icon(painter, square, icon, theme.colour("textTertiary"))
+        icon_rect = QRectF(12, box.center().y() - side / 2, side, side)
+        paint_icon(painter, icon_rect, icon, theme.colour("textTertiary"))
         rest = box.adjusted(18 + side, 0, -6, 0)
         font = theme.font("code" if role in {"text", "selectedText"} else "body")
-        paint.text_line(painter, rest, words, font, theme.colour(role))
+        paint.text_line(painter, rest, text, font, theme.colour(role))
 
-    def _paint_topic(self, painter: QPainter, plot: QRectF, place: int) -> None:
-        theme, replay, topic = self._theme, self._replay, self._topics[place]
+    def _paint_topic(self, painter: QPainter, plot: QRectF, index: int) -> None:
+        theme, replay, topic = self._theme, self._replay, self._topics[index]
         if replay is None:
             return
-        top = self._lanes_top() + place * self._row_height() - self.verticalScrollBar().value()
-        whole = QRectF(0, top, self.viewport().width(), self._row_height())
+        top = self._lanes_top() + index * self._row_height() - self.verticalScrollBar().value()
+        row_rect = QRectF(0, top, self.viewport().width(), self._row_height())
         is_chosen = topic == replay.chosen
         if is_chosen:
-            painter.fillRect(whole, theme.colour("selected"))
-        known = replay.recorded_topics[topic]
+            painter.fillRect(row_rect, theme.colour("selected"))
+        recorded = replay.recorded_topics[topic]
         role = "selectedText" if is_chosen else "text"
-        icon = TOPIC_ICONS.get(known.codec, "binary")
+        icon = TOPIC_ICONS.get(recorded.codec, "binary")
         self._paint_name(painter, QRectF(0, top, plot.left(), self._row_height()), icon, topic, role)
         self._paint_density(painter, plot, top, topic, is_chosen=is_chosen)
         self._paint_losses(painter, plot, top, topic)
         self._paint_alarms_of(painter, plot, top, topic)
         self._paint_stats(
-            painter, QRectF(plot.right(), top, whole.right() - plot.right() - 10, self._row_height()), topic
+            painter,
+            QRectF(plot.right(), top, row_rect.right() - plot.right() - 10, self._row_height()),
+            topic,
         )
 
     def _paint_density(
@@ -368,10 +372,10 @@ class TimelineCanvas(QAbstractScrollArea):
         )
         if filled * MIN_LINE_SPACING_PX < density.bucket_count:
             per_px = box.width() / density.bucket_count
-            for place, count in enumerate(counts):
+            for index, count in enumerate(counts):
                 if count:
                     painter.fillRect(
-                        QRectF(left + place * per_px, box.top(), TICK_WIDTH, DENSITY_HEIGHT), colour
+                        QRectF(left + index * per_px, box.top(), TICK_WIDTH, DENSITY_HEIGHT), colour
                     )
         elif peak:
             painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, False)
@@ -382,16 +386,16 @@ class TimelineCanvas(QAbstractScrollArea):
         replay = self._replay
         if replay is None or replay.densities is None:
             return
-        ink = self._theme.colour("warn")
+        colour = self._theme.colour("warn")
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(ink)
+        painter.setBrush(colour)
         painted = plot.left() - 4
         for mark in replay.densities.losses.get(topic, ()):
             x = self.x_of(mark.at_ns)
             if plot.left() <= x <= plot.right() and x >= painted + 3:
                 painted = x
                 middle = top + self._row_height() / 2
-                painter.fillRect(QRectF(x - 1, middle - 8, 2, 16), ink)
+                painter.fillRect(QRectF(x - 1, middle - 8, 2, 16), colour)
                 notch = [QPointF(x - 4, middle - 8), QPointF(x + 4, middle - 8), QPointF(x, middle - 3)]
                 painter.drawPolygon(QPolygonF(notch))
 
@@ -422,21 +426,21 @@ class TimelineCanvas(QAbstractScrollArea):
         if replay is None:
             return
         font, count = theme.font("code"), replay.recorded_topics[topic].message_count
-        known = replay.stats.get(topic)
-        lost = None if known is None or known.lost is None else known.lost + known.unkept
+        stats = replay.stats.get(topic)
+        lost = None if stats is None or stats.lost is None else stats.lost + stats.unkept
         if box.width() > theme.scaled(FIGURES_WIDTH) - 12:
             half = QRectF(box.left(), box.top(), box.width() / 2, box.height())
             paint.text_line(
                 painter, half, group_digits(count), font, theme.colour("textSecondary"), paint.RIGHT
             )
         if lost is not None:
-            words, role = group_digits(lost), "warn" if lost else "textTertiary"
-            paint.text_line(painter, box, words, font, theme.colour(role), paint.RIGHT)
+            text, role = group_digits(lost), "warn" if lost else "textTertiary"
+            paint.text_line(painter, box, text, font, theme.colour(role), paint.RIGHT)
             if lost:
                 side = theme.scaled(13)
-                left = box.right() - paint.width_of(font, words) - side - 4
-                square = QRectF(left, box.center().y() - side / 2, side, side)
-                paint_icon(painter, square, "triangle-alert", theme.colour("warn"))
+                left = box.right() - paint.width_of(font, text) - side - 4
+                icon_rect = QRectF(left, box.center().y() - side / 2, side, side)
+                paint_icon(painter, icon_rect, "triangle-alert", theme.colour("warn"))
 
     def _paint_loop(self, painter: QPainter) -> None:
         if self._loop is None:
@@ -450,9 +454,9 @@ class TimelineCanvas(QAbstractScrollArea):
         painter.fillRect(QRectF(left, 0, right - left, plot.height()), tint)
         for x in (left, right):
             painter.fillRect(QRectF(x - 1, 0, 2, plot.height()), accent)
-        high = self._theme.scaled(RULER_HEIGHT)
+        ruler_height = self._theme.scaled(RULER_HEIGHT)
         for x in (left - 8, right):
-            paint.box(painter, QRectF(x, 5, 8, high - 10), 2, accent)
+            paint.box(painter, QRectF(x, 5, 8, ruler_height - 10), 2, accent)
         painter.restore()
 
     def _paint_playhead(self, painter: QPainter) -> None:
@@ -463,31 +467,29 @@ class TimelineCanvas(QAbstractScrollArea):
         painter.fillRect(QRectF(x - 0.75, 0, 1.5, plot.height()), theme.colour("text"))
         font = theme.font("small")
         first_ns = self.scale.first_ns
-        words = (
-            clock_text(self._position_ns) if self.by_clock else duration_text(self._position_ns - first_ns)
-        )
-        wide = paint.width_of(font, words) + 12
-        left = max(plot.left(), min(plot.right() - wide, x - wide / 2))
-        flag = QRectF(left, 3, wide, theme.scaled(RULER_HEIGHT) - 7)
+        text = clock_text(self._position_ns) if self.by_clock else duration_text(self._position_ns - first_ns)
+        width = paint.width_of(font, text) + 12
+        left = max(plot.left(), min(plot.right() - width, x - width / 2))
+        flag = QRectF(left, 3, width, theme.scaled(RULER_HEIGHT) - 7)
         paint.box(painter, flag, theme.radius("small"), theme.colour("tooltip"))
-        paint.text_line(painter, flag, words, font, theme.colour("tooltipText"), paint.CENTRE)
+        paint.text_line(painter, flag, text, font, theme.colour("tooltipText"), paint.CENTRE)
 
     # -- mouse --------------------------------------------------------------------------------------------
 
-    def mark_at(self, at: QPointF) -> LaneMark | None:
+    def mark_at(self, position: QPointF) -> LaneMark | None:
         """Return the mark at a position, or None. If marks overlap, the narrowest one is returned."""
-        found = [mark for mark in self._marks if mark.box.contains(at)]
-        return min(found, key=lambda mark: mark.box.width(), default=None)
+        matches = [mark for mark in self._marks if mark.box.contains(position)]
+        return min(matches, key=lambda mark: mark.box.width(), default=None)
 
-    def _grip_at(self, at: QPointF) -> str:
+    def _grip_at(self, position: QPointF) -> str:
         # Part that is dragged after a press at this position.
         plot = self._plot_rect()
-        if not plot.left() - GRIP_PX <= at.x() <= plot.right() + GRIP_PX or self.scale is None:
+        if not plot.left() - GRIP_PX <= position.x() <= plot.right() + GRIP_PX or self.scale is None:
             return ""
-        if self._loop is not None and at.y() < self._theme.scaled(RULER_HEIGHT):
+        if self._loop is not None and position.y() < self._theme.scaled(RULER_HEIGHT):
             for name, edge in zip(("start", "end"), self._loop, strict=True):
                 outer = self.x_of(edge) + (-4 if name == "start" else 4)
-                if abs(at.x() - outer) <= GRIP_PX:
+                if abs(position.x() - outer) <= GRIP_PX:
                     return name
         return "playhead"
 
@@ -506,9 +508,9 @@ class TimelineCanvas(QAbstractScrollArea):
             self._replay.seek(self.time_at(event.position().x()))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        held = self._held or self._grip_at(event.position())
+        grip = self._held or self._grip_at(event.position())
         self.viewport().setCursor(
-            Qt.CursorShape.SplitHCursor if held in {"start", "end"} else Qt.CursorShape.ArrowCursor
+            Qt.CursorShape.SplitHCursor if grip in {"start", "end"} else Qt.CursorShape.ArrowCursor
         )
         if not self._held or self._replay is None:
             return
@@ -533,40 +535,40 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         # Context menu of the bookmark under the mouse or, by keyboard, at the playhead.
-        bookmark, place = None, event.globalPos()
+        bookmark, position = None, event.globalPos()
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
             bookmark = self._replay.current_bookmark() if self._replay is not None else None
             if bookmark is not None:
                 corner = QPoint(round(self.x_of(bookmark.at_ns)), round(self._theme.scaled(RULER_HEIGHT)))
-                place = self.viewport().mapToGlobal(corner)
+                position = self.viewport().mapToGlobal(corner)
         elif (mark := self.mark_at(QPointF(event.pos()))) is not None:
             bookmark = mark.bookmark
         if bookmark is not None:
-            self.menu_requested.emit(bookmark, place)
+            self.menu_requested.emit(bookmark, position)
             event.accept()
 
-    def rename(self, bookmark: Bookmark, take: Callable[[str], bool]) -> None:
+    def rename(self, bookmark: Bookmark, on_rename: Callable[[str], bool]) -> None:
         """Start editing the name of a bookmark in place.
 
         Args:
             bookmark: Bookmark to rename.
-            take: Receives the new name and returns False if it is invalid.
+            on_rename: Receives the new name and returns False if it is invalid.
         """
         if self.field is not None:
             return
         if self.scale is not None:
             self.set_scale(self.scale.with_time(bookmark.at_ns))
         scaled, view = self._theme.scaled, self.viewport()
-        wide = min(round(scaled(FIELD_WIDTH)), view.width())
-        left = max(0, min(round(self.x_of(bookmark.at_ns)), view.width() - wide))
-        place = QRect(left, round(scaled(RULER_HEIGHT)), wide, round(scaled(LANE_HEIGHT)))
-        self.field = RenameField(self._theme, view, place, bookmark.name, take, _("Bookmark name"))
+        width = min(round(scaled(FIELD_WIDTH)), view.width())
+        left = max(0, min(round(self.x_of(bookmark.at_ns)), view.width() - width))
+        rect = QRect(left, round(scaled(RULER_HEIGHT)), width, round(scaled(LANE_HEIGHT)))
+        self.field = RenameField(self._theme, view, rect, bookmark.name, on_rename, _("Bookmark name"))
         self.field.closed.connect(self._rename_finished)
 
     def _rename_finished(self) -> None:
-        had = self.field is not None and self.field.hasFocus()
+        had_focus = self.field is not None and self.field.hasFocus()
         self.field = None
-        if had:
+        if had_focus:
             self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -586,26 +588,26 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def viewportEvent(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
-            words = self._tooltip_at(QPointF(event.pos()))
-            QToolTip.showText(event.globalPos(), plain.tip(words) if words else "", self.viewport())
+            text = self._tooltip_at(QPointF(event.pos()))
+            QToolTip.showText(event.globalPos(), plain.tip(text) if text else "", self.viewport())
             return True
         return super().viewportEvent(event)
 
-    def _tooltip_at(self, at: QPointF) -> str:
+    def _tooltip_at(self, position: QPointF) -> str:
         # Tooltip of a mark, of losses, or of an elided name.
-        replay, topic = self._replay, self.topic_at(at.y())
+        replay, topic = self._replay, self.topic_at(position.y())
         if replay is None or self.scale is None:
             return ""
         if not topic:
-            mark = self.mark_at(at)
+            mark = self.mark_at(position)
             return mark.text if mark is not None else ""
         losses = replay.densities.losses.get(topic, ()) if replay.densities is not None else ()
-        lost = sum(each.count for each in losses if abs(self.x_of(each.at_ns) - at.x()) <= GRIP_PX)
-        if at.x() >= self._plot_rect().left() and lost:
-            words = ngettext(
+        lost = sum(each.count for each in losses if abs(self.x_of(each.at_ns) - position.x()) <= GRIP_PX)
+        if position.x() >= self._plot_rect().left() and lost:
+            template = ngettext(
                 "{count} message of {topic} was lost here", "{count} messages of {topic} were lost here", lost
             )
-            return words.format(count=group_digits(lost), topic=topic)
+            return template.format(count=group_digits(lost), topic=topic)
         return topic
 
 
@@ -624,7 +626,7 @@ def density_image(counts: Sequence[int], peak: int, colour: QColor) -> QImage:
         red, green, blue = rgb
         levels.append(round(alpha * 255) << 24 | red << 16 | green << 8 | blue)
     pixels = array("I", [levels[0 if not count else max(1, count * 255 // peak)] for count in counts])
-    made = QImage(
+    image = QImage(
         pixels.tobytes(), len(counts), 1, 4 * len(counts), QImage.Format.Format_ARGB32_Premultiplied
     )
-    return made.copy()  # copied because QImage doesn't own the buffer
+    return image.copy()  # copied because QImage doesn't own the buffer

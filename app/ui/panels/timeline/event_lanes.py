@@ -73,32 +73,32 @@ class EventLanes:
     def __init__(self, theme: Theme, painter: QPainter, plot: QRectF, x_of: Callable[[int], float]) -> None:
         self._theme, self._painter, self._plot, self._x_of = theme, painter, plot, x_of
 
-    def paint(self, lane: str, replay: Replay, top: float, high: float) -> list[LaneMark]:
+    def paint(self, lane: str, replay: Replay, top: float, height: float) -> list[LaneMark]:
         """Paint one lane and return its marks.
 
         Args:
             lane: Lane, a key in `LANE_LABELS`.
             replay: Open recording.
             top: Upper edge of the lane in px.
-            high: Height of the lane in px.
+            height: Height of the lane in px.
         """
         plot = self._plot
-        box = QRectF(plot.left(), top, plot.width(), high)
+        box = QRectF(plot.left(), top, plot.width(), height)
         spans = replay.densities.spans if replay.densities is not None else None
         self._painter.save()
         self._painter.setClipRect(box)
         if lane == BOOKMARKS:
-            made = self._paint_bookmarks(replay, box)
+            marks = self._paint_bookmarks(replay, box)
         elif spans is None:
-            made = []
+            marks = []
         elif lane == RUNS:
-            made = [
+            marks = [
                 self._paint_run_mark(span, box, replay.start_ns) for span in self.visible_spans(spans.runs)
             ]
         else:
-            made = self._paint_alarms(list(self.visible_spans(spans.alarms)), box, replay.start_ns)
+            marks = self._paint_alarms(list(self.visible_spans(spans.alarms)), box, replay.start_ns)
         self._painter.restore()
-        return made
+        return marks
 
     def visible_spans(self, spans: Iterable[RecordedSpan]) -> Iterator[RecordedSpan]:
         """Yield the spans to paint: visible spans that the mark of the previous span does not hide."""
@@ -114,44 +114,44 @@ class EventLanes:
 
     def _paint_bookmarks(self, replay: Replay, box: QRectF) -> list[LaneMark]:
         theme, painter, marks = self._theme, self._painter, replay.bookmarks
-        font, ink = theme.font("small"), theme.colour("accentText")
+        font, colour = theme.font("small"), theme.colour("accentText")
         if not marks:
             tertiary = theme.colour("textTertiary")
             paint.text_line(
                 painter, box.adjusted(FLAG_SIZE, 0, 0, 0), _("Press B to add one"), font, tertiary
             )
-        made, free = [], box.left() - 1.0
+        lane_marks, free = [], box.left() - 1.0
         for mark in marks:
             x = self._x_of(mark.at_ns)
             if not box.left() - 1 <= x <= box.right() + 1:
                 continue
-            painter.setPen(QPen(ink, 1.5))
+            painter.setPen(QPen(colour, 1.5))
             painter.drawLine(QPointF(x, box.top() + 3), QPointF(x, box.bottom() - 3))
             painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(ink)
+            painter.setBrush(colour)
             painter.drawRect(QRectF(x, box.top() + 4, FLAG_SIZE, 7))
-            wide = 0.0
+            name_width = 0.0
             if x >= free and mark.name:
-                wide = min(paint.width_of(font, mark.name), theme.scaled(MAX_NAME_WIDTH))
-                place = QRectF(x + 12, box.top(), wide, box.height())
-                paint.text_line(painter, place, mark.name, font, theme.colour("text"))
-                free = x + 16 + wide
-            pressed = QRectF(x - GAP, box.top(), FLAG_SIZE + 2 * GAP + wide, box.height())
-            made.append(LaneMark(pressed, mark.at_ns, mark.name or _("Bookmark"), mark))
-        return made
+                name_width = min(paint.width_of(font, mark.name), theme.scaled(MAX_NAME_WIDTH))
+                name_rect = QRectF(x + 12, box.top(), name_width, box.height())
+                paint.text_line(painter, name_rect, mark.name, font, theme.colour("text"))
+                free = x + 16 + name_width
+            pressed = QRectF(x - GAP, box.top(), FLAG_SIZE + 2 * GAP + name_width, box.height())
+            lane_marks.append(LaneMark(pressed, mark.at_ns, mark.name or _("Bookmark"), mark))
+        return lane_marks
 
     # -- behaviours ---------------------------------------------------------------------------------------
 
-    def bar_rect(self, span: RecordedSpan, top: float, high: float) -> QRectF:
+    def bar_rect(self, span: RecordedSpan, top: float, height: float) -> QRectF:
         """Return the rectangle of a run in a lane.
 
         Args:
             span: Run.
             top: Upper edge of the lane in px.
-            high: Height of the lane in px.
+            height: Height of the lane in px.
         """
         left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
-        return QRectF(left, top + 3, max(MIN_MARK_WIDTH, right - left), high - 6)
+        return QRectF(left, top + 3, max(MIN_MARK_WIDTH, right - left), height - 6)
 
     def _paint_run_mark(self, span: RecordedSpan, box: QRectF, start_ns: int) -> LaneMark:
         bar = self.bar_rect(span, box.top(), box.height())
@@ -169,55 +169,55 @@ class EventLanes:
         """
         theme, painter = self._theme, self._painter
         paint.box(painter, bar, theme.radius("small"), theme.colour(fill), theme.colour(edge))
-        seen = bar.intersected(QRectF(self._plot.left(), bar.top(), self._plot.width(), bar.height()))
-        inside = seen.adjusted(6, 0, -6, 0)
-        if inside.width() < theme.scaled(MIN_TEXT_WIDTH):
+        visible_rect = bar.intersected(QRectF(self._plot.left(), bar.top(), self._plot.width(), bar.height()))
+        content_rect = visible_rect.adjusted(6, 0, -6, 0)
+        if content_rect.width() < theme.scaled(MIN_TEXT_WIDTH):
             return
         font, side = theme.font("small"), theme.scaled(ICON_SIZE)
-        self._paint_icon("blocks", inside.left(), inside, "textTertiary")
-        inside.adjust(side + GAP, 0, 0, 0)
+        self._paint_icon("blocks", content_rect.left(), content_rect, "textTertiary")
+        content_rect.adjust(side + GAP, 0, 0, 0)
         icon, role, result = RESULT_STYLES.get(span.result, ("", "", ""))
-        words = span.details or (_(result) if result else "")
-        wide = side + GAP + paint.width_of(font, words)
+        text = span.details or (_(result) if result else "")
+        result_width = side + GAP + paint.width_of(font, text)
         name = min(paint.width_of(font, span.name), theme.scaled(MAX_NAME_WIDTH))
-        if icon and name + 2 * GAP + wide <= inside.width():
-            self._paint_icon(icon, inside.right() - wide, inside, role)
-            paint.text_line(painter, inside, words, font, theme.colour(role), paint.RIGHT)
-            inside.adjust(0, 0, -wide - GAP, 0)
-        elif icon and name + 2 * GAP + side <= inside.width():
-            self._paint_icon(icon, inside.right() - side, inside, role)
-            inside.adjust(0, 0, -side - GAP, 0)
-        paint.text_line(painter, inside, span.name, font, theme.colour("text"))
+        if icon and name + 2 * GAP + result_width <= content_rect.width():
+            self._paint_icon(icon, content_rect.right() - result_width, content_rect, role)
+            paint.text_line(painter, content_rect, text, font, theme.colour(role), paint.RIGHT)
+            content_rect.adjust(0, 0, -result_width - GAP, 0)
+        elif icon and name + 2 * GAP + side <= content_rect.width():
+            self._paint_icon(icon, content_rect.right() - side, content_rect, role)
+            content_rect.adjust(0, 0, -side - GAP, 0)
+        paint.text_line(painter, content_rect, span.name, font, theme.colour("text"))
 
     def _paint_icon(self, name: str, left: float, row: QRectF, role: str) -> None:
         side = self._theme.scaled(ICON_SIZE)
-        square = QRectF(left, row.center().y() - side / 2, side, side)
-        paint_icon(self._painter, square, name, self._theme.colour(role))
+        icon_rect = QRectF(left, row.center().y() - side / 2, side, side)
+        paint_icon(self._painter, icon_rect, name, self._theme.colour(role))
 
     # -- alarms -------------------------------------------------------------------------------------------
 
     def _paint_alarms(self, spans: list[RecordedSpan], box: QRectF, start_ns: int) -> list[LaneMark]:
         # Each bar has its text at the right, up to the next bar.
-        made, theme = [], self._theme
+        marks, theme = [], self._theme
         font, side = theme.font("small"), theme.scaled(ICON_SIZE)
-        for place, span in enumerate(spans):
+        for index, span in enumerate(spans):
             role = "error" if span.is_error else "warn"
             left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
             bar = QRectF(left, box.top() + 5, max(MIN_MARK_WIDTH, right - left), box.height() - 10)
             paint.box(self._painter, bar, 1.5, theme.colour(role))
-            words = alarm_text(span)
-            until = self._x_of(spans[place + 1].start_ns) if place + 1 < len(spans) else box.right()
+            message = alarm_text(span)
+            until = self._x_of(spans[index + 1].start_ns) if index + 1 < len(spans) else box.right()
             begin = max(bar.right(), box.left()) + 5
             room = min(until, box.right()) - begin - side - GAP
             pressed = bar.adjusted(-3, -3, 3, 3)
             if room >= theme.scaled(MIN_TEXT_WIDTH):
-                wide = min(room, paint.width_of(font, words) + 1)
+                text_width = min(room, paint.width_of(font, message) + 1)
                 self._paint_icon("circle-x" if span.is_error else "triangle-alert", begin, box, role)
-                text = QRectF(begin + side + GAP, box.top(), wide, box.height())
-                paint.text_line(self._painter, text, words, font, theme.colour(role))
+                text = QRectF(begin + side + GAP, box.top(), text_width, box.height())
+                paint.text_line(self._painter, text, message, font, theme.colour(role))
                 pressed = pressed.united(text)
-            made.append(LaneMark(pressed, span.start_ns, _with_times(words, span, start_ns)))
-        return made
+            marks.append(LaneMark(pressed, span.start_ns, _with_times(message, span, start_ns)))
+        return marks
 
 
 def alarm_text(span: RecordedSpan) -> str:
@@ -237,13 +237,13 @@ def run_text(span: RecordedSpan, start_ns: int) -> str:
         span: Run.
         start_ns: Start of the recording, in ns since 1970.
     """
-    known = RESULT_STYLES.get(span.result)
-    words = span.details or (_(known[2]) if known is not None else "")
-    return _with_times(f"{span.name}: {words}" if words else span.name, span, start_ns)
+    style = RESULT_STYLES.get(span.result)
+    result = span.details or (_(style[2]) if style is not None else "")
+    return _with_times(f"{span.name}: {result}" if result else span.name, span, start_ns)
 
 
-def _with_times(words: str, span: RecordedSpan, start_ns: int) -> str:
+def _with_times(text: str, span: RecordedSpan, start_ns: int) -> str:
     begin, end = (duration_text(each - start_ns, digits=1) for each in (span.start_ns, span.end_ns))
     if not span.has_ended:
-        return _("{what}\nsince {begin}").format(what=words, begin=begin)
-    return _("{what}\n{begin} to {end}").format(what=words, begin=begin, end=end)
+        return _("{what}\nsince {begin}").format(what=text, begin=begin)
+    return _("{what}\n{begin} to {end}").format(what=text, begin=begin, end=end)

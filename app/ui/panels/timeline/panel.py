@@ -107,24 +107,24 @@ class TimelinePanel(PanelWidget):
         # Shows the progress of opening, the error, or how to open a recording.
         replay = self.session.replay
         status = replay.status if replay is not None else None
-        words: tuple[object, ...]
+        state: tuple[object, ...]
         if replay is None or status is None:
-            words = (_("No recording is open"), _("Open a recording or drop one here."), True)
+            state = (_("No recording is open"), _("Open a recording or drop one here."), True)
         elif status.stage == "failed":
-            words = (
+            state = (
                 _("{name} can't be played.").format(name=replay.name),
                 f"{status.message[:1].upper()}{status.message[1:]}.",
                 True,
             )
         else:
             percent = round(100 * status.progress)
-            said = _("Reading the index, {percent} %")
-            words = (replay.name, said.format(percent=percent), False)
-        if words == self._state and self.pages.currentIndex() == 0:
+            template = _("Reading the index, {percent} %")
+            state = (replay.name, template.format(percent=percent), False)
+        if state == self._state and self.pages.currentIndex() == 0:
             return
-        self._state = words
-        title, sentence, offers = words
-        self.empty.set_texts(str(title), str(sentence), "film")
+        self._state = state
+        title, hint, offers = state
+        self.empty.set_texts(str(title), str(hint), "film")
         action = EmptyAction(
             _("Open a recording"), lambda: self.context.run("replay.open"), "folder-open", is_primary=True
         )
@@ -178,8 +178,8 @@ class TimelinePanel(PanelWidget):
             super().keyPressEvent(event)
 
     def _handle_key(self, event: QKeyEvent, replay: Replay) -> bool:
-        held = event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
-        does: dict[tuple[Qt.KeyboardModifier, int], Callable[[], object]] = {
+        modifiers = event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+        actions: dict[tuple[Qt.KeyboardModifier, int], Callable[[], object]] = {
             (NONE, Qt.Key.Key_Space): replay.toggle,
             (NONE, Qt.Key.Key_Left): lambda: replay.step(forward=False),
             (NONE, Qt.Key.Key_Right): lambda: replay.step(forward=True),
@@ -200,20 +200,22 @@ class TimelinePanel(PanelWidget):
             (NONE, Qt.Key.Key_Up): lambda: self._select_neighbour(-1),
             (NONE, Qt.Key.Key_Down): lambda: self._select_neighbour(1),
         }
-        wanted = does.get((held, event.key()))
-        if wanted is None and event.text() in {"[", "]"}:  # typed with AltGr on many keyboard layouts
-            wanted = does[(NONE, Qt.Key.Key_BracketLeft if event.text() == "[" else Qt.Key.Key_BracketRight)]
-        if wanted is None:
+        action = actions.get((modifiers, event.key()))
+        if action is None and event.text() in {"[", "]"}:  # typed with AltGr on many keyboard layouts
+            action = actions[
+                (NONE, Qt.Key.Key_BracketLeft if event.text() == "[" else Qt.Key.Key_BracketRight)
+            ]
+        if action is None:
             return False
-        wanted()
+        action()
         return True
 
     def _select_neighbour(self, by: int) -> None:
         # Selects the next topic above or below.
         replay = self._shown
         if replay is not None and (topics := list(replay.recorded_topics)):
-            place = topics.index(replay.chosen) if replay.chosen in topics else 0
-            self.show_topic(topics[max(0, min(len(topics) - 1, place + by))])
+            index = topics.index(replay.chosen) if replay.chosen in topics else 0
+            self.show_topic(topics[max(0, min(len(topics) - 1, index + by))])
 
     # -- sending ------------------------------------------------------------------------------------------
 
@@ -228,8 +230,8 @@ class TimelinePanel(PanelWidget):
     def _close_chooser(self) -> None:
         self._below.setCurrentWidget(self.canvas)
         self.refresh()
-        place = self.strip.switch if self.strip.isVisibleTo(self) else self.transport.armed
-        place.setFocus(Qt.FocusReason.OtherFocusReason)
+        focus_target = self.strip.switch if self.strip.isVisibleTo(self) else self.transport.armed
+        focus_target.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def dispose(self) -> None:
         if self.session.is_replaying:
@@ -237,14 +239,14 @@ class TimelinePanel(PanelWidget):
 
     # -- bookmarks ----------------------------------------------------------------------------------------
 
-    def _run_on_current_bookmark(self, do: Callable[[Bookmark], object]) -> None:
+    def _run_on_current_bookmark(self, action: Callable[[Bookmark], object]) -> None:
         mark = self._shown.current_bookmark() if self._shown is not None else None
         if mark is not None:
-            do(mark)
+            action(mark)
         else:
             self.context.show_toast(_("No bookmark at the playhead. Select one, or press B to add one"))
 
-    def _show_menu(self, mark: Bookmark, place: QPoint) -> None:
+    def _show_menu(self, mark: Bookmark, position: QPoint) -> None:
         # Context menu of a bookmark.
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -252,7 +254,7 @@ class TimelinePanel(PanelWidget):
             RowAction(_("Rename"), "pencil", lambda: self.rename_bookmark(mark)),
             RowAction(_("Delete"), "trash-2", lambda: self.delete_bookmark(mark)),
         )
-        fill_menu(menu, self.theme, actions).popup(place)
+        fill_menu(menu, self.theme, actions).popup(position)
 
     def rename_bookmark(self, mark: Bookmark) -> None:
         """Start editing the name of a bookmark in place."""
@@ -271,9 +273,9 @@ class TimelinePanel(PanelWidget):
             or not self._apply_change(lambda: replay.remove_bookmark(mark))
         ):
             return
-        words = _("Deleted the bookmark “{name}”").format(name=mark.name) if mark.name else ""
+        text = _("Deleted the bookmark “{name}”").format(name=mark.name) if mark.name else ""
         self.context.show_toast(
-            words or _("Deleted the bookmark"),
+            text or _("Deleted the bookmark"),
             _("Undo"),
             lambda: self._apply_change(lambda: replay.restore_bookmark(mark)),
         )
@@ -297,21 +299,21 @@ class TimelinePanel(PanelWidget):
         return True
 
     def more_actions(self) -> list[QAction]:
-        made = []
+        actions = []
         path = self._shown.path if self._shown is not None else None
         rows = (
             (_("Open a recording"), "folder-open", "replay.open"),
             *([(_("Export a range"), "download", f"recording.export:{path}")] if path else []),
             (_("Back to live"), "radio-tower", "replay.live"),
         )
-        for words, icon, command in rows:
-            action = QAction(self.theme.icon(icon), words, self)
+        for text, icon, command in rows:
+            action = QAction(self.theme.icon(icon), text, self)
             action.triggered.connect(lambda _on=False, command=command: self.context.run(command))
-            made.append(action)
+            actions.append(action)
         for old in self._menu_actions:
             old.deleteLater()
-        self._menu_actions = made
-        return [*made, self._minutes.entry()] if path else made
+        self._menu_actions = actions
+        return [*actions, self._minutes.entry()] if path else actions
 
     _menu_actions: Sequence[QAction] = ()
 

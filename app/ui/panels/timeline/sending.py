@@ -56,15 +56,17 @@ class ReplayStrip(ArmedStrip):
         self.setVisible(self.sending is not None and (self._is_on or self.acting.question is not None))
 
     def summary_text(self) -> str:
-        going = self.sending.outbox.active_topics if self.sending is not None else ()
-        if not going:
+        active = self.sending.outbox.active_topics if self.sending is not None else ()
+        if not active:
             return ""
-        count, skipped = sum(each.count for each in going), sum(each.dropped_count for each in going)
-        heard = max(each.subscriber_count for each in going)
+        count, skipped = sum(each.count for each in active), sum(each.dropped_count for each in active)
+        subscriber_count = max(each.subscriber_count for each in active)
         sent = ngettext("{count} sent", "{count} sent", count).format(count=group_digits(count))
         late = [late_text(skipped)] if skipped else []
-        ears = ngettext("received by {count}", "received by {count}", heard).format(count=heard)
-        return ", ".join((sent, *late, ears if heard else _("no subscribers")))
+        ears = ngettext("received by {count}", "received by {count}", subscriber_count).format(
+            count=subscriber_count
+        )
+        return ", ".join((sent, *late, ears if subscriber_count else _("no subscribers")))
 
     def token_text(self, target: Target) -> str:
         routes = self.sending.routes if self.sending is not None else {}
@@ -133,35 +135,35 @@ class SendChooser(QWidget):
         self._arrange()
 
     def _arrange(self) -> None:
-        foot = Flow(gap=8, row_gap=6)
-        foot.addWidget(label(_("Sent as"), "small", role="textSecondary"))
+        footer = Flow(gap=8, row_gap=6)
+        footer.addWidget(label(_("Sent as"), "small", role="textSecondary"))
         for field in (self.name, self.arm, self.cancel):
-            foot.addWidget(field)
+            footer.addWidget(field)
         scroll = ScrollColumn(_("Topics sent"), margins=(12, 8, 12, 8), gap=6)
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         below = QWidget()
-        below.setLayout(foot)
-        for place, widget in enumerate((self.words, self.table, self.problem, below)):
-            scroll.column.insertWidget(place, widget)
+        below.setLayout(footer)
+        for index, widget in enumerate((self.words, self.table, self.problem, below)):
+            scroll.column.insertWidget(index, widget)
         scroll.column.setStretchFactor(self.table, 1)
         scroll.column.setStretch(scroll.column.count() - 1, 0)  # the table takes the remaining height
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(scroll)
 
-    def open(self, sending: ReplaySending, counts: dict[str, int], chosen: str) -> None:
+    def open(self, sending: ReplaySending, counts: dict[str, int], selected: str) -> None:
         """Show the topics of a recording.
 
         Args:
             sending: Controller that sends the topics.
             counts: Number of recorded messages by topic.
-            chosen: Topic whose row is selected.
+            selected: Topic whose row is selected.
         """
         self._sending, self._counts, self._seen = sending, counts, None
         sending.analyze()
         self.problem.setText("")
         self.refresh()
-        self.table.select_key(chosen)
+        self.table.select_key(selected)
         self._show_name()
         self.table.setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -172,10 +174,10 @@ class SendChooser(QWidget):
             return
         self._seen = (sending, sending.revision)
         self._show_rows()
-        said = _("While armed, these topics are also sent to the live network during playback.")
+        hint = _("While armed, these topics are also sent to the live network during playback.")
         moving = _("Topics that move a robot are marked and need confirmation.")
         reading = _("Checking which topics move robots.")
-        self.words.setText(f"{said} {moving if sending.is_analyzed else reading}")
+        self.words.setText(f"{hint} {moving if sending.is_analyzed else reading}")
         self.problem.setVisible(bool(self.problem.text()))
         self.arm.setEnabled(bool(sending.routes) and sending.is_analyzed)
 
@@ -220,9 +222,9 @@ class SendChooser(QWidget):
     def _arm(self) -> None:
         if self._sending is None or not self.arm.isEnabled():
             return
-        why_not = self._sending.arm()
-        if why_not:
-            self.arming_failed.emit(why_not)
+        reason = self._sending.arm()
+        if reason:
+            self.arming_failed.emit(reason)
         else:
             self.exited.emit()
 

@@ -96,9 +96,9 @@ class TransportRow(QWidget):
         )
         self.speed.reset.connect(lambda: self.speed.setValue(SPEED_STEP_COUNT // 2))
 
-    def _apply_to_replay(self, what: Callable[[Replay], object]) -> None:
+    def _apply_to_replay(self, action: Callable[[Replay], object]) -> None:
         if self._replay is not None:
-            what(self._replay)
+            action(self._replay)
 
     def show_replay(self, replay: Replay, player: PlayerStatus) -> None:
         """Show the state of a replay.
@@ -118,8 +118,8 @@ class TransportRow(QWidget):
         )
         at_ns = player.position_ns
         self.date.setText(f"{date_text(at_ns)}, {clock_text(at_ns)}")
-        word, icon = (_("Pause"), "pause") if player.is_playing else (_("Play"), "play")
-        self.play.set_label(word, icon)
+        text, icon = (_("Pause"), "pause") if player.is_playing else (_("Play"), "play")
+        self.play.set_label(text, icon)
         self.play.set_kind("plain" if player.is_playing else "primary")
         self.loop.setChecked(player.is_looping)
         self.loop.set_label(self._loop_text(replay, player))
@@ -132,16 +132,16 @@ class TransportRow(QWidget):
         return _("Loop {begin} to {end}").format(begin=begin, end=end)
 
     def _update_speed(self, player: PlayerStatus) -> None:
-        asked, true = player.speed, player.measured_speed
-        is_slow = player.is_playing and true is not None and true < MIN_NORMAL_SPEED_RATIO * asked
+        requested, true = player.speed, player.measured_speed
+        is_slow = player.is_playing and true is not None and true < MIN_NORMAL_SPEED_RATIO * requested
         if is_slow:
-            words = _("requested {asked}, actual {true} \u00d7").format(
-                asked=f"{asked:.3g}", true=f"{true:.2g}"
+            text = _("requested {asked}, actual {true} \u00d7").format(
+                asked=f"{requested:.3g}", true=f"{true:.2g}"
             )
         else:
-            words = f"{asked:.1f}\u2009\u00d7" if asked >= 1 else f"{asked:.2g}\u2009\u00d7"
-        if words != self.said.text():
-            self.said.setText(words)
+            text = f"{requested:.1f}\u2009\u00d7" if requested >= 1 else f"{requested:.2g}\u2009\u00d7"
+        if text != self.said.text():
+            self.said.setText(text)
             set_role(self.said, "warn" if is_slow else "textSecondary")
 
 

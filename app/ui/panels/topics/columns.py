@@ -30,10 +30,15 @@ def network_without_stats(topic: Topic) -> NetworkKind | None:
 
 def name_cell(topic: Topic) -> Cell:
     """Return the cell with the name, bold with a chip while the topic is new, struck through when gone."""
-    gone = topic.gone_s is not None
-    chip = pgettext("topic", "new") if topic.is_new and not gone else None
+    is_gone = topic.gone_s is not None
+    chip = pgettext("topic", "new") if topic.is_new and not is_gone else None
     return Cell(
-        topic.name, role=_text_role(topic, "text"), mono=True, bold=bool(chip), is_struck_out=gone, chip=chip
+        topic.name,
+        role=_text_role(topic, "text"),
+        mono=True,
+        bold=bool(chip),
+        is_struck_out=is_gone,
+        chip=chip,
     )
 
 
@@ -137,16 +142,18 @@ def _curve_tip(topic: Topic) -> str:
         if network_without_stats(topic) is not None:
             return _unreported_tip(topic)
         return _("No rate reported yet")
-    said = _("Recent rate: {least} to {most} /s")
-    return said.format(least=rate_text(min(topic.rates)), most=rate_text(max(topic.rates)))
+    template = _("Recent rate: {least} to {most} /s")
+    return template.format(least=rate_text(min(topic.rates)), most=rate_text(max(topic.rates)))
 
 
 def _displayed_tip(topic: Topic) -> str:
     # Shown only if messages were dropped before they reached the panels.
     if not (topic.dropped or topic.missed):
         return ""
-    shown, sent = topic.displayed_and_sent_counts
-    return _("{shown} of {sent} messages shown").format(shown=group_digits(shown), sent=group_digits(sent))
+    displayed, sent = topic.displayed_and_sent_counts
+    return _("{shown} of {sent} messages shown").format(
+        shown=group_digits(displayed), sent=group_digits(sent)
+    )
 
 
 def _network_tip(topic: Topic) -> str:
@@ -183,7 +190,7 @@ def _rate_tip(topic: Topic) -> str:
 
 
 def _loss_tip(topic: Topic) -> str:
-    shown, kind = _displayed_tip(topic), network_without_stats(topic)
+    displayed, kind = _displayed_tip(topic), network_without_stats(topic)
     if topic.lost is None and kind is not None:
         lost = _("{network} doesn't count lost messages").format(network=kind.product_name)
     elif topic.lost is None:
@@ -191,7 +198,7 @@ def _loss_tip(topic: Topic) -> str:
     else:
         lost = ngettext("{count} message lost", "{count} messages lost", topic.lost)
         lost = lost.format(count=group_digits(topic.lost))
-    return _("{lost}. {shown}").format(lost=lost, shown=shown) if shown else lost
+    return _("{lost}. {shown}").format(lost=lost, shown=displayed) if displayed else lost
 
 
 COLUMNS: tuple[Column[Topic], ...] = (
@@ -274,8 +281,8 @@ def _folder_name_cell(folder: TopicFolder) -> Cell:
 
 def _folder_type_cell(folder: TopicFolder) -> Cell:
     count = len(folder.topics)
-    words = ngettext("{count} topic", "{count} topics", count).format(count=group_digits(count))
-    return Cell(words, role="textTertiary")
+    text = ngettext("{count} topic", "{count} topics", count).format(count=group_digits(count))
+    return Cell(text, role="textTertiary")
 
 
 def _folder_loss_cell(folder: TopicFolder) -> Cell:
@@ -289,8 +296,8 @@ def _folder_loss_tip(folder: TopicFolder) -> str:
     lost = folder.stats.lost
     if lost is None:
         return _("No subscriber reports losses")
-    said = ngettext("{count} message lost in {folder}", "{count} messages lost in {folder}", lost)
-    return said.format(count=group_digits(lost), folder=folder.path)
+    template = ngettext("{count} message lost in {folder}", "{count} messages lost in {folder}", lost)
+    return template.format(count=group_digits(lost), folder=folder.path)
 
 
 def _sum_tip(folder: TopicFolder) -> str:
@@ -356,19 +363,19 @@ COMMON_COLUMNS = tuple(
 
 
 def columns(
-    own: Callable[[Topic], bool], several: Callable[[], bool], as_tree: Callable[[], bool]
+    is_own: Callable[[Topic], bool], several: Callable[[], bool], as_tree: Callable[[], bool]
 ) -> tuple[Column[TreeRow], ...]:
     """Return the columns of the table.
 
     Args:
-        own: Returns True for Studio's own topics, which are never shown as new.
+        is_own: Returns True for Studio's own topics, which are never shown as new.
         several: Returns True to show the network column.
         as_tree: Returns True if topics are shown below folders, with only the last part of their names.
     """
 
     def topic_name_cell(topic: Topic) -> Cell:
         cell = name_cell(topic)
-        if cell.chip and own(topic):
+        if cell.chip and is_own(topic):
             cell = replace(cell, bold=False, chip=None)
         if not as_tree():
             return cell
@@ -377,10 +384,10 @@ def columns(
 
     def folder_name_cell(folder: TopicFolder) -> Cell:
         cell = _folder_name_cell(folder)
-        fresh = not folder.is_open and any(
-            topic.is_new and topic.gone_s is None and not own(topic) for topic in folder.topics
+        has_new = not folder.is_open and any(
+            topic.is_new and topic.gone_s is None and not is_own(topic) for topic in folder.topics
         )
-        return replace(cell, chip=pgettext("topic", "new")) if fresh else cell
+        return replace(cell, chip=pgettext("topic", "new")) if has_new else cell
 
     first = _with_folders(
         replace(COLUMNS[0], cell=topic_name_cell), (folder_name_cell, *FOLDER_COLUMNS["topic"][1:])

@@ -81,7 +81,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
             self.theme, "list-tree", _("Group topics into folders by name"), checkable=True, size=26
         )
         self.as_tree.toggled.connect(lambda _on: self.rebuild())
-        self.count = ElidedLabel("small", "textSecondary", least=60)
+        self.count = ElidedLabel("small", "textSecondary", min_width=60)
         self.header.insert(0, self.count)
         self.header.append(self.as_tree)
         column = QVBoxLayout(self)
@@ -96,8 +96,8 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self._wanted = ""
 
     def make_model(self) -> TableModel[TreeRow]:
-        every = columns(self._is_own, self.has_other_networks, lambda: self._tree is not None)
-        return TableModel(every, lambda row: row.key)
+        table_columns = columns(self._is_own, self.has_other_networks, lambda: self._tree is not None)
+        return TableModel(table_columns, lambda row: row.key)
 
     def make_table(self, model: TableModel[TreeRow]) -> TableView[TreeRow]:
         self.topics_table = TopicsTable(self.theme, model, "topic")
@@ -114,10 +114,10 @@ class TopicsPanel(NetworkTable[TreeRow]):
 
     def refresh(self) -> None:
         self._ticks += 1
-        facts = self._snapshot()
+        state = self._snapshot()
         order = self.table.order.column
         lively = order is not None and order.name in CHANGING_COLUMNS
-        if facts != self._seen or (lively and self._ticks % SORT_TICKS == 0):
+        if state != self._seen or (lively and self._ticks % SORT_TICKS == 0):
             self.rebuild()
         if self._ticks % STATS_UPDATE_TICKS == 0 and self.model.rowCount():
             if self._tree is not None:
@@ -135,14 +135,14 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self._seen = self._snapshot()
         topics = [*self.session.topics, *self.session.networks.topics]
         self._ours = self.session.launcher.virtual_robots
-        words = self.filter_words()
-        fit = topic_filter(words)
-        rows = [topic for topic in topics if fit(topic.name, _haystack(topic))] if words else topics
-        self._show_rows(rows, filtered=bool(words))
+        keywords = self.filter_words()
+        fit = topic_filter(keywords)
+        rows = [topic for topic in topics if fit(topic.name, _haystack(topic))] if keywords else topics
+        self._show_rows(rows, filtered=bool(keywords))
         if self._wanted:
             self.show_topic(self._wanted)
-        self._update_counts(len(topics), len(rows) if words else None)
-        self.show_table(bool(rows), bool(words))
+        self._update_counts(len(topics), len(rows) if keywords else None)
+        self.show_table(bool(rows), bool(keywords))
         self.show_networks()
         recorded = self.session.replay is not None
         kinds = [network.kind for network in self.session.networks.selected_networks]
@@ -163,25 +163,25 @@ class TopicsPanel(NetworkTable[TreeRow]):
         if was_tree or self._tree is not None:
             self.table.refresh_visible()  # names of topics are formatted differently in a tree
 
-    def _update_counts(self, known: int, found: int | None) -> None:
+    def _update_counts(self, total: int, match_count: int | None) -> None:
         nodes = len(self.session.networks.nodes)
         if self.session.graph is not None:
             nodes += len(self.session.graph.nodes)
-        if found is None:
-            words = ngettext("{count} topic", "{count} topics", known)
+        if match_count is None:
+            text = ngettext("{count} topic", "{count} topics", total)
         else:
-            words = ngettext("{found} of {count} topic", "{found} of {count} topics", known)
-        words = words.format(count=group_digits(known), found=found)
+            text = ngettext("{found} of {count} topic", "{found} of {count} topics", total)
+        text = text.format(count=group_digits(total), found=match_count)
         if nodes:
-            there = ngettext("{count} node", "{count} nodes", nodes).format(count=group_digits(nodes))
-            words = _("{topics}, {nodes}").format(topics=words, nodes=there)
-        self.count.setText(words if known else "")
-        self.filter.setVisible(known > 0)
+            node_text = ngettext("{count} node", "{count} nodes", nodes).format(count=group_digits(nodes))
+            text = _("{topics}, {nodes}").format(topics=text, nodes=node_text)
+        self.count.setText(text if total else "")
+        self.filter.setVisible(total > 0)
 
     def update_empty_state(self) -> None:
         if self.session.master.kind == "searching":
-            said = _("Address: {address}").format(address=self.session.master.address)
-            self.empty.set_texts(_("Searching for a master"), said, "radio-tower")
+            text = _("Address: {address}").format(address=self.session.master.address)
+            self.empty.set_texts(_("Searching for a master"), text, "radio-tower")
             self.empty.set_actions([])
         else:
             self.empty.set_texts(
@@ -192,8 +192,8 @@ class TopicsPanel(NetworkTable[TreeRow]):
             )
 
     def missing_topic(self) -> str:
-        words = self.filter.text().strip()
-        return words if words.startswith("/") and len(words.split()) == 1 else ""
+        filter_text = self.filter.text().strip()
+        return filter_text if filter_text.startswith("/") and len(filter_text.split()) == 1 else ""
 
     def _start_virtual_robot(self) -> None:
         self.context.run("robots.virtual")
@@ -264,8 +264,8 @@ class TopicsPanel(NetworkTable[TreeRow]):
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         closed = state.get("closed")
-        known = closed if isinstance(closed, list) else []
-        self._closed = {key for key in known[:MAX_COLLAPSED_FOLDERS] if isinstance(key, str)}
+        keys = closed if isinstance(closed, list) else []
+        self._closed = {key for key in keys[:MAX_COLLAPSED_FOLDERS] if isinstance(key, str)}
         self.as_tree.setChecked(state.get("tree") is True)
         super().restore_state(state)
 
@@ -279,8 +279,8 @@ def _footer_text(kinds: Sequence[NetworkKind]) -> str:
 
 
 def _haystack(topic: Topic) -> str:
-    words = (network_label(topic.network), topic.name, topic.msg_type, *topic.publisher_nodes)
-    return " ".join(words)
+    parts = (network_label(topic.network), topic.name, topic.msg_type, *topic.publisher_nodes)
+    return " ".join(parts)
 
 
 PANEL = Panel("topics", TABLE_TEXTS.title, "list", (), TopicsPanel)

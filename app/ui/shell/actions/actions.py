@@ -35,18 +35,18 @@ class Actions:
         window: Window in which the shortcuts work.
         theme: Theme that provides the icons.
         commands: Commands in the order of the menus.
-        do: Object that is passed to `run` and `disabled_reason` of each command.
+        handlers: Object that is passed to `run` and `disabled_reason` of each command.
     """
 
-    def __init__(self, window: QWidget, theme: Theme, commands: Sequence[Command[T]], do: T) -> None:
+    def __init__(self, window: QWidget, theme: Theme, commands: Sequence[Command[T]], handlers: T) -> None:
         self._theme, self._commands = theme, commands
         self._groups: dict[str, QActionGroup] = {}
         self._actions: dict[str, QAction] = {}
         self._why_not: dict[str, Callable[[], str]] = {}
         for command in commands:
             action = self._actions[command.id] = self._make(command, window)
-            action.triggered.connect(lambda _on=False, run=command.run: run(do))
-            self._why_not[command.id] = partial(command.disabled_reason, do)
+            action.triggered.connect(lambda _on=False, run=command.run: run(handlers))
+            self._why_not[command.id] = partial(command.disabled_reason, handlers)
 
     def _make(self, command: Command[Any], window: QWidget) -> QAction:
         action = QAction("\t".join(filter(None, (command.label, command.displayed_key))), window)
@@ -142,19 +142,21 @@ class Actions:
             The menus by name; names of submenus contain a slash, such as "View/Look".
         """
         titles = with_mnemonics([_(name) for name in menus])
-        made = {name: Menu(self._theme, bar, title) for name, title in zip(menus, titles, strict=True)}
-        for menu in made.values():
+        menus_by_path = {
+            name: Menu(self._theme, bar, title) for name, title in zip(menus, titles, strict=True)
+        }
+        for menu in menus_by_path.values():
             bar.addMenu(menu)
         for command in self._commands:
             if not command.menu:
                 continue
-            place = command.menu
+            path = command.menu
             if command.submenu:
-                place = f"{command.menu}/{command.submenu}"
-                if place not in made:
-                    made[place] = Menu(self._theme, made[command.menu], _(command.submenu))
-                    made[command.menu].addMenu(made[place])
+                path = f"{command.menu}/{command.submenu}"
+                if path not in menus_by_path:
+                    menus_by_path[path] = Menu(self._theme, menus_by_path[command.menu], _(command.submenu))
+                    menus_by_path[command.menu].addMenu(menus_by_path[path])
             if command.separator_above:
-                made[place].addSeparator()
-            made[place].addAction(self._actions[command.id])
-        return made
+                menus_by_path[path].addSeparator()
+            menus_by_path[path].addAction(self._actions[command.id])
+        return menus_by_path

@@ -147,13 +147,13 @@ class Shortcuts(QObject):
         self._own = self._read()
 
     def _read(self) -> dict[str, tuple[str, ...]]:
-        kept: dict[str, object] = self._settings.get("shortcuts", {})
-        found: dict[str, tuple[str, ...]] = {}
-        for name, keys in kept.items():
+        saved: dict[str, object] = self._settings.get("shortcuts", {})
+        shortcuts: dict[str, tuple[str, ...]] = {}
+        for name, keys in saved.items():
             if name in self.commands and isinstance(keys, list):
-                good = tuple(normal(key) for key in keys if isinstance(key, str) and normal(key))
-                found[name] = good
-        return found
+                valid_keys = tuple(normal(key) for key in keys if isinstance(key, str) and normal(key))
+                shortcuts[name] = valid_keys
+        return shortcuts
 
     def default_keys(self, name: str) -> tuple[str, ...]:
         """Return the default shortcuts of a command.
@@ -170,8 +170,10 @@ class Shortcuts(QObject):
         """Return the current shortcuts of a command; menus show the first one."""
         keys = self._own.get(name, self.default_keys(name))
         if name == STOP_COMMAND:
-            given = {key for other, own in self._own.items() if other != STOP_COMMAND for key in own}
-            return (STOP_KEY, *(key for key in keys if key != STOP_KEY and key not in given))
+            assigned = {
+                key for other, other_keys in self._own.items() if other != STOP_COMMAND for key in other_keys
+            }
+            return (STOP_KEY, *(key for key in keys if key != STOP_KEY and key not in assigned))
         return tuple(key for key in keys if key != STOP_KEY)
 
     def first(self, name: str) -> str:
@@ -191,12 +193,14 @@ class Shortcuts(QObject):
         key = format_key(pressed)
         if key == STOP_KEY:
             return "" if name == STOP_COMMAND else _("F12 always triggers Stop and can't be changed.")
-        held = pressed.keyboardModifiers() & MODIFIERS
-        if not held and pressed.key() not in FUNCTION_KEYS:
+        modifiers = pressed.keyboardModifiers() & MODIFIERS
+        if not modifiers and pressed.key() not in FUNCTION_KEYS:
             return _(MODIFIER_REQUIRED_TEXT)
         for fixed in FIXED_KEYS:
-            own = key in self.default_keys(name)  # Ctrl+F is "find" both in the Inspector and in the blocks
-            if key in [normal(each) for each in fixed.key.split(", ")] and held and not own:
+            is_own_default = key in self.default_keys(
+                name
+            )  # Ctrl+F is "find" both in the Inspector and in the blocks
+            if key in [normal(each) for each in fixed.key.split(", ")] and modifiers and not is_own_default:
                 return _("{key} is reserved for “{command}” ({place}).").format(
                     key=shortcut_text(key), command=_(fixed.label), place=_(fixed.scope)
                 )
@@ -211,18 +215,18 @@ class Shortcuts(QObject):
             name: Name of the command.
             key: New shortcut; "" removes all.
         """
-        key, holder = normal(key), self.command_for(key)
-        if holder and holder != name:
-            self._own[holder] = tuple(each for each in self.keys_of(holder) if each != key)
+        key, owner = normal(key), self.command_for(key)
+        if owner and owner != name:
+            self._own[owner] = tuple(each for each in self.keys_of(owner) if each != key)
         self._own[name] = (key,) if key else ()
         self._save()
 
     def swap(self, name: str, key: str) -> None:
         """Assign a shortcut to a command, and the command's first shortcut to the one that had it."""
-        holder, before = self.command_for(key), self.first(name)
+        owner, before = self.command_for(key), self.first(name)
         self._own[name] = (normal(key),)
-        if holder and holder != name:
-            self._own[holder] = (before,) if before and before != STOP_KEY else ()
+        if owner and owner != name:
+            self._own[owner] = (before,) if before and before != STOP_KEY else ()
         self._save()
 
     def reset(self, name: str) -> None:
@@ -258,8 +262,8 @@ class Shortcuts(QObject):
         for widget in QApplication.allWidgets():
             command = widget.property("command")
             if isinstance(command, str):
-                said = _(self.commands[command].tip)
+                text = _(self.commands[command].tip)
                 # the tooltip is the only text of an icon button
-                if not said or isinstance(widget, IconButton):
-                    said = widget.accessibleName()
-                widget.setToolTip(plain.tip(tip_with_key(said, ", ".join(self.keys_of(command)))))
+                if not text or isinstance(widget, IconButton):
+                    text = widget.accessibleName()
+                widget.setToolTip(plain.tip(tip_with_key(text, ", ".join(self.keys_of(command)))))

@@ -107,22 +107,24 @@ class AppBar(QWidget):
 
     def _fit(self) -> None:
         # Shrinks in this order if the menus lack room: texts of the switch, the chip, the key of the field.
-        for bare in range(4):
-            self.switch.set_icon_only(bare > 0)
-            self.chip.set_icon_only(bare > 1)
-            self.search.set_icon_only(bare > 2)
+        for level in range(4):
+            self.switch.set_icon_only(level > 0)
+            self.chip.set_icon_only(level > 1)
+            self.search.set_icon_only(level > 2)
             if self._needed_width() <= self.width():
                 break
-        taken = 0 if self.switch.isHidden() else self.switch.sizeHint().width() + EDGE_MARGIN
-        half = (self.width() - 2 * EDGE_MARGIN - taken - EDGE_MARGIN) / 2
+        switch_width = 0 if self.switch.isHidden() else self.switch.sizeHint().width() + EDGE_MARGIN
+        half = (self.width() - 2 * EDGE_MARGIN - switch_width - EDGE_MARGIN) / 2
         self._grid.setColumnStretch(2, int(self._halves[1].sizeHint().width() <= half))
 
     def _needed_width(self) -> int:
         parts = [
             part for half in self._halves for part in half.findChildren(QWidget, options=DIRECT_CHILDREN)
         ]
-        wide = sum(self._min_width(part) + GAP for part in (self.switch, *parts) if not part.isHidden())
-        return wide + 2 * EDGE_MARGIN
+        content_width = sum(
+            self._min_width(part) + GAP for part in (self.switch, *parts) if not part.isHidden()
+        )
+        return content_width + 2 * EDGE_MARGIN
 
     def _min_width(self, part: QWidget) -> int:
         if part is self.menus:
@@ -181,10 +183,10 @@ class PaletteField(PaintedButton):
         self._bare = False
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
-    def set_icon_only(self, bare: bool) -> None:
-        """Hide the shortcut if `bare`, so that the button can be narrower."""
-        if bare != self._bare:
-            self._bare = bare
+    def set_icon_only(self, icon_only: bool) -> None:
+        """Hide the shortcut if `icon_only`, so that the button can be narrower."""
+        if icon_only != self._bare:
+            self._bare = icon_only
             self.updateGeometry()
             self.update()
 
@@ -202,29 +204,31 @@ class PaletteField(PaintedButton):
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("body")
-        wide = LEFT + self._icon_side() + GAP + paint.width_of(font, self.text()) + 16 + self._key_cap_width()
-        high = max(FIELD_HEIGHT, round(paint.height_of(font)) + 8)
-        return QSize(max(FIELD_WIDTH, round(wide)), high)
+        width = (
+            LEFT + self._icon_side() + GAP + paint.width_of(font, self.text()) + 16 + self._key_cap_width()
+        )
+        height = max(FIELD_HEIGHT, round(paint.height_of(font)) + 8)
+        return QSize(max(FIELD_WIDTH, round(width)), height)
 
     def minimumSizeHint(self) -> QSize:
-        least = LEFT + self._icon_side() + GAP + (self._key_cap_width() or LEFT)
-        return QSize(round(least), self.sizeHint().height())
+        min_width = LEFT + self._icon_side() + GAP + (self._key_cap_width() or LEFT)
+        return QSize(round(min_width), self.sizeHint().height())
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme, middle = self._theme, rect.height() / 2
         fill = theme.colour("hover" if self.is_highlighted else "panel")
         paint.box(painter, rect, theme.radius("control"), fill, theme.colour("borderStrong"))
         side = self._icon_side()
-        square = QRectF(LEFT, middle - side / 2, side, side)
-        paint_icon(painter, square, "search", theme.colour("textSecondary"))
+        icon_area = QRectF(LEFT, middle - side / 2, side, side)
+        paint_icon(painter, icon_area, "search", theme.colour("textSecondary"))
         font = theme.font("body")
         left = LEFT + side + GAP
         room = rect.width() - left - self._key_cap_width() - 4
         if room >= self._theme.scaled(MIN_TEXT_WIDTH):
             area = QRectF(left, 0, room, rect.height())
-            whole = paint.width_of(font, self.text()) <= room
+            is_full_text = paint.width_of(font, self.text()) <= room
             paint.text_line(
-                painter, area, self.text() if whole else _("Find"), font, theme.colour("textSecondary")
+                painter, area, self.text() if is_full_text else _("Find"), font, theme.colour("textSecondary")
             )
         if self._key and not self._bare:
             paint.key_cap(painter, theme, rect.right() - 6, middle, self._key)
@@ -239,25 +243,25 @@ def robots_chip(session: Session) -> tuple[str, str]:
     moving = [link for link in links if link.state == "not stopped"]
     if moving:
         first, others = moving[0], len(moving) - 1
-        words = _("{robot}: {state}")
+        text = _("{robot}: {state}")
         if others:
-            words = ngettext("{robot} and {count} more: {state}", "{robot} and {count} more: {state}", others)
-        return words.format(robot=first.name, count=others, state=first.state_label), "error"
+            text = ngettext("{robot} and {count} more: {state}", "{robot} and {count} more: {state}", others)
+        return text.format(robot=first.name, count=others, state=first.state_label), "error"
     stopping = [link for link in links if link.state == "stopping"]
     if stopping:
         if len(stopping) == 1:
             return _("{robot} stopping").format(robot=stopping[0].name), "running"
-        words = ngettext("{count} robot stopping", "{count} robots stopping", len(stopping))
-        return words.format(count=len(stopping)), "running"
+        text = ngettext("{count} robot stopping", "{count} robots stopping", len(stopping))
+        return text.format(count=len(stopping)), "running"
     silent = [link for link in links if link.state == "silent"]
     if silent:
-        words = silent[0].silence_reason or _("not responding")
+        text = silent[0].silence_reason or _("not responding")
         if len(silent) > 1:
-            words = ngettext("{count} robot not responding", "{count} robots not responding", len(silent))
-            return words.format(count=len(silent)), "error"
+            text = ngettext("{count} robot not responding", "{count} robots not responding", len(silent))
+            return text.format(count=len(silent)), "error"
         if len(links) > 1:
-            return _("{robot}: {state}").format(robot=silent[0].name, state=words), "error"
-        return words[:1].upper() + words[1:], "error"
+            return _("{robot}: {state}").format(robot=silent[0].name, state=text), "error"
+        return text[:1].upper() + text[1:], "error"
     status = "off" if any(link.state == CONNECTING for link in links) else "ok"
     if len(links) > 1:
         return ngettext("{count} robot", "{count} robots", len(links)).format(count=len(links)), status

@@ -93,15 +93,15 @@ class BannerText(QWidget):
         painter = QPainter(self)
         # the largest font in which the full text fits, else the smallest one
         kind = next((each for each in TEXT_KINDS if self.lines(each)[1]), TEXT_KINDS[-1])
-        lines, high = self.lines(kind)[0], paint.height_of(self._theme.font(kind))
-        top = (self.height() - high * len(lines)) / 2
+        lines, line_height = self.lines(kind)[0], paint.height_of(self._theme.font(kind))
+        top = (self.height() - line_height * len(lines)) / 2
         for line in lines:
-            left = 0.0
+            x = 0.0
             for text, font, role in line:
-                area = QRectF(left, top, self.width() - left, high)
+                area = QRectF(x, top, self.width() - x, line_height)
                 paint.text_line(painter, area, text, font, self._theme.colour(role))
-                left += paint.width_of(font, text + " ")
-            top += high
+                x += paint.width_of(font, text + " ")
+            top += line_height
         painter.end()
 
     def lines(self, kind: str) -> tuple[list[list[tuple[str, QFont, str]]], bool]:
@@ -118,27 +118,27 @@ class BannerText(QWidget):
         bold.setWeight(QFont.Weight.DemiBold)
         rows = max(1, int(self.height() / paint.height_of(plain_font)))
         lines: list[list[tuple[str, QFont, str]]] = [[]]
-        left = 0.0
-        for sentence, font, role in (
+        x = 0.0
+        for text, font, role in (
             (self._title, bold, "text"),
             (self._detail, plain_font, "textSecondary"),
         ):
-            rest = sentence.split()
+            rest = text.split()
             while rest:
-                fitting = _fitting_word_count(font, rest, self.width() - left)
-                if fitting < len(rest) and len(lines) == rows:
+                fitting_count = _fitting_word_count(font, rest, self.width() - x)
+                if fitting_count < len(rest) and len(lines) == rows:
                     lines[-1].append((" ".join(rest), font, role))
                     return lines, False
-                if not fitting and not lines[-1]:
-                    fitting = 1
-                if fitting:
-                    piece = " ".join(rest[:fitting])
+                if not fitting_count and not lines[-1]:
+                    fitting_count = 1
+                if fitting_count:
+                    piece = " ".join(rest[:fitting_count])
                     lines[-1].append((piece, font, role))
-                    left += paint.width_of(font, piece + " ")
-                    del rest[:fitting]
+                    x += paint.width_of(font, piece + " ")
+                    del rest[:fitting_count]
                 if rest:
                     lines.append([])
-                    left = 0.0
+                    x = 0.0
         return lines, True
 
 
@@ -206,16 +206,16 @@ class Banner(AlertBox):
         self._icon = self.button.icon_name = icon
         self.set_status(status)
         self.words.show_text(title, detail)
-        spoken = f"{title} {detail}".strip()
-        self.setAccessibleName(spoken)
-        news = DIGITS.sub("", spoken)
-        if news != self._announced:  # changes of numbers alone aren't announced again
-            self._announced = news
-            paint.announce(self, spoken)
+        message = f"{title} {detail}".strip()
+        self.setAccessibleName(message)
+        text_without_digits = DIGITS.sub("", message)
+        if text_without_digits != self._announced:  # changes of numbers alone aren't announced again
+            self._announced = text_without_digits
+            paint.announce(self, message)
         self._step, self._others = button or "", others
         self.second.set_label(second or "")
-        for widget, shown in ((self.button, button), (self.second, second), (self.more, others)):
-            paint.show_when(widget, bool(shown))
+        for widget, label in ((self.button, button), (self.second, second), (self.more, others)):
+            paint.show_when(widget, bool(label))
         self._fit()
 
     def leaveEvent(self, event: QEvent) -> None:
@@ -228,14 +228,14 @@ class Banner(AlertBox):
         for button in (self.button, self.second):
             button.set_size(size)
         count = ngettext("and {count} more", "and {count} more", self._others).format(count=self._others)
-        wanted = (
+        widths = (
             self.more.width_with(count),
             self.button.width_with(self._step),
             self.second.sizeHint().width(),
         )
-        beside = zip((self.more, self.button, self.second), wanted, strict=True)
-        taken = sum(width + self.gap for button, width in beside if not button.isHidden())
-        room = self.width() - self.left - self.close_button.sizeHint().width() - self.gap - taken
+        button_widths = zip((self.more, self.button, self.second), widths, strict=True)
+        buttons_width = sum(width + self.gap for button, width in button_widths if not button.isHidden())
+        room = self.width() - self.left - self.close_button.sizeHint().width() - self.gap - buttons_width
         is_narrow = room < scaled(MIN_TEXT_WIDTH)
         self.more.set_label(f"+{self._others}" if is_narrow else count, name=count)
         self.button.icon_name = NARROW_BUTTON_ICON if is_narrow and self._icon is None else self._icon
@@ -340,18 +340,18 @@ class AlertBanner(QWidget):
     def _alert_to_show(self, alerts: Sequence[AlertLike]) -> AlertLike | None:
         # Keeps the current alert while the mouse is over the banner, so that the button under it doesn't
         # change.
-        shown = self._alert
-        if shown is not None and self.banner.underMouse():
-            still = next((alert for alert in alerts if alert.id == shown.id), None)
-            if still is not None:
-                return still
+        current = self._alert
+        if current is not None and self.banner.underMouse():
+            updated = next((alert for alert in alerts if alert.id == current.id), None)
+            if updated is not None:
+                return updated
         return alerts[0] if alerts else None
 
     def _answer(self, which: int) -> None:
         if self._offer is not None:
-            answer = self._offer[which]
+            action = self._offer[which]
             self._offer = None
-            answer()
+            action()
             self.show_alerts(self._alerts)
 
     def _next_step(self) -> None:
@@ -387,8 +387,8 @@ class AlertBanner(QWidget):
             self.setGeometry(area)
             self.raise_()
             self._fresh_until = self.clock() + CLICK_GUARD_S if self._is_under_mouse() else 0.0
-        fresh = self.clock() < self._fresh_until
-        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents, fresh)
+        is_guarded = self.clock() < self._fresh_until
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents, is_guarded)
 
     def _is_under_mouse(self) -> bool:
         return self.rect().contains(self.mapFromGlobal(self.mouse_at()))

@@ -26,11 +26,11 @@ _WRAP_FLAGS = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignLeft | Qt.Ali
 class ChoiceButton(PaintedButton):
     """Button for one choice, with its number key and wrapped text."""
 
-    def __init__(self, theme: Theme, words: str, key: str) -> None:
+    def __init__(self, theme: Theme, text: str, key: str) -> None:
         # `key` is "" for choices beyond the number keys.
-        super().__init__(theme, words, radius="large")
+        super().__init__(theme, text, radius="large")
         self.key = key
-        self._shown = plain.make_breakable(words)
+        self._shown = plain.make_breakable(text)
         self.setProperty("ownFocus", True)
 
     def _font(self) -> QFont:
@@ -50,8 +50,8 @@ class ChoiceButton(PaintedButton):
         return max(round(self._theme.scaled(MIN_HEIGHT)), math.ceil(needed) + 2 * PADDING)
 
     def sizeHint(self) -> QSize:
-        wide = self.one_line_width()
-        return QSize(wide, self.height_for(wide))
+        width = self.one_line_width()
+        return QSize(width, self.height_for(width))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Handle Enter and Space, and pass all other keys on to `ChoiceGrid`.
@@ -65,13 +65,13 @@ class ChoiceButton(PaintedButton):
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme, role = self._theme, self._theme.colour
-        chosen = self.hasFocus()
+        is_focused = self.hasFocus()
         fill = "pressed" if self.isDown() else "hover" if self.is_hovered else None
-        edge = "accent" if chosen else "borderStrong" if self.isEnabled() else "border"
+        edge = "accent" if is_focused else "borderStrong" if self.isEnabled() else "border"
         if fill is None and self.isEnabled():
-            fill = "accentTint" if chosen else "panel"
+            fill = "accentTint" if is_focused else "panel"
         radius = theme.radius("large")
-        paint.box(painter, rect, radius, role(fill) if fill else None, role(edge), 2 if chosen else 1)
+        paint.box(painter, rect, radius, role(fill) if fill else None, role(edge), 2 if is_focused else 1)
         if self.key:
             right = PADDING + paint.key_width(theme, self.key)
             paint.key_cap(painter, theme, right, rect.center().y(), self.key)
@@ -105,9 +105,9 @@ class ChoiceGrid(QWidget):
             button.hide()
             button.deleteLater()
         self.buttons = []
-        for number, words in enumerate(choices, 1):
-            button = ChoiceButton(self._theme, words, str(number) if number <= NUMBER_KEY_COUNT else "")
-            button.clicked.connect(lambda _on=False, words=words: self.selected.emit(words))
+        for number, choice in enumerate(choices, 1):
+            button = ChoiceButton(self._theme, choice, str(number) if number <= NUMBER_KEY_COUNT else "")
+            button.clicked.connect(lambda _on=False, words=choice: self.selected.emit(words))
             button.setParent(self)
             button.show()
             self.buttons.append(button)
@@ -119,16 +119,16 @@ class ChoiceGrid(QWidget):
         if self.buttons:
             self.buttons[0].setFocus(Qt.FocusReason.PopupFocusReason)
 
-    def set_paused(self, *, held: bool) -> None:
-        """Disable all choices if `held`, else enable them."""
+    def set_paused(self, *, paused: bool) -> None:
+        """Disable all choices if `paused`, else enable them."""
         for button in self.buttons:
-            button.setEnabled(not held)
+            button.setEnabled(not paused)
 
     def columns(self, width: int) -> int:
         """Return the number of columns that fit into a width in px."""
         widest = max((each.one_line_width() for each in self.buttons), default=1)
-        fitting = (width - GAP) // (widest + GAP)
-        return max(1, min(MAX_COLUMNS, len(self.buttons), fitting))
+        fitting_columns = (width - GAP) // (widest + GAP)
+        return max(1, min(MAX_COLUMNS, len(self.buttons), fitting_columns))
 
     def button_rects(self, width: int) -> list[QRect]:
         """Return the rectangles of the buttons for a width in px.
@@ -136,26 +136,29 @@ class ChoiceGrid(QWidget):
         Buttons of the same row have equal heights.
         """
         columns = self.columns(width)
-        wide = (width - GAP) // columns - GAP
-        found: list[QRect] = []
+        button_width = (width - GAP) // columns - GAP
+        rects: list[QRect] = []
         top = 0
         for first in range(0, len(self.buttons), columns):
             row = self.buttons[first : first + columns]
-            high = max(each.height_for(wide) for each in row)
-            found += [QRect(place * (wide + GAP), top, wide, high) for place in range(len(row))]
-            top += high + GAP
-        return found
+            row_height = max(each.height_for(button_width) for each in row)
+            rects += [
+                QRect(column * (button_width + GAP), top, button_width, row_height)
+                for column in range(len(row))
+            ]
+            top += row_height + GAP
+        return rects
 
     def heightForWidth(self, width: int) -> int:
-        places = self.button_rects(width)
-        return places[-1].bottom() + 1 if places else 0
+        rects = self.button_rects(width)
+        return rects[-1].bottom() + 1 if rects else 0
 
     def hasHeightForWidth(self) -> bool:
         return True
 
     def sizeHint(self) -> QSize:
-        wide = max(1, self.width())
-        return QSize(wide, self.heightForWidth(wide))
+        width = max(1, self.width())
+        return QSize(width, self.heightForWidth(width))
 
     def minimumSizeHint(self) -> QSize:
         return QSize(60, 0)
@@ -165,8 +168,8 @@ class ChoiceGrid(QWidget):
         self._arrange()
 
     def _arrange(self) -> None:
-        for button, place in zip(self.buttons, self.button_rects(max(60, self.width())), strict=True):
-            button.setGeometry(place)
+        for button, rect in zip(self.buttons, self.button_rects(max(60, self.width())), strict=True):
+            button.setGeometry(rect)
 
     def handle_key(self, event: QKeyEvent) -> bool:
         """Move the focus on an arrow key, or activate a choice on a number key; return True if handled."""
@@ -184,10 +187,10 @@ class ChoiceGrid(QWidget):
         }  # fmt: skip
         if key not in steps:
             return False
-        here = next((place for place, each in enumerate(self.buttons) if each.hasFocus()), 0)
-        there = min(max(here + steps[Qt.Key(key)], 0), len(self.buttons) - 1)
-        self.buttons[there].setFocus(Qt.FocusReason.OtherFocusReason)
-        self.focus_moved.emit(self.buttons[there])
+        current = next((index for index, each in enumerate(self.buttons) if each.hasFocus()), 0)
+        target = min(max(current + steps[Qt.Key(key)], 0), len(self.buttons) - 1)
+        self.buttons[target].setFocus(Qt.FocusReason.OtherFocusReason)
+        self.focus_moved.emit(self.buttons[target])
         return True
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -42,10 +42,10 @@ class RecordButton(Button):
         self.icon_role = "error"
         self._is_on = self._is_bare = False
 
-    def set_icon_only(self, bare: bool) -> None:
-        """Show only the icon if `bare`, else the icon and the text."""
-        if bare != self._is_bare:
-            self._is_bare = bare
+    def set_icon_only(self, icon_only: bool) -> None:
+        """Show only the icon if `icon_only`, else the icon and the text."""
+        if icon_only != self._is_bare:
+            self._is_bare = icon_only
             self.updateGeometry()
             self.update()
 
@@ -60,15 +60,17 @@ class RecordButton(Button):
             return
         length = length_text(recordings.elapsed_s)
         size = size_text(recordings.client.state.size_bytes)
-        words = _("{length}, {size}").format(length=length, size=size)
-        if words != self.text():
-            self.set_label(words)
+        text = _("{length}, {size}").format(length=length, size=size)
+        if text != self.text():
+            self.set_label(text)
             self.setAccessibleName(_("Recording"))
 
     def sizeHint(self) -> QSize:
-        high = super().sizeHint().height()
-        bare = self.icon_side() + 2 * self.measure.padding
-        return QSize(bare if self._is_bare else round(self._theme.scaled(RECORD_BUTTON_WIDTH_PX)), high)
+        height = super().sizeHint().height()
+        icon_width = self.icon_side() + 2 * self.measure.padding
+        return QSize(
+            icon_width if self._is_bare else round(self._theme.scaled(RECORD_BUTTON_WIDTH_PX)), height
+        )
 
     def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
         colour = self._theme.colour
@@ -109,8 +111,8 @@ class SourceSwitch(MenuButton):
         if replay is None:
             self.set_label(_("Live network"), LIVE_ICON)
             return
-        there = replay.opened is not None
-        length = duration_text(replay.end_ns - replay.start_ns, digits=0) if there else ""
+        is_loaded = replay.opened is not None
+        length = duration_text(replay.end_ns - replay.start_ns, digits=0) if is_loaded else ""
         self.set_label(f"{replay.name}  {length}".strip(), RECORDING_ICON)
 
     def _open_menu(self) -> None:
@@ -149,13 +151,13 @@ class DeveloperTools(QObject):
         self.panels.clicked.connect(lambda: menus.open_panel_menu(self.panels))
         self._wide_only = (Separator(theme, upright=True, length=24), self.layout, self.panels)
         tools = (self.record, self.keep, self.freeze, *self._wide_only)
-        for place, tool in enumerate(tools):
-            bar.add_tool(tool, place)
+        for index, tool in enumerate(tools):
+            bar.add_tool(tool, index)
         for button in (self.record, self.keep, self.freeze, self.layout, self.panels):
             button.allow_shrinking()
         self.source = SourceSwitch(theme, commands.session, self._actions)
-        for place, tool in enumerate((self.source, self.source.back), tools.index(self.freeze) + 1):
-            bar.add_tool(tool, place)
+        for index, tool in enumerate((self.source, self.source.back), tools.index(self.freeze) + 1):
+            bar.add_tool(tool, index)
         bar.installEventFilter(self)
         theme.changed.connect(self._fit)
 
@@ -171,8 +173,8 @@ class DeveloperTools(QObject):
         self.freeze.setEnabled(bool(freeze_buttons(shell.bench)))
         self.record.show_recording(self._recordings)
         self.keep.set_label(_("Save last {count} s").format(count=self._recordings.wish.seconds))
-        own = shell.saved_layouts.custom_name("developer")
-        name = own or _("Developer")
+        custom_name = shell.saved_layouts.custom_name("developer")
+        name = custom_name or _("Developer")
         self.layout.set_label(name)
         self.layout.setAccessibleName(_("Layout {name}").format(name=name))
 

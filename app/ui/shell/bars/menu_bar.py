@@ -52,33 +52,35 @@ class MenuBar(QMenuBar):
             window.removeEventFilter(self._alt)
             window.installEventFilter(self._alt)
 
-    def _show_mnemonics(self, shown: bool) -> None:
-        if shown != self._shows_letters:
-            self._shows_letters = shown
+    def _show_mnemonics(self, visible: bool) -> None:
+        if visible != self._shows_letters:
+            self._shows_letters = visible
             self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         for action in self.actions():
-            place = self.actionGeometry(action)
-            if action.isVisible() and not place.isEmpty():
-                self._paint_entry(painter, QRectF(place), action)
+            rect = self.actionGeometry(action)
+            if action.isVisible() and not rect.isEmpty():
+                self._paint_entry(painter, QRectF(rect), action)
         painter.end()
 
-    def _paint_entry(self, painter: QPainter, place: QRectF, action: QAction) -> None:
-        theme, font, said = self._theme, self.font(), strip_mnemonic(action.text())
-        chosen, menu = action is self.activeAction(), action.menu()
-        if chosen:
+    def _paint_entry(self, painter: QPainter, rect: QRectF, action: QAction) -> None:
+        theme, font, text = self._theme, self.font(), strip_mnemonic(action.text())
+        is_active, menu = action is self.activeAction(), action.menu()
+        if is_active:
             is_open = isinstance(menu, QWidget) and menu.isVisible()
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            paint.box(painter, place, theme.radius("small"), theme.colour("pressed" if is_open else "hover"))
-        ink = theme.colour("text" if chosen else "textSecondary")
-        wide, metrics = paint.width_of(font, said), QFontMetricsF(font)
-        left = place.center().x() - wide / 2
-        paint.text_line(painter, QRectF(left, place.top(), wide + 1, place.height()), said, font, ink)
+            paint.box(painter, rect, theme.radius("small"), theme.colour("pressed" if is_open else "hover"))
+        colour = theme.colour("text" if is_active else "textSecondary")
+        text_width, metrics = paint.width_of(font, text), QFontMetricsF(font)
+        text_left = rect.center().x() - text_width / 2
+        paint.text_line(
+            painter, QRectF(text_left, rect.top(), text_width + 1, rect.height()), text, font, colour
+        )
         letter = action.text().find("&")
         if letter >= 0 and (self._shows_letters or self.hasFocus()):
-            start = left + paint.width_of(font, said[:letter])
-            line = QRectF(start, 0, paint.width_of(font, said[letter]), 1)
-            line.moveTop(round(place.center().y() + metrics.ascent() / 2 + 1))
-            painter.fillRect(line, ink)
+            start = text_left + paint.width_of(font, text[:letter])
+            line = QRectF(start, 0, paint.width_of(font, text[letter]), 1)
+            line.moveTop(round(rect.center().y() + metrics.ascent() / 2 + 1))
+            painter.fillRect(line, colour)

@@ -76,12 +76,12 @@ class QuestionCard(FloatingCard):
         shadow.setColor(theme.colour("shadow"))
         self.setGraphicsEffect(shadow)
 
-    def show_question(self, question: AskedQuestion | None, *, held: bool) -> None:
+    def show_question(self, question: AskedQuestion | None, *, paused: bool) -> None:
         """Show a question, or hide the card; called on every tick.
 
         Args:
             question: Question, or None to hide the card.
-            held: True to disable the card while the behaviour is paused.
+            paused: True to disable the card while the behaviour is paused.
         """
         if question != self._question:
             self._question = question
@@ -89,30 +89,30 @@ class QuestionCard(FloatingCard):
                 self._close()
             else:
                 self._open(question)
-        if question is not None and held != self._held:
-            self._set_paused(held=held)
+        if question is not None and paused != self._held:
+            self._set_paused(paused=paused)
 
     def _open(self, question: AskedQuestion) -> None:
-        words = question.text.strip() or _("The behaviour has a question")
-        self.words.setText(words)
-        self.setAccessibleName(words)
-        self.field.setAccessibleName(words)
+        text = question.text.strip() or _("The behaviour has a question")
+        self.words.setText(text)
+        self.setAccessibleName(text)
+        self.field.setAccessibleName(text)
         self.field.clear()
         self.choices.show_choices(question.choices)
         self._offered.updateGeometry()  # a hidden card isn't notified of changed size hints
-        self.choices.setAccessibleName(words)
+        self.choices.setAccessibleName(text)
         typed = not question.choices
         self.field.setVisible(typed)
         self.button.setVisible(typed)
         self._offered.setVisible(not typed)
         if not self.isVisible():
             self._before = QApplication.focusWidget()
-        self._set_paused(held=False)
+        self._set_paused(paused=False)
         self.show()
         self.place()
         self.raise_()
         self.focus_input()
-        paint.announce(self, ", ".join((words, *question.choices)))
+        paint.announce(self, ", ".join((text, *question.choices)))
 
     def focus_input(self) -> None:
         """Set the focus to the input if there is a question and the card is enabled."""
@@ -124,9 +124,9 @@ class QuestionCard(FloatingCard):
             self.field.setFocus(Qt.FocusReason.PopupFocusReason)
 
     def _close(self) -> None:
-        inside = self._has_focus()
+        had_focus = self._has_focus()
         before, self._before = self._before, None
-        if inside and before is not None and isValid(before) and before.isVisible():
+        if had_focus and before is not None and isValid(before) and before.isVisible():
             before.setFocus(Qt.FocusReason.PopupFocusReason)
         self.hide()
 
@@ -134,19 +134,19 @@ class QuestionCard(FloatingCard):
         focus = QApplication.focusWidget()
         return focus is not None and (focus is self or self.isAncestorOf(focus))
 
-    def _set_paused(self, *, held: bool) -> None:
-        had = self._has_focus()
-        self._held = held
-        if had and held and self.choices.buttons:
+    def _set_paused(self, *, paused: bool) -> None:
+        had_focus = self._has_focus()
+        self._held = paused
+        if had_focus and paused and self.choices.buttons:
             # Otherwise Qt would move the focus from the disabled widget to the next one in the window.
             self.setFocus(Qt.FocusReason.OtherFocusReason)
-        self.choices.set_paused(held=held)
-        self._hint.setVisible(held and bool(self.choices.buttons))
-        if had and not held and self.hasFocus():
+        self.choices.set_paused(paused=paused)
+        self._hint.setVisible(paused and bool(self.choices.buttons))
+        if had_focus and not paused and self.hasFocus():
             self.choices.focus_first()
-        self.field.setReadOnly(held)
-        self.field.setPlaceholderText(_("Press Resume first") if held else "")
-        self.button.setEnabled(not held)
+        self.field.setReadOnly(paused)
+        self.field.setPlaceholderText(_("Press Resume first") if paused else "")
+        self.button.setEnabled(not paused)
 
     def place(self) -> None:
         """Move the card to the lower part of the window, centred, but higher if it would cover Stop."""
@@ -155,21 +155,21 @@ class QuestionCard(FloatingCard):
         if window is None or layout is None:
             return
         self.field.setMinimumHeight(self.button.sizeHint().height())
-        wanted = WIDTH_WITH_CHOICES if self.choices.buttons else WIDTH
-        wide = min(window.width() - 2 * MARGIN, round(self._theme.scaled(wanted)))
-        left = (window.width() - wide) // 2
-        top, lowest = self._free_range(window, left, wide)
-        needed = max(layout.totalHeightForWidth(wide), layout.minimumSize().height())
+        preferred_width = WIDTH_WITH_CHOICES if self.choices.buttons else WIDTH
+        width = min(window.width() - 2 * MARGIN, round(self._theme.scaled(preferred_width)))
+        left = (window.width() - width) // 2
+        top, lowest = self._free_range(window, left, width)
+        needed = max(layout.totalHeightForWidth(width), layout.minimumSize().height())
         bottom = min(lowest, max(round(window.height() * BOTTOM_SHARE), top + needed))
-        high = min(needed, bottom - top)
-        self.setGeometry(left, bottom - high, wide, high)
+        height = min(needed, bottom - top)
+        self.setGeometry(left, bottom - height, width, height)
 
-    def _free_range(self, window: QWidget, left: int, wide: int) -> tuple[int, int]:
+    def _free_range(self, window: QWidget, left: int, width: int) -> tuple[int, int]:
         # Vertical range between the Stop buttons above and below the card.
         middle, top, bottom = window.height() // 2, MARGIN, window.height() - MARGIN
-        for each in stop_buttons_in(window):
-            stop = QRect(each.mapTo(window, QPoint()), each.size())
-            if stop.right() < left or stop.left() > left + wide:
+        for button in stop_buttons_in(window):
+            stop = QRect(button.mapTo(window, QPoint()), button.size())
+            if stop.right() < left or stop.left() > left + width:
                 continue
             if stop.center().y() < middle:
                 top = max(top, stop.bottom() + MARGIN)
@@ -190,10 +190,10 @@ class QuestionCard(FloatingCard):
     def _submit(self) -> None:
         self._send(self.field.text())
 
-    def _send(self, words: str) -> None:
+    def _send(self, text: str) -> None:
         question = self._question
         if question is not None and not self._held:
-            self._answer(question, words)
+            self._answer(question, text)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme

@@ -85,8 +85,8 @@ class RunStateIcon(QWidget):
         else:
             role = theme.status("error").colour if mark == "circle-x" else "textSecondary"
             side = 18 if mark == "circle-x" else 16
-            square = QRectF(centre.x() - side / 2, centre.y() - side / 2, side, side)
-            paint_icon(painter, square, mark, theme.colour(role))
+            icon_area = QRectF(centre.x() - side / 2, centre.y() - side / 2, side, side)
+            paint_icon(painter, icon_area, mark, theme.colour(role))
         painter.end()
 
 
@@ -125,9 +125,9 @@ class RunStateLabel(QWidget):
         """
         if (title, detail, is_alarm) != (self._title, self._detail, self._is_alarm):
             self._title, self._detail, self._is_alarm = title, detail, is_alarm
-            said = [each for each in (title, detail) if each]
-            self.setAccessibleName(". ".join(said))
-            self.setToolTip(plain.tip("\n".join(said)))
+            parts = [each for each in (title, detail) if each]
+            self.setAccessibleName(". ".join(parts))
+            self.setToolTip(plain.tip("\n".join(parts)))
             self.update()
 
     def _title_font(self) -> QFont:
@@ -141,8 +141,8 @@ class RunStateLabel(QWidget):
         return max(paint.width_of(font, text) for text, font, _role in lines)
 
     def sizeHint(self) -> QSize:
-        high = paint.height_of(self._title_font()) + paint.height_of(self._theme.font("body"))
-        return QSize(320, round(high))
+        height = paint.height_of(self._title_font()) + paint.height_of(self._theme.font("body"))
+        return QSize(320, round(height))
 
     def minimumSizeHint(self) -> QSize:
         return QSize(0, self.sizeHint().height())
@@ -155,9 +155,9 @@ class RunStateLabel(QWidget):
         lines = self.lines(width)
         top = (self.height() - sum(paint.height_of(font) for _text, font, _role in lines)) / 2
         for text, font, role in lines:
-            high = paint.height_of(font)
-            paint.text_line(painter, QRectF(0, top, width, high), text, font, self._theme.colour(role))
-            top += high
+            line_height = paint.height_of(font)
+            paint.text_line(painter, QRectF(0, top, width, line_height), text, font, self._theme.colour(role))
+            top += line_height
         painter.end()
 
     def lines(self, width: float) -> list[tuple[str, QFont, str]]:
@@ -166,13 +166,13 @@ class RunStateLabel(QWidget):
         The last line is elided if it is too long. If the bar is high enough, a long detail is split
         into two lines in a small font.
         """
-        bold, plain, small = self._title_font(), self._theme.font("body"), self._theme.font("small")
+        bold, body, small = self._title_font(), self._theme.font("body"), self._theme.font("small")
         title, quiet = [(self._title, bold, self.colour_role)], "textSecondary"
         if not self._detail:
             return title
         both = paint.height_of(bold) + 2 * paint.height_of(small)
-        if paint.width_of(plain, self._detail) <= width or both > self.height():
-            return [*title, (self._detail, plain, quiet)]
+        if paint.width_of(body, self._detail) <= width or both > self.height():
+            return [*title, (self._detail, body, quiet)]
         return [*title, *((line, small, quiet) for line in paint.two_lines(small, self._detail, width))]
 
 
@@ -208,21 +208,21 @@ class StopResultLabel(QWidget):
 
     def show_view(self, view: RunView) -> None:
         """Show the result of the last Stop, or hide the widget if there is none."""
-        look, text = "", ""
+        appearance, text = "", ""
         if view.state == "unanswered":
-            look, text = "error", (view.compact_text if self._compact else view.result or "")
+            appearance, text = "error", (view.compact_text if self._compact else view.result or "")
         elif view.state == "stopping" and view.result:
-            look, text = "counting", view.result
+            appearance, text = "counting", view.result
         elif view.result:
-            look, text = view.result_status, view.result
+            appearance, text = view.result_status, view.result
         elif view.last_stop and not self._compact:
-            look, text = "reminder", view.last_stop
-        status = view.last_stop_status if look == "reminder" else view.result_status
-        if (look, text, status) != (self._look, self._text, self._status):
-            self._look, self._text, self._status = look, text, status
+            appearance, text = "reminder", view.last_stop
+        status = view.last_stop_status if appearance == "reminder" else view.result_status
+        if (appearance, text, status) != (self._look, self._text, self._status):
+            self._look, self._text, self._status = appearance, text, status
             self.setAccessibleName(text)
             self.setToolTip(plain.tip(text))
-            if look in {"ok", "off", "error"}:
+            if appearance in {"ok", "off", "error"}:
                 paint.announce(self, text)
             paint.show_when(self, bool(text))
             self.updateGeometry()
@@ -245,8 +245,8 @@ class StopResultLabel(QWidget):
         width += self._icon() + (6 if self._compact or self._look == "reminder" else 10)
         if self._look != "reminder":
             width += 17 if self._compact else 28
-        least = 28 if self._compact else 44
-        return QSize(round(width) + 2, max(least, round(paint.height_of(self._font())) + 10))
+        min_height = 28 if self._compact else 44
+        return QSize(round(width) + 2, max(min_height, round(paint.height_of(self._font())) + 10))
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
@@ -256,8 +256,8 @@ class StopResultLabel(QWidget):
         painter = QPainter(self)
         rect = QRectF(self.rect())
         if self._look == "counting":
-            area, ink = rect.adjusted(0, 0, -8, 0), theme.colour("textSecondary")
-            paint.text_line(painter, area, self._text, self._font(), ink, paint.RIGHT)
+            area, colour = rect.adjusted(0, 0, -8, 0), theme.colour("textSecondary")
+            paint.text_line(painter, area, self._text, self._font(), colour, paint.RIGHT)
         elif self._look == "reminder":
             self._paint_reminder(painter, rect)
         else:
@@ -269,22 +269,22 @@ class StopResultLabel(QWidget):
 
     def _paint_reminder(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        high = paint.height_of(theme.font("body"))
-        upper = QRectF(rect.left(), rect.center().y() - high - 1, rect.width(), high)
+        line_height = paint.height_of(theme.font("body"))
+        upper = QRectF(rect.left(), rect.center().y() - line_height - 1, rect.width(), line_height)
         paint.text_line(
             painter, upper, _("Last stop"), theme.font("body"), theme.colour("textSecondary"), paint.RIGHT
         )
-        self._paint_line(painter, QRectF(rect.left(), rect.center().y() + 1, rect.width(), high))
+        self._paint_line(painter, QRectF(rect.left(), rect.center().y() + 1, rect.width(), line_height))
 
     def _paint_line(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
         status = theme.status(self._status)
         side = self._icon()
-        square = QRectF(rect.left(), rect.center().y() - side / 2, side, side)
-        paint_icon(painter, square, status.icon, theme.colour(status.colour))
-        left = side + (6 if self._compact or self._look == "reminder" else 10)
+        icon_area = QRectF(rect.left(), rect.center().y() - side / 2, side, side)
+        paint_icon(painter, icon_area, status.icon, theme.colour(status.colour))
+        text_left = side + (6 if self._compact or self._look == "reminder" else 10)
         paint.text_line(
-            painter, rect.adjusted(left, 0, 0, 0), self._text, self._font(), theme.colour(status.colour)
+            painter, rect.adjusted(text_left, 0, 0, 0), self._text, self._font(), theme.colour(status.colour)
         )
 
 
@@ -305,15 +305,15 @@ class Bar(QWidget):
         painter.end()
 
 
-def free_area(bar: Bar, left: int, beside: Iterable[QWidget]) -> QRect:
+def free_area(bar: Bar, left: int, right_widgets: Iterable[QWidget]) -> QRect:
     """Return the free area of a bar, for an alert.
 
     Args:
         bar: Bar.
         left: Left edge of the area in px.
-        beside: Widgets that limit the area on the right.
+        right_widgets: Widgets that limit the area on the right.
     """
-    right = min((each.x() for each in beside), default=bar.width()) - GAP
+    right = min((each.x() for each in right_widgets), default=bar.width()) - GAP
     return QRect(left, BANNER_EDGE, max(0, right - left), bar.height() - 1 - 2 * BANNER_EDGE)
 
 
@@ -374,12 +374,12 @@ class RunBar(Bar):
         has to act, the text of the run state stays fully visible.
         """
         left = self.sentence.x() + self._state_text_px() + GAP
-        beside: list[QWidget] = [
+        right_widgets: list[QWidget] = [
             each for each in (self.restart, self.confirm, self.stop) if not each.isHidden()
         ]
         if not self.result.isHidden() and self.result.appearance != "reminder":
-            beside.append(self.result)
-        return free_area(self, round(left), beside)
+            right_widgets.append(self.result)
+        return free_area(self, round(left), right_widgets)
 
     def reserve_banner_room(self, *, has_banner: bool) -> None:
         """Shorten the text of the run state if there is a banner, else restore its width."""
@@ -400,23 +400,27 @@ class RunBar(Bar):
         # Pause and Step become icons in every state, then Run. A successful result leaves room for the state,
         # which may be an error.
         scaled, buttons = self._theme.scaled, (self.run, self.pause, self.step)
-        words = sum(each.full_width() for each in buttons)
+        buttons_width = sum(each.full_width() for each in buttons)
         needed = (
-            words + self.stop.sizeHint().width() + FIXED_ITEMS_PX + scaled(SENTENCE_PX) + scaled(RESULT_PX)
+            buttons_width
+            + self.stop.sizeHint().width()
+            + FIXED_ITEMS_PX
+            + scaled(SENTENCE_PX)
+            + scaled(RESULT_PX)
         )
-        bare = self.width() < max(scaled(MIN_WIDTH_WITH_TEXTS_PX), needed)
+        icon_only = self.width() < max(scaled(MIN_WIDTH_WITH_TEXTS_PX), needed)
         self.run.set_icon_only(self.width() < self._theme.scaled(MIN_TEXT_WIDTH_PX))
-        self.pause.set_icon_only(bare)
-        self.step.set_icon_only(bare)
-        shown = (
+        self.pause.set_icon_only(icon_only)
+        self.step.set_icon_only(icon_only)
+        visible_widgets = (
             *buttons,
             self.stop,
             *(each for each in (self.restart, self.confirm) if each.isVisibleTo(self)),
         )
-        rest = self.width() - FIXED_ITEMS_PX - sum(each.sizeHint().width() for each in shown)
-        left = max(scaled(MIN_RESULT_PX), rest - min(self.sentence.full_width(), scaled(SENTENCE_PX)))
+        rest = self.width() - FIXED_ITEMS_PX - sum(each.sizeHint().width() for each in visible_widgets)
+        result_width = max(scaled(MIN_RESULT_PX), rest - min(self.sentence.full_width(), scaled(SENTENCE_PX)))
         self.result.setMaximumWidth(
-            round(left) if self.result.appearance in {"ok", "off"} else QWIDGETSIZE_MAX
+            round(result_width) if self.result.appearance in {"ok", "off"} else QWIDGETSIZE_MAX
         )
 
     def show_view(self, view: RunView) -> None:
@@ -484,23 +488,25 @@ class ToolBar(Bar):
         """
         left = max((each.geometry().right() + 1 for each in self._visible_tools()), default=0) + GAP
         buttons = (self.result, self.restart, self.pause, self.step, self.confirm, self.run, self.stop)
-        beside: list[QWidget] = [each for each in buttons if not each.isHidden()]
+        right_widgets: list[QWidget] = [each for each in buttons if not each.isHidden()]
         states = [each for each in (self.mark, self.words) if not each.isHidden()]
-        area = free_area(self, left, [*beside, *states])
+        area = free_area(self, left, [*right_widgets, *states])
         return (
-            area if area.width() >= self._theme.scaled(MIN_BANNER_WIDTH_PX) else free_area(self, left, beside)
+            area
+            if area.width() >= self._theme.scaled(MIN_BANNER_WIDTH_PX)
+            else free_area(self, left, right_widgets)
         )
 
     def needed_width(self) -> int:
         """Return the width in px at which no text in the bar is shortened."""
         run_state = (self.mark, self.words, self.result, self.restart, self.pause, self.step, self.confirm)
-        shown = [each for each in (*run_state, self.run, self.stop) if not each.isHidden()]
-        parts: list[QWidget] = [*shown, *self._visible_tools()]
+        visible_widgets = [each for each in (*run_state, self.run, self.stop) if not each.isHidden()]
+        parts: list[QWidget] = [*visible_widgets, *self._visible_tools()]
         widths = [each.sizeHint().expandedTo(each.minimumSize()).width() for each in parts]
         return sum(widths) + GAP * (len(widths) + 2)
 
     def _visible_tools(self) -> list[QWidget]:
-        items = (self.tools.itemAt(place) for place in range(self.tools.count()))
+        items = (self.tools.itemAt(index) for index in range(self.tools.count()))
         tools = [item.widget() for item in items if item is not None]
         return [tool for tool in tools if tool is not None and not tool.isHidden()]
 
@@ -508,23 +514,23 @@ class ToolBar(Bar):
         """Connect the buttons to the actions of their commands."""
         bind_run_buttons(self, actions)
 
-    def add_tool(self, tool: QWidget, place: int = -1) -> None:
+    def add_tool(self, tool: QWidget, index: int = -1) -> None:
         """Insert a tool on the left of the bar.
 
         Args:
             tool: Widget to insert.
-            place: Position among the tools; -1 appends the tool.
+            index: Position among the tools; -1 appends the tool.
         """
-        self.tools.insertWidget(place, tool)
+        self.tools.insertWidget(index, tool)
 
     def show_view(self, view: RunView) -> None:
         """Show a run state in short form."""
         self.result.show_view(view)
-        spoken = bool(self.result.text) and view.state in {"proven", "unanswered"}
+        is_result_shown = bool(self.result.text) and view.state in {"proven", "unanswered"}
         self.mark.show_state(view.state)
-        self.mark.setVisible(not spoken)
+        self.mark.setVisible(not is_result_shown)
         self.words.setText(view.compact_text)
-        self.words.setVisible(not spoken)
+        self.words.setVisible(not is_result_shown)
         self.run.set_label(_(view.run_label))
         self.run.setVisible(view.can_run)
         self.restart.setVisible(view.can_restart)

@@ -28,8 +28,8 @@ TICK_MS = 33
 FIGURE_SPACE = "\u2007"
 
 
-def _worst_status(found: Iterable[str]) -> tuple[str, str]:
-    return ("circle-x", "error") if "error" in found else ("triangle-alert", "warn")
+def _worst_status(severities: Iterable[str]) -> tuple[str, str]:
+    return ("circle-x", "error") if "error" in severities else ("triangle-alert", "warn")
 
 
 class StatusFormatter:
@@ -57,8 +57,8 @@ class StatusFormatter:
         if not alerts:
             return EMPTY_ENTRY
         icon, status = _worst_status(alert.severity for alert in alerts)
-        words = ngettext("{count} alert", "{count} alerts", len(alerts))
-        return icon, words.format(count=len(alerts)), status
+        text = ngettext("{count} alert", "{count} alerts", len(alerts))
+        return icon, text.format(count=len(alerts)), status
 
     def health(self) -> StatusEntry:
         """Return the number of alerts, else with the health of the robots.
@@ -68,34 +68,40 @@ class StatusFormatter:
         alerts = self.alerts()
         if alerts != EMPTY_ENTRY:
             return alerts
-        known = self._session.fleet.links
+        all_links = self._session.fleet.links
         links = [
-            link for link in known if link.state != "away"
-        ] or known  # Health also shows robots that have left
+            link for link in all_links if link.state != "away"
+        ] or all_links  # Health also shows robots that have left
         if not links:
             coming = self._session.starting_robots
             return "circle-dashed", connected_text((), coming) if coming else _("No robot"), "off"
         topics, now = self._session.live.topics, time.monotonic()
-        found = [(link, health_items(link, topics, now, age_text)) for link in links]
-        wrong = [fact.status for _link, facts in found for fact in facts if fact.needs_attention]
-        if wrong:
-            icon, status = _worst_status(wrong)
-            words = _("{robot}: needs attention ({count})")
+        link_items = [(link, health_items(link, topics, now, age_text)) for link in links]
+        problem_statuses = [
+            item.status for _link, items in link_items for item in items if item.needs_attention
+        ]
+        if problem_statuses:
+            icon, status = _worst_status(problem_statuses)
+            text = _("{robot}: needs attention ({count})")
             if len(links) > 1:
-                words = ngettext(
+                text = ngettext(
                     "{robots} robot: {count} warning", "{robots} robots: {count} warnings", len(links)
                 )
-            return icon, words.format(robot=links[0].name, robots=len(links), count=len(wrong)), status
+            return (
+                icon,
+                text.format(robot=links[0].name, robots=len(links), count=len(problem_statuses)),
+                status,
+            )
         if any(link.state == STOPPING for link in links):
             return "circle-dashed", _("Waiting for Stop to be confirmed"), "off"
         name, count = links[0].name, len(links)
-        if all(has_reported(link, facts) for link, facts in found):
-            words = ngettext("{count} robot: no problems", "{count} robots: no problems", count)
-            words = words if count > 1 else _("{robot}: no problems")
-            return "circle-check", words.format(robot=name, count=count), "ok"
-        words = ngettext("{count} robot is connected", "{count} robots are connected", count)
-        words = words if count > 1 else _("{robot} is connected")
-        return "circle-dashed", words.format(robot=name, count=count), "off"
+        if all(has_reported(link, items) for link, items in link_items):
+            text = ngettext("{count} robot: no problems", "{count} robots: no problems", count)
+            text = text if count > 1 else _("{robot}: no problems")
+            return "circle-check", text.format(robot=name, count=count), "ok"
+        text = ngettext("{count} robot is connected", "{count} robots are connected", count)
+        text = text if count > 1 else _("{robot} is connected")
+        return "circle-dashed", text.format(robot=name, count=count), "off"
 
     def save_state(self) -> StatusEntry:
         """Return the time of the last save or, for unsaved changes, the state of the backup."""
@@ -103,12 +109,12 @@ class StatusFormatter:
         if document.dirty and document.journal_error is not None:
             return "circle-x", _("Not saved · no backup"), "error"
         if document.dirty:
-            words = _("Not saved · backed up") if document.path is None else _("Unsaved changes · backed up")
-            return "save", words, None
+            text = _("Not saved · backed up") if document.path is None else _("Unsaved changes · backed up")
+            return "save", text, None
         if document.saved_at is None:
             return EMPTY_ENTRY
-        then = self._clock(document.saved_at)
-        return "save", _("Saved {clock}").format(clock=f"{then.tm_hour}:{then.tm_min:02d}"), None
+        saved_time = self._clock(document.saved_at)
+        return "save", _("Saved {clock}").format(clock=f"{saved_time.tm_hour}:{saved_time.tm_min:02d}"), None
 
     def topics(self) -> StatusEntry:
         """Return the number of active topics."""
@@ -121,8 +127,8 @@ class StatusFormatter:
 
     def remote_access_plain(self) -> StatusEntry:
         """Return the fact of `remote_access`, but without an icon for the default setting."""
-        icon, words, status = self.remote_access()
-        return ("" if status is None else icon), words, status
+        icon, text, status = self.remote_access()
+        return ("" if status is None else icon), text, status
 
     def web_pages(self) -> StatusEntry:
         """Return the network of the web server and the number of connected pages.
@@ -140,8 +146,8 @@ class StatusFormatter:
         if master.kind == "connected":
             return "circle-check", _("Master {address}").format(address=master.address), "ok"
         if master.kind == "searching":
-            words = _("Searching for the master {address}").format(address=master.address)
-            return "circle-dashed", words, "off"
+            text = _("Searching for the master {address}").format(address=master.address)
+            return "circle-dashed", text, "off"
         return "circle-dashed", _("No master"), "off"
 
     def traffic(self) -> StatusEntry:
@@ -151,21 +157,21 @@ class StatusFormatter:
             return EMPTY_ENTRY
         live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         nodes, rate = len(graph.nodes), self._session.traffic.messages_per_s
-        facts = [
+        parts = [
             ngettext("{count} node", "{count} nodes", nodes).format(count=nodes),
             ngettext("{count} topic", "{count} topics", live).format(count=live),
         ]
         if rate is not None:
-            facts.append(_("{count} messages/s").format(count=group_digits(round(rate))))
-        return "", ", ".join(facts), None
+            parts.append(_("{count} messages/s").format(count=group_digits(round(rate))))
+        return "", ", ".join(parts), None
 
     def lost(self) -> StatusEntry:
         """Return the number of messages lost during the last 30 s; empty for 0."""
         lost = self._session.traffic.lost_30s
         if not lost:
             return EMPTY_ENTRY
-        words = ngettext("{count} lost in 30 s", "{count} lost in 30 s", lost)
-        return "triangle-alert", words.format(count=group_digits(lost)), "warn"
+        text = ngettext("{count} lost in 30 s", "{count} lost in 30 s", lost)
+        return "triangle-alert", text.format(count=group_digits(lost)), "warn"
 
     def recording(self) -> StatusEntry:
         """Return duration, size and losses of the current recording; empty if there is none."""
@@ -177,13 +183,13 @@ class StatusFormatter:
             return "circle-dot", _("Starting to record"), "recording"
         lost = state.lost + state.unwritten_count
         losses = ngettext("{count} lost", "{count} lost", lost).format(count=group_digits(lost))
-        words = _("Recording {time}, {size}, {losses}").format(
+        text = _("Recording {time}, {size}, {losses}").format(
             time=length_text(recordings.elapsed_s),
             size=size_text(state.size_bytes),
             losses=losses if lost else _("none lost"),
         )
         return (
-            ("triangle-alert", words, "warn") if state.unwritten_count else ("circle-dot", words, "recording")
+            ("triangle-alert", text, "warn") if state.unwritten_count else ("circle-dot", text, "recording")
         )
 
     def arming(self) -> StatusEntry:
@@ -191,25 +197,26 @@ class StatusFormatter:
         acting = self._session.acting
         if not acting.arming.is_on:
             return EMPTY_ENTRY
-        left = length_text(math.ceil(acting.arming.remaining_s))
-        going = acting.outbox.repeated_messages
+        remaining = length_text(math.ceil(acting.arming.remaining_s))
+        repeated = acting.outbox.repeated_messages
         replay = self._session.replay
         played = (
             replay.sending.outbox.active_topics if replay is not None and replay.sending is not None else ()
         )
         if played:
-            said = ngettext("Sending {count} topic of the recording, armed {time}",
+            template = ngettext("Sending {count} topic of the recording, armed {time}",
                             "Sending {count} topics of the recording, armed {time}", len(played))  # fmt: skip
-            words = said.format(count=len(played), time=left)
-        elif len(going) == 1:
-            words = _("Sending “{name}”, armed {time}").format(name=going[0].order.name, time=left)
-        elif going:
-            said = ngettext("Sending {count} message, armed {time}", "Sending {count} messages, armed {time}",
-                            len(going))  # fmt: skip
-            words = said.format(count=len(going), time=left)
+            text = template.format(count=len(played), time=remaining)
+        elif len(repeated) == 1:
+            text = _("Sending “{name}”, armed {time}").format(name=repeated[0].order.name, time=remaining)
+        elif repeated:
+            template = ngettext("Sending {count} message, armed {time}",
+                                "Sending {count} messages, armed {time}",
+                                len(repeated))  # fmt: skip
+            text = template.format(count=len(repeated), time=remaining)
         else:
-            words = _("Armed {time}").format(time=left)
-        return "triangle-alert", words, "warn"
+            text = _("Armed {time}").format(time=remaining)
+        return "triangle-alert", text, "warn"
 
     def flight_recorder(self) -> StatusEntry:
         """Return the duration stored in the flight recorder; empty while it is off."""
@@ -229,15 +236,17 @@ class StatusFormatter:
         when = _("{date}, {begin} to {end}").format(date=date_text(replay.start_ns), begin=begin, end=end)
         count, messages = len(recorded.topics), recorded.message_count
         topics = ngettext("{count} topic", "{count} topics", count).format(count=group_digits(count))
-        said = ngettext("{count} message", "{count} messages", messages).format(count=group_digits(messages))
+        message_count = ngettext("{count} message", "{count} messages", messages).format(
+            count=group_digits(messages)
+        )
         lost: StatusEntry = EMPTY_ENTRY
         if replay.lost:
-            words = ngettext("{count} lost while recording", "{count} lost while recording", replay.lost)
-            lost = ("triangle-alert", words.format(count=group_digits(replay.lost)), "warn")
+            text = ngettext("{count} lost while recording", "{count} lost while recording", replay.lost)
+            lost = ("triangle-alert", text.format(count=group_digits(replay.lost)), "warn")
         return (
             ("history", name, None),
             ("", when, None),
-            ("", _("{topics}, {messages}").format(topics=topics, messages=said), None),
+            ("", _("{topics}, {messages}").format(topics=topics, messages=message_count), None),
             lost,
         )
 
@@ -253,10 +262,10 @@ class StatusFormatter:
         traffic = self._session.traffic
         if traffic.shown_30s >= traffic.sent_30s:
             return EMPTY_ENTRY
-        words = _("{shown} of {sent} shown in 30 s")
+        text = _("{shown} of {sent} shown in 30 s")
         return (
             "",
-            words.format(shown=group_digits(traffic.shown_30s), sent=group_digits(traffic.sent_30s)),
+            text.format(shown=group_digits(traffic.shown_30s), sent=group_digits(traffic.sent_30s)),
             None,
         )
 
@@ -294,14 +303,14 @@ class StatusBar(QWidget):
         while len(items) < count:
             item, line = StatusItem(self._theme), Separator(self._theme, upright=True)
             item.pressed.connect(self.pressed)
-            holder = QWidget()
-            row = QHBoxLayout(holder)
+            container = QWidget()
+            row = QHBoxLayout(container)
             row.setContentsMargins(0, 0, 0, 0)
             row.setSpacing(10)
             for widget in (line, item) if right else (item, line):
                 row.addWidget(widget)
-            place = self._row.count() if right else len(items)
-            self._row.insertWidget(place, holder)
+            index = self._row.count() if right else len(items)
+            self._row.insertWidget(index, container)
             items.append((item, line))
 
     def show_entries(self, left: Sequence[StatusEntry], right: Sequence[StatusEntry]) -> None:
@@ -311,18 +320,18 @@ class StatusBar(QWidget):
             left: Facts on the left, from left to right.
             right: Facts on the right, from left to right.
         """
-        for facts, items, at_right in ((left, self._left, False), (right, self._right, True)):
-            shown = [fact for fact in facts if fact[1]]
-            self._add_items(items, len(shown), right=at_right)
+        for entries, items, at_right in ((left, self._left, False), (right, self._right, True)):
+            visible_entries = [entry for entry in entries if entry[1]]
+            self._add_items(items, len(visible_entries), right=at_right)
             for index, (item, line) in enumerate(items):
-                fact = shown[index] if index < len(shown) else EMPTY_ENTRY
-                item.set(*fact)
-                item.set_command(self.commands.get(fact[1], ""))
-                holder = item.parentWidget()
-                if holder is not None:
-                    holder.setVisible(bool(fact[1]))
-                    holder.setContentsMargins(10 if (at_right or index) else 0, 0, 0, 0)
-                paint.show_when(line, bool(fact[1]) and (at_right or index < len(shown) - 1))
+                entry = visible_entries[index] if index < len(visible_entries) else EMPTY_ENTRY
+                item.set(*entry)
+                item.set_command(self.commands.get(entry[1], ""))
+                container = item.parentWidget()
+                if container is not None:
+                    container.setVisible(bool(entry[1]))
+                    container.setContentsMargins(10 if (at_right or index) else 0, 0, 0, 0)
+                paint.show_when(line, bool(entry[1]) and (at_right or index < len(visible_entries) - 1))
 
     def items(self) -> list[StatusItem]:
         """Return the visible items, from left to right."""

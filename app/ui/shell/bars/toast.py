@@ -52,7 +52,7 @@ class Toast(FloatingCard):
 
     def show_toast(
         self,
-        words: str,
+        text: str,
         button: str = "",
         run: Callable[[], object] | None = None,
         *,
@@ -61,15 +61,15 @@ class Toast(FloatingCard):
         """Show a sentence for some seconds, with an optional button.
 
         Args:
-            words: Sentence.
+            text: Sentence.
             button: Text of the button, such as "Undo"; "" for no button.
             run: Callback of the button.
             until: Returns True when the sentence is outdated, which closes the toast early.
         """
         self._until = until
-        self._words.setText(words)
-        self.setAccessibleName(words)
-        paint.announce(self, words)
+        self._words.setText(text)
+        self.setAccessibleName(text)
+        paint.announce(self, text)
         self._run = run
         self.button.set_label(button)
         paint.show_when(self.button, bool(button and run))
@@ -101,10 +101,10 @@ class Toast(FloatingCard):
     def _fit(self, room: int) -> None:
         aside = self.sizeHint().width() - self._words.sizeHint().width()
         line = paint.width_of(self._words.font(), self._words.text()) + 2
-        wide = min(room, round(line) + aside)
+        width = min(room, round(line) + aside)
         layout = self.layout()
-        high = layout.totalHeightForWidth(wide) if layout is not None else 0
-        self.resize(wide, max(high, layout.minimumSize().height() if layout is not None else 0))
+        height = layout.totalHeightForWidth(width) if layout is not None else 0
+        self.resize(width, max(height, layout.minimumSize().height() if layout is not None else 0))
 
     def enterEvent(self, event: QEnterEvent) -> None:
         self._timer.stop()

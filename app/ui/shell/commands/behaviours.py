@@ -54,11 +54,11 @@ class SupportsUndo(Protocol):
 class SupportsBlockEdits(Protocol):
     """Interface of a panel with blocks that can be copied and pasted."""
 
-    def edit_blocks(self, what: str) -> None:
+    def edit_blocks(self, action: str) -> None:
         """Apply an edit to the selected blocks, unless the page handles the keys itself.
 
         Args:
-            what: "copy", "cut", "paste" or "duplicate".
+            action: "copy", "cut", "paste" or "duplicate".
         """
 
 
@@ -109,8 +109,8 @@ class TabPosition:
         Raises:
             ValueError: The position isn't a number.
         """
-        key, _colon, place = text.rpartition(":")
-        return cls(key, int(place))
+        key, _colon, position = text.rpartition(":")
+        return cls(key, int(position))
 
 
 def parse_stack(text: str) -> Stack:
@@ -161,11 +161,13 @@ class BehaviourCommands:
     Methods with a document key as argument return False if there is no such document.
     """
 
-    def __init__(self, shell: Shell, session: Session, files: DocumentController, asks: FileDialogs) -> None:
+    def __init__(
+        self, shell: Shell, session: Session, files: DocumentController, dialogs: FileDialogs
+    ) -> None:
         self._shell, self._session, self._files = shell, session, files
         self._versions: version_history.VersionHistorySheet | None = None
-        self.pictures = ImageCommands(shell, session, asks)
-        self.printing = PrintCommands(shell, session, asks)
+        self.pictures = ImageCommands(shell, session, dialogs)
+        self.printing = PrintCommands(shell, session, dialogs)
 
     def run_or_resume(self) -> None:
         """Resume a paused program, or run the current behaviour.
@@ -181,18 +183,18 @@ class BehaviourCommands:
     def _replace_run(self, begin: Callable[[], object]) -> None:
         # Shows a toast with the name of the behaviour that was stopped by this run.
         session = self._session
-        runs, shown, running = session.runs, session.document, session.runs.document
+        runs, displayed, running = session.runs, session.document, session.runs.document
         was_active = runs.active
         begin()
         if (
             was_active
             and running is not None
-            and running is not shown
+            and running is not displayed
             and not runs.is_running_or_pending(running)
         ):
             self._shell.show_toast(
                 _("Stopped “{stopped}” to run “{name}”").format(
-                    stopped=session.documents.title(running), name=session.documents.title(shown)
+                    stopped=session.documents.title(running), name=session.documents.title(displayed)
                 )
             )
 
@@ -336,15 +338,15 @@ class BehaviourCommands:
         if isinstance(editor, SupportsUndo):
             editor.redo()
 
-    def edit_blocks(self, what: str) -> None:
+    def edit_blocks(self, action: str) -> None:
         """Apply an edit to the selected blocks if the Behaviour layout is shown, wherever the focus is.
 
         Args:
-            what: "copy", "cut", "paste" or "duplicate".
+            action: "copy", "cut", "paste" or "duplicate".
         """
         editor = self._shell.editor()
         if self._shell.current_layout == "behaviour" and isinstance(editor, SupportsBlockEdits):
-            editor.edit_blocks(what)
+            editor.edit_blocks(action)
 
     def show_block(self, block: str) -> None:
         """Show the Behaviour layout and scroll to the block with this id."""
@@ -394,29 +396,29 @@ class BehaviourCommands:
     def clear_recent(self) -> None:
         """Clear the list of recent files and show a toast with an Undo button."""
         before: list[RecentFile] = self._session.settings.all_recent_files
-        words = _("Recent files cleared")
+        message = _("Recent files cleared")
         if not self._set_recent([]):
-            words = _("Can't save this change: the recent files will reappear when Studio restarts")
-        self._shell.show_toast(words, _("Undo"), lambda: self._set_recent(before))
+            message = _("Can't save this change: the recent files will reappear when Studio restarts")
+        self._shell.show_toast(message, _("Undo"), lambda: self._set_recent(before))
 
     def _set_recent(self, files: list[RecentFile]) -> bool:
-        kept = True
+        saved = True
         try:
             self._session.settings.set_recent(files)
         except SettingsError as error:
             self._shell.log_problem(str(error))
-            kept = False
+            saved = False
         self._shell.show_recent()
-        return kept
+        return saved
 
-    def restore_tabs(self, left: Sequence[UnsavedWork], offer: ShowOffer) -> None:
+    def restore_tabs(self, unsaved_work: Sequence[UnsavedWork], offer: ShowOffer) -> None:
         """Restore the tabs of the last session, and offer to recover unsaved changes.
 
         Args:
-            left: Changes that were not saved, for example because of a crash.
+            unsaved_work: Changes that were not saved, for example because of a crash.
             offer: Shows the offer; called only if changes remain that the tabs don't contain.
         """
-        rest = self._session.tabs.restore(left)
+        rest = self._session.tabs.restore(unsaved_work)
         if not rest:
             return
 
@@ -432,16 +434,16 @@ class BehaviourCommands:
         )
 
 
-def unsaved_text(left: Sequence[UnsavedWork]) -> str:
+def unsaved_text(unsaved: Sequence[UnsavedWork]) -> str:
     """Return a sentence that names the behaviours with unsaved changes."""
-    if len(left) == 1:
-        return _("“{name}” wasn't saved before Studio closed.").format(name=left[0].name)
-    if len(left) == 2:
+    if len(unsaved) == 1:
+        return _("“{name}” wasn't saved before Studio closed.").format(name=unsaved[0].name)
+    if len(unsaved) == 2:
         return _("“{name}” and “{other}” weren't saved before Studio closed.").format(
-            name=left[0].name, other=left[1].name
+            name=unsaved[0].name, other=unsaved[1].name
         )
     return ngettext(
         "“{name}” and {count} other weren't saved before Studio closed.",
         "“{name}” and {count} others weren't saved before Studio closed.",
-        len(left) - 1,
-    ).format(name=left[0].name, count=len(left) - 1)
+        len(unsaved) - 1,
+    ).format(name=unsaved[0].name, count=len(unsaved) - 1)

@@ -31,20 +31,20 @@ _ARGUMENT_COMMANDS_BY_ID = {command.id: command for command in ARGUMENT_COMMANDS
 class Commands:
     """Handlers, actions, menus and shortcuts of a window."""
 
-    def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
+    def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
         keys = Shortcuts(session.settings, shell.log_problem, COMMANDS)
         self.session = session
         self.files = DocumentController(
-            session, asks, shell.show_toast, partial(bring_into_view, shell), shell.editor
+            session, dialogs, shell.show_toast, partial(bring_into_view, shell), shell.editor
         )
-        self.behaviours = BehaviourCommands(shell, session, self.files, asks)
+        self.behaviours = BehaviourCommands(shell, session, self.files, dialogs)
         session.alarms.run_behaviour = self.behaviours.run_named
         self.robots = RobotCommands(shell, session, self.files, self.behaviours.undo)
         self.view = ViewCommands(shell, session, self.files, keys)
         self.shortcuts = keys
-        self.recording = RecordCommands(shell, session, asks)
+        self.recording = RecordCommands(shell, session, dialogs)
         self.variables = VariableCommands(shell, session, self.files)
-        self.replay = ReplayCommands(shell, session, asks)
+        self.replay = ReplayCommands(shell, session, dialogs)
         self.files.open_recording = self.replay.open
         self.files.open_layout = self.view.open_layout
         self._do = Handlers(
@@ -56,7 +56,7 @@ class Commands:
             self.robots,
             self.view,
             EditCommands(shell),
-            ReportCommands(shell, session, self.files, asks),
+            ReportCommands(shell, session, self.files, dialogs),
             self.recording,
             self.replay,
             ActingCommands(shell),

@@ -20,7 +20,7 @@ MODIFYING_EDITS = frozenset({"cut", "paste"})
 class SupportsEditMenu(Protocol):
     """Interface of a panel that handles the Edit menu itself, because its text fields aren't Qt widgets."""
 
-    def edit_from_menu(self, what: Edit) -> None:
+    def edit_from_menu(self, edit: Edit) -> None:
         """Apply an edit command to the focused field of the page, or to the selected blocks."""
 
 
@@ -42,23 +42,23 @@ class EditCommands:
         if now is not None and not isinstance(now, (QMenu, QMenuBar)):
             self._had = now
 
-    def run(self, what: Edit) -> None:
+    def run(self, edit: Edit) -> None:
         """Apply an edit to the focused field or to the blocks."""
         field = self._focused_field()
         if field is not None:
-            getattr(field, what)()
+            getattr(field, edit)()
             return
         editor = self._shell.editor()
         if self._shell.current_layout == "behaviour" and isinstance(editor, SupportsEditMenu):
-            editor.edit_from_menu(what)
+            editor.edit_from_menu(edit)
 
-    def disabled_reason(self, what: Edit) -> str:
+    def disabled_reason(self, edit: Edit) -> str:
         """Return the reason why an edit is unavailable, or "" if it is available."""
         field = self._focused_field()
         if field is not None:
-            return _("This text can't be changed") if what in MODIFYING_EDITS and field.isReadOnly() else ""
+            return _("This text can't be changed") if edit in MODIFYING_EDITS and field.isReadOnly() else ""
         return "" if self._shell.current_layout == "behaviour" else _("Only for blocks and text fields")
 
     def _focused_field(self) -> Field | None:
-        had = self._had if self._had is not None and isValid(self._had) else None
-        return had if isinstance(had, FIELD_TYPES) and had.isVisible() else None
+        focused = self._had if self._had is not None and isValid(self._had) else None
+        return focused if isinstance(focused, FIELD_TYPES) and focused.isVisible() else None

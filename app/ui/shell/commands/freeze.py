@@ -29,8 +29,8 @@ def freeze_buttons(bench: Workbench | None) -> list[QAbstractButton]:
 
 def all_frozen(bench: Workbench | None) -> bool:
     """Return True if at least one panel can be frozen, and all such panels are frozen."""
-    found = freeze_buttons(bench)
-    return bool(found) and all(button.isChecked() for button in found)
+    buttons = freeze_buttons(bench)
+    return bool(buttons) and all(button.isChecked() for button in buttons)
 
 
 def toggle_freeze(bench: Workbench | None) -> None:

@@ -75,10 +75,10 @@ class DynamicMenus:
         recent = recent_titles(self._session.settings.all_recent_files)
         self._recent.menuAction().setVisible(bool(recent))
         for file in recent:
-            words = file.name
+            label = file.name
             if not file.exists:
-                words = _("{file} (missing)").format(file=file.name)
-            entry = self._recent.addAction(plain.escape_menu_text(words))
+                label = _("{file} (missing)").format(file=file.name)
+            entry = self._recent.addAction(plain.escape_menu_text(label))
             entry.setToolTip(plain.tip(str(file.path)))
             entry.setEnabled(file.exists)
             entry.triggered.connect(lambda _on=False, path=file.path: self._open_file(path))
@@ -87,20 +87,20 @@ class DynamicMenus:
 
     def _list_layouts(self, menu: Menu) -> None:
         menu.clear()
-        arrangements, shown = self._shell.saved_layouts, self._shell.current_layout
+        arrangements, current = self._shell.saved_layouts, self._shell.current_layout
         for layout in LAYOUTS:
             entry = menu.addAction(self._shell.theme.icon(layout.icon), _(layout.title))
             entry.setCheckable(True)
-            entry.setChecked(shown == layout.name and not arrangements.custom_name(layout.name))
+            entry.setChecked(current == layout.name and not arrangements.custom_name(layout.name))
             entry.triggered.connect(lambda _on=False, name=layout.name: self._view.show_built_in_layout(name))
-        own = arrangements.all()
-        if own:
+        custom_layouts = arrangements.all()
+        if custom_layouts:
             menu.addSeparator()
-        for each in own:
-            entry = menu.addAction(plain.escape_menu_text(each.name))
+        for custom in custom_layouts:
+            entry = menu.addAction(plain.escape_menu_text(custom.name))
             entry.setCheckable(True)
-            entry.setChecked(shown == each.base and arrangements.custom_name(each.base) == each.name)
-            entry.triggered.connect(lambda _on=False, name=each.name: self._view.show_custom_layout(name))
+            entry.setChecked(current == custom.base and arrangements.custom_name(custom.base) == custom.name)
+            entry.triggered.connect(lambda _on=False, name=custom.name: self._view.show_custom_layout(name))
         menu.addSeparator()
         for name in LAYOUT_COMMANDS:
             menu.addAction(self.actions[name])
@@ -126,8 +126,8 @@ class DynamicMenus:
                     self._add_extra_panel(panel, key, number)
 
     def _add_extra_panel(self, panel: Panel, key: str, number: int) -> None:
-        words = numbered_title(_(panel.title), number)
-        entry = self._panels.addAction(self._shell.theme.icon(panel.icon), words)
+        title = numbered_title(_(panel.title), number)
+        entry = self._panels.addAction(self._shell.theme.icon(panel.icon), title)
         entry.setCheckable(True)
         entry.setChecked(True)
         entry.triggered.connect(lambda on=False, key=key: self._set_panel_open(key, on))

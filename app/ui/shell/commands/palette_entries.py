@@ -31,13 +31,13 @@ class PaletteEntries:
         shell: Shell,
         session: Session,
         commands: Sequence[Command[Any]],
-        why_not: Callable[[str], str],
+        disabled_reason: Callable[[str], str],
         shortcuts: Shortcuts,
     ) -> None:
         # `why_not` returns the reason why a command is unavailable, or "".
         self._shell, self._session, self._shortcuts = shell, session, shortcuts
         self._shown = [command for command in commands if command.in_palette]
-        self._why_not = why_not
+        self._why_not = disabled_reason
         self._topics: list[Entry] = []
         self._topics_seen = (-1, -1)
 
@@ -54,47 +54,47 @@ class PaletteEntries:
         ]
 
     def _commands(self) -> list[Entry]:
-        made = []
-        for each in self._shown:
-            key, reason = self._shortcuts.first(each.id), self._why_not(each.id)
-            icon = each.icon or "chevrons-right"
-            made.append(Entry(f"command:{each.id}", each.label, icon, _(each.menu), key, reason))
-        return made
+        entries = []
+        for command in self._shown:
+            key, reason = self._shortcuts.first(command.id), self._why_not(command.id)
+            icon = command.icon or "chevrons-right"
+            entries.append(Entry(f"command:{command.id}", command.label, icon, _(command.menu), key, reason))
+        return entries
 
     def _panels(self) -> list[Entry]:
         bench = self._shell.bench
         opened: Sequence[str] = bench.open_names() if bench is not None else ()
-        made = []
+        entries = []
         for panel in sorted(self._shell.panels.values(), key=lambda panel: _(panel.title)):
-            place = opened.index(panel.name) + 1 if panel.name in opened else 0
-            key = self._shortcuts.first(f"panel.{place}") if 0 < place < 10 else ""
-            made.append(Entry(f"panel:{panel.name}", _(panel.title), panel.icon, "", key))
+            position = opened.index(panel.name) + 1 if panel.name in opened else 0
+            key = self._shortcuts.first(f"panel.{position}") if 0 < position < 10 else ""
+            entries.append(Entry(f"panel:{panel.name}", _(panel.title), panel.icon, "", key))
             if panel.allows_multiple and panel.name in opened:
-                words = _("Another panel: {panel}").format(panel=_(panel.title))
-                made.append(Entry(f"another:{panel.name}", words, "plus"))
-        return made
+                label = _("Another panel: {panel}").format(panel=_(panel.title))
+                entries.append(Entry(f"another:{panel.name}", label, "plus"))
+        return entries
 
     def _robots(self) -> list[Entry]:
         links = self._session.fleet.links
         return [Entry(f"robot:{link.name}", link.name, "bot", link.chip_text) for link in links]
 
     def _layouts(self) -> list[Entry]:
-        own = self._shell.saved_layouts.all()
+        custom_layouts = self._shell.saved_layouts.all()
         return [
             Entry(f"layout:{each.name}", each.name, "panel-left", _(layout_named(each.base).title))
-            for each in own
+            for each in custom_layouts
         ]
 
     def _files(self) -> list[Entry]:
         now = dt.datetime.now().astimezone()
-        made = []
+        entries = []
         for file in recent_titles(self._session.settings.all_recent_files):
             when = relative_day_text(dt.datetime.fromtimestamp(file.opened_s).astimezone(), now)
             reason = ""
             if not file.exists:
                 reason = _("No longer in {folder}").format(folder=file.path.parent.name)
-            made.append(Entry(f"file:{file.path}", file.name, "file", when, reason=reason))
-        return made
+            entries.append(Entry(f"file:{file.path}", file.name, "file", when, reason=reason))
+        return entries
 
     def _examples(self) -> list[Entry]:
         examples = self._shell.examples
@@ -104,7 +104,7 @@ class PaletteEntries:
         topics, networks = self._session.topics, self._session.networks
         if (topics.revision, networks.revision) != self._topics_seen:
             self._topics_seen = topics.revision, networks.revision
-            there = [
+            current_topics = [
                 *topics.existing_topics(),
                 *(topic for topic in networks.topics if topic.gone_since is None),
             ]
@@ -115,6 +115,6 @@ class PaletteEntries:
                     TOPIC_ICONS.get(topic.codec, "list"),
                     topic.msg_type,
                 )
-                for topic in there
+                for topic in current_topics
             ]
         return self._topics

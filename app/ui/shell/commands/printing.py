@@ -29,14 +29,16 @@ MAX_DPI = 300
 class SupportsPrinting(Protocol):
     """Interface of a panel whose contents can be printed."""
 
-    def render_pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+    def render_pdf(
+        self, title: str, date: str, layout: QPageLayout, callback: Callable[[bytes], None]
+    ) -> None:
         """Render the contents as a PDF document.
 
         Args:
             title: Title of the document.
             date: Formatted date, printed on each page.
             layout: Page size, orientation and margins.
-            done: Called with the PDF data; b"" if there is nothing to print.
+            callback: Called with the PDF data; b"" if there is nothing to print.
         """
 
 
@@ -47,11 +49,11 @@ class PrintCommands:
         self,
         shell: Shell,
         session: Session,
-        asks: FileDialogs,
+        dialogs: FileDialogs,
         printers: Callable[[], list[str]] | None = None,
     ) -> None:
         # `printers` returns the names of the computer's printers.
-        self._shell, self._session, self._asks = shell, session, asks
+        self._shell, self._session, self._asks = shell, session, dialogs
         self._printers = printers if printers is not None else printer_names
 
     def show_dialog(self) -> None:
@@ -99,29 +101,29 @@ class PrintCommands:
 
     def save(self, path: Path) -> None:
         """Save the blocks as PDF, adding the file extension ".pdf" if it is missing."""
-        whole = path if path.suffix.lower() == ".pdf" else path.with_name(f"{path.name}.pdf")
+        pdf_path = path if path.suffix.lower() == ".pdf" else path.with_name(f"{path.name}.pdf")
 
         def write(data: bytes) -> None:
             if not data:
                 self._notify_no_blocks()
                 return
             try:
-                write_atomically(whole, data)
+                write_atomically(pdf_path, data)
             except OSError as error:
                 self._shell.show_toast(
                     _("Can't save the PDF: {why}").format(why=error.strerror or str(error))
                 )
             else:
-                self._shell.show_toast(_("Saved {name}").format(name=whole.name))
+                self._shell.show_toast(_("Saved {name}").format(name=pdf_path.name))
 
         self._render(default_page_layout(), write)
 
-    def _render(self, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+    def _render(self, layout: QPageLayout, callback: Callable[[bytes], None]) -> None:
         editor = self._shell.editor()
         if isinstance(editor, SupportsPrinting):
             today = dt.datetime.now().astimezone()
             date = day_text(today.day, today.month, today.year)
-            editor.render_pdf(self._session.document.name, date, layout, done)
+            editor.render_pdf(self._session.document.name, date, layout, callback)
 
     def _notify_no_blocks(self) -> None:
         self._shell.show_toast(_("This page has no blocks"))

@@ -33,8 +33,8 @@ def suggested_path(document: Document) -> Path:
 
     The folder is that of the behaviour's file; for files in Studio's own folder it is the home folder.
     """
-    own = document.path
-    folder = own.parent if own is not None and own.parent != closed_tabs_folder() else Path.home()
+    path = document.path
+    folder = path.parent if path is not None and path.parent != closed_tabs_folder() else Path.home()
     return folder / document.name
 
 
@@ -42,21 +42,21 @@ def suggested_path(document: Document) -> Path:
 class SupportsPicture(Protocol):
     """Interface of a panel that can render an image of its contents."""
 
-    def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+    def picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
         """Render all blocks.
 
         Args:
             kind: Image format, "png" or "svg".
             white: True for a white background, False for a transparent one.
-            done: Called with the image data; b"" if there are no blocks.
+            callback: Called with the image data; b"" if there are no blocks.
         """
 
 
 class ImageCommands:
     """Handlers that save or copy an image of the current behaviour's blocks."""
 
-    def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
-        self._shell, self._session, self._asks = shell, session, asks
+    def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
+        self._shell, self._session, self._asks = shell, session, dialogs
 
     def ask_save(self) -> None:
         """Ask for a file and format, then save the image."""
@@ -75,20 +75,20 @@ class ImageCommands:
             kind: Image format, "png" or "svg".
             white: True for a white background, False for a transparent one.
         """
-        whole = path if path.suffix.lower() == f".{kind}" else path.with_name(f"{path.name}.{kind}")
+        image_path = path if path.suffix.lower() == f".{kind}" else path.with_name(f"{path.name}.{kind}")
 
         def write(data: bytes) -> None:
             if not data:
                 self._notify_no_blocks()
                 return
             try:
-                write_atomically(whole, data)
+                write_atomically(image_path, data)
             except OSError as error:
                 self._shell.show_toast(
                     _("Can't save the image: {why}").format(why=error.strerror or str(error))
                 )
             else:
-                self._shell.show_toast(_("Saved {name}").format(name=whole.name))
+                self._shell.show_toast(_("Saved {name}").format(name=image_path.name))
 
         self._render(kind, white, write)
 
@@ -105,10 +105,10 @@ class ImageCommands:
 
         self._render("png", True, copy_image)
 
-    def _render(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+    def _render(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
         editor = self._shell.editor()
         if isinstance(editor, SupportsPicture):
-            editor.picture(kind, white, done)
+            editor.picture(kind, white, callback)
 
     def _notify_no_blocks(self) -> None:
         self._shell.show_toast(_("This page has no blocks"))

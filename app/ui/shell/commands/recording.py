@@ -32,8 +32,8 @@ class SupportsRecordings(Protocol):
 class RecordCommands:
     """Handlers of the commands for recording, used by shortcuts, menus, the tool bar and the sheet."""
 
-    def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
-        self._shell, self._session, self._asks = shell, session, asks
+    def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
+        self._shell, self._session, self._asks = shell, session, dialogs
         self._recordings = session.recordings
         self._recordings.on_made = self._on_saved
         self._sheet: record_sheet.RecordSheet | None = None
@@ -52,14 +52,14 @@ class RecordCommands:
         self.open_sheet()
 
     def _start(self, choice: RecordingChoice | None = None) -> bool:
-        why_not = self._recordings.record(choice=choice)
-        if why_not and choice is None:
-            self._shell.show_toast(why_not, _("Choose topics to record"), self.open_sheet)
-        elif why_not:
-            self._shell.show_toast(why_not)
+        reason = self._recordings.record(choice=choice)
+        if reason and choice is None:
+            self._shell.show_toast(reason, _("Choose topics to record"), self.open_sheet)
+        elif reason:
+            self._shell.show_toast(reason)
         elif self._session.master.kind != "connected":
             self._shell.show_toast(_("Recording starts as soon as a master appears"))
-        return not why_not
+        return not reason
 
     def record_topic(self, key: str) -> bool:
         """Start a recording of a single topic, without changing the saved settings.
@@ -100,15 +100,15 @@ class RecordCommands:
                 self._enable_flight_recorder,
             )
             return
-        why_not = recordings.save_last()
-        if why_not:
-            self._shell.show_toast(why_not)
+        reason = recordings.save_last()
+        if reason:
+            self._shell.show_toast(reason)
 
     def _enable_flight_recorder(self) -> None:
         recordings = self._recordings
         recordings.set_ring_settings(replace(recordings.wish, is_on=True))
-        words = _("The flight recorder now keeps the last {count} s")
-        self._shell.show_toast(words.format(count=recordings.wish.seconds))
+        message = _("The flight recorder now keeps the last {count} s")
+        self._shell.show_toast(message.format(count=recordings.wish.seconds))
 
     def show(self, path: Path | None = None) -> None:
         """Show the recordings panel and select a recording in it, if one is given."""
@@ -129,8 +129,8 @@ class RecordCommands:
         if path.parent == self._recordings.folder:
             self.show(path)
         else:
-            words = _("{file} is in another folder. Choose that folder for recordings first")
-            self._shell.show_toast(words.format(file=path.name), _("Choose a folder"), self.ask_folder)
+            message = _("{file} is in another folder. Choose that folder for recordings first")
+            self._shell.show_toast(message.format(file=path.name), _("Choose a folder"), self.ask_folder)
 
     def ask_folder(self) -> None:
         """Ask for the folder in which recordings are saved."""
@@ -140,19 +140,19 @@ class RecordCommands:
             recordings.set_folder(folder)
             self._shell.show_toast(_("Recordings are saved in {folder}").format(folder=folder))
 
-        place = recordings.folder
-        self._asks.select_folder(str(place if place.is_dir() else Path.home()), take)
+        start_folder = recordings.folder
+        self._asks.select_folder(str(start_folder if start_folder.is_dir() else Path.home()), take)
 
     def _on_saved(self, path: Path, kind: str) -> None:
         if kind == "kept":
-            words = _("Saved the last seconds: {file}").format(file=path.stem)
+            message = _("Saved the last seconds: {file}").format(file=path.stem)
         else:
             state = self._recordings.client.state
-            words = {
+            message = {
                 "time": _("Recording stopped at the time limit: {file}, {length}, {size}"),
                 "size": _("Recording stopped at the size limit: {file}, {length}, {size}"),
             }.get(state.reached_limit, _("Saved recording {file}: {length}, {size}"))
-            words = words.format(
+            message = message.format(
                 file=path.stem, length=length_text(state.duration_s), size=size_text(state.size_bytes)
             )
-        self._shell.show_toast(words, _("Show"), lambda: self.show(path))
+        self._shell.show_toast(message, _("Show"), lambda: self.show(path))

@@ -27,14 +27,14 @@ TIMELINE_PANEL = "timeline"
 class ReplayCommands:
     """Handlers of the commands that show a recording in place of the live network."""
 
-    def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
-        self._shell, self._session, self._asks = shell, session, asks
+    def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
+        self._shell, self._session, self._asks = shell, session, dialogs
 
     def ask_open(self) -> None:
         """Ask for a recording and open it."""
         replay = self._session.replay
-        place = replay.path.parent if replay is not None else folder.default_folder()
-        self._asks.open_recording(str(place), self.open)
+        start_folder = replay.path.parent if replay is not None else folder.default_folder()
+        self._asks.open_recording(str(start_folder), self.open)
 
     def open(self, path: Path) -> None:
         """Open a recording and show the timeline; an error is shown as an alert."""
@@ -71,12 +71,12 @@ class ReplayCommands:
         if replay is None:
             return
         try:
-            made = replay.bookmark()
+            bookmark = replay.bookmark()
         except RecordingError as error:
-            sentence = f"{error.reason[:1].upper()}{error.reason[1:]}."
+            message = f"{error.reason[:1].upper()}{error.reason[1:]}."
             self._session.alerts.raise_alert(
-                "recording:bookmark", "error", _("Can't save the bookmark."), sentence
+                "recording:bookmark", "error", _("Can't save the bookmark."), message
             )
             return
-        if made is not None:
-            self._shell.show_toast(_("Added a bookmark"), _("Undo"), lambda: replay.remove_bookmark(made))
+        if bookmark is not None:
+            self._shell.show_toast(_("Added a bookmark"), _("Undo"), lambda: replay.remove_bookmark(bookmark))

@@ -42,11 +42,11 @@ class ReportCommands:
         shell: Shell,
         session: Session,
         files: DocumentController,
-        asks: FileDialogs,
+        dialogs: FileDialogs,
         clock: Callable[[], float] = time.time,
     ) -> None:
         # `clock` returns seconds since 1970.
-        self._shell, self._session, self._files, self._asks = shell, session, files, asks
+        self._shell, self._session, self._files, self._asks = shell, session, files, dialogs
         self._clock = clock
         self._sheet: report_sheet.ReportSheet | None = None
 
@@ -88,12 +88,12 @@ class ReportCommands:
         Studio itself sends no request.
         """
         opened = open_externally(QUrl(page))
-        words = (
+        message = (
             _("This is NEP Studio {version}. The newest version is shown in your browser.")
             if opened
             else _("This is NEP Studio {version}. You'll find newer versions at {page}")
         )
-        self._shell.show_toast(words.format(version=__version__, page=page))
+        self._shell.show_toast(message.format(version=__version__, page=page))
 
 
 def qt_info(window: QWidget) -> tuple[tuple[str, str], ...]:
@@ -103,8 +103,8 @@ def qt_info(window: QWidget) -> tuple[tuple[str, str], ...]:
         Pairs of name and value, in English, because developers read the reports.
     """
     screens = [
-        (f"screen {place}", f"{size.width()} x {size.height()} at {each.devicePixelRatio():g}, {rate:.0f} Hz")
-        for place, each in enumerate(QGuiApplication.screens(), start=1)
+        (f"screen {index}", f"{size.width()} x {size.height()} at {each.devicePixelRatio():g}, {rate:.0f} Hz")
+        for index, each in enumerate(QGuiApplication.screens(), start=1)
         for size, rate in ((each.size(), each.refreshRate()),)
     ]
     return (

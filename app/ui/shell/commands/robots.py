@@ -96,9 +96,9 @@ class RobotCommands:
             False if there is no such robot.
         """
         launcher = self._session.launcher
-        names = [each for each in launcher.wanted if name in {"", each}]
-        for each in names:
-            launcher.stop_virtual_robot(each)
+        names = [robot for robot in launcher.wanted if name in {"", robot}]
+        for robot in names:
+            launcher.stop_virtual_robot(robot)
         return bool(names)
 
     def toggle_room_full_screen(self) -> None:
@@ -151,22 +151,22 @@ class RobotCommands:
 
         def replace() -> None:
             if document.replace_missing_robot(swap.missing, robot):
-                words = _("Replaced {other} with {robot}")
-                words = words.format(robot=swap.replacement, other=swap.missing)
-                self._shell.show_toast(words, _("Undo"), self._undo)
+                message = _("Replaced {other} with {robot}")
+                message = message.format(robot=swap.replacement, other=swap.missing)
+                self._shell.show_toast(message, _("Undo"), self._undo)
 
         self._files.run_after_flush(replace)
         return True
 
     def revoke_motion_permissions(self) -> None:
         """Revoke all permissions of real robots to move, so that Studio asks again before a movement."""
-        words = _("Studio will ask again before a real robot moves")
+        message = _("Studio will ask again before a real robot moves")
         try:
             self._session.fleet.permission.revoke_all()
         except SettingsError as error:
             self._shell.log_problem(str(error))
-            words = _("Until you close Studio, it will ask again before a real robot moves")
-        self._shell.show_toast(words)
+            message = _("Until you close Studio, it will ask again before a real robot moves")
+        self._shell.show_toast(message)
 
     def open_network_access(self) -> None:
         """Open the sheet that controls access from other computers."""

@@ -60,7 +60,7 @@ class Shell(Protocol):
     def show_toast(self) -> ShowToast:
         """Function that shows a toast, see `Toast`."""
 
-    def log_problem(self, sentence: str) -> None:
+    def log_problem(self, message: str) -> None:
         """Log a sentence to the Console, about a problem that requires no action."""
 
     def editor(self) -> object:

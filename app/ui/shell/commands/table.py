@@ -61,86 +61,86 @@ class Handlers:
 # Reasons why commands are unavailable, shown in the palette.
 
 
-def _run_disabled_reason(do: Handlers) -> str:
-    view = do.session.runs.view()
+def _run_disabled_reason(handlers: Handlers) -> str:
+    view = handlers.session.runs.view()
     if view.can_run or view.can_restart:
         return ""
     return _(RUN_DISABLED_REASONS.get(view.state, NOTHING_TO_RUN_TEXT))
 
 
-def _restart_disabled_reason(do: Handlers) -> str:
-    return "" if do.session.runs.active else _("Nothing is running")
+def _restart_disabled_reason(handlers: Handlers) -> str:
+    return "" if handlers.session.runs.active else _("Nothing is running")
 
 
-def _pause_disabled_reason(do: Handlers) -> str:
-    view = do.session.runs.view()
+def _pause_disabled_reason(handlers: Handlers) -> str:
+    view = handlers.session.runs.view()
     if view.can_pause:
         return ""
     return _("Already paused") if view.state == "paused" else _("Nothing is running")
 
 
-def _step_disabled_reason(do: Handlers) -> str:
-    view = do.session.runs.view()
+def _step_disabled_reason(handlers: Handlers) -> str:
+    view = handlers.session.runs.view()
     return "" if view.can_step else _(RUN_DISABLED_REASONS.get(view.state, NOTHING_TO_RUN_TEXT))
 
 
-def _editor_disabled_reason(do: Handlers) -> str:
-    return "" if do.shell.current_layout == "behaviour" else _("Only in the Behaviour layout")
+def _editor_disabled_reason(handlers: Handlers) -> str:
+    return "" if handlers.shell.current_layout == "behaviour" else _("Only in the Behaviour layout")
 
 
-def _panels_disabled_reason(do: Handlers) -> str:
-    return _("The start page has no panels") if do.shell.bench is None else ""
+def _panels_disabled_reason(handlers: Handlers) -> str:
+    return _("The start page has no panels") if handlers.shell.bench is None else ""
 
 
-def _custom_layout_disabled_reason(do: Handlers) -> str:
-    if do.shell.saved_layouts.custom_name(do.shell.current_layout):
+def _custom_layout_disabled_reason(handlers: Handlers) -> str:
+    if handlers.shell.saved_layouts.custom_name(handlers.shell.current_layout):
         return ""
-    return _panels_disabled_reason(do) or _("Built-in layouts can't be changed")
+    return _panels_disabled_reason(handlers) or _("Built-in layouts can't be changed")
 
 
-def _previous_layout_disabled_reason(do: Handlers) -> str:
-    if do.shell.current_layout != START_PAGE:
+def _previous_layout_disabled_reason(handlers: Handlers) -> str:
+    if handlers.shell.current_layout != START_PAGE:
         return _("Only on the start page")
-    return "" if do.shell.left else _("Nothing open")
+    return "" if handlers.shell.left else _("Nothing open")
 
 
-def _freeze_disabled_reason(do: Handlers) -> str:
-    return "" if freeze_buttons(do.shell.bench) else _("Nothing to freeze here")
+def _freeze_disabled_reason(handlers: Handlers) -> str:
+    return "" if freeze_buttons(handlers.shell.bench) else _("Nothing to freeze here")
 
 
-def _recent_disabled_reason(do: Handlers) -> str:
-    return "" if do.session.settings.all_recent_files else _("The list is empty")
+def _recent_disabled_reason(handlers: Handlers) -> str:
+    return "" if handlers.session.settings.all_recent_files else _("The list is empty")
 
 
-def _open_recording_disabled_reason(do: Handlers) -> str:
-    return "" if do.session.replay is not None else _("No recording is open")
+def _open_recording_disabled_reason(handlers: Handlers) -> str:
+    return "" if handlers.session.replay is not None else _("No recording is open")
 
 
-def _loaded_recording_disabled_reason(do: Handlers) -> str:
-    if do.session.replay is None:
-        return _open_recording_disabled_reason(do)
-    return "" if do.session.replay.player is not None else _("The recording is still opening")
+def _loaded_recording_disabled_reason(handlers: Handlers) -> str:
+    if handlers.session.replay is None:
+        return _open_recording_disabled_reason(handlers)
+    return "" if handlers.session.replay.player is not None else _("The recording is still opening")
 
 
-def _room_disabled_reason(do: Handlers) -> str:
-    there = any(link.is_virtual for link in do.session.fleet.connected)
-    return "" if there else _("No virtual robots")
+def _room_disabled_reason(handlers: Handlers) -> str:
+    has_virtual = any(link.is_virtual for link in handlers.session.fleet.connected)
+    return "" if has_virtual else _("No virtual robots")
 
 
-def _virtual_robot_disabled_reason(do: Handlers) -> str:
-    return "" if do.session.launcher.wanted else _("No virtual robot was started in this window")
+def _virtual_robot_disabled_reason(handlers: Handlers) -> str:
+    return "" if handlers.session.launcher.wanted else _("No virtual robot was started in this window")
 
 
-def _recording_disabled_reason(do: Handlers) -> str:
-    return "" if do.session.recordings.is_recording else _("Not recording")
+def _recording_disabled_reason(handlers: Handlers) -> str:
+    return "" if handlers.session.recordings.is_recording else _("Not recording")
 
 
-def _larger_text_disabled_reason(do: Handlers) -> str:
-    return _("Text is at its largest") if do.shell.theme.text_percent >= TEXT_PERCENT_RANGE[1] else ""
+def _larger_text_disabled_reason(handlers: Handlers) -> str:
+    return _("Text is at its largest") if handlers.shell.theme.text_percent >= TEXT_PERCENT_RANGE[1] else ""
 
 
-def _smaller_text_disabled_reason(do: Handlers) -> str:
-    return _("Text is at its smallest") if do.shell.theme.text_percent <= TEXT_PERCENT_RANGE[0] else ""
+def _smaller_text_disabled_reason(handlers: Handlers) -> str:
+    return _("Text is at its smallest") if handlers.shell.theme.text_percent <= TEXT_PERCENT_RANGE[0] else ""
 
 
 C = Command[Handlers]
@@ -157,17 +157,17 @@ def _go_to_panel(number: int) -> C:
     )
 
 
-def _edit(what: Edit, text: str, key: str, icon: str, *, above: bool = False) -> C:
+def _edit(edit: Edit, text: str, key: str, icon: str, *, above: bool = False) -> C:
     # A menu entry only; the focused widget handles its key.
     return C(
-        f"edit.{what}",
+        f"edit.{edit}",
         text,
-        lambda do: do.editing.run(what),
+        lambda do: do.editing.run(edit),
         "Edit",
         icon=icon,
         displayed_key=key,
         separator_above=above,
-        disabled_reason=lambda do: do.editing.disabled_reason(what),
+        disabled_reason=lambda do: do.editing.disabled_reason(edit),
         in_palette=False,
         in_shortcuts=False,
     )

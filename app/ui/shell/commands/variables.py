@@ -52,9 +52,9 @@ class VariableCommands:
         verb = _("Create")
 
         def ask_name() -> None:
-            take = lambda name: self._edit({"do": "new", "name": name, "list": is_list})  # noqa: E731
+            callback = lambda name: self._edit({"do": "new", "name": name, "list": is_list})  # noqa: E731
             self._get_name_sheet().ask(
-                question, verb, self.rejection_reason, take, self._free_name(is_list=is_list)
+                question, verb, self.rejection_reason, callback, self._free_name(is_list=is_list)
             )
 
         self._run_after_flush(ask_name)
@@ -94,14 +94,14 @@ class VariableCommands:
             if name is None:
                 return
             self._edit({"do": "delete", "id": id})
-            said = _("Deleted “{name}”").format(name=name)
+            message = _("Deleted “{name}”").format(name=name)
             if count:
-                said = ngettext(
+                message = ngettext(
                     "Deleted “{name}” and {count} block that used it",
                     "Deleted “{name}” and {count} blocks that used it",
                     count,
                 ).format(name=name, count=count)
-            self._shell.show_toast(said, _("Undo"), lambda: self._edit({"do": "undo"}))
+            self._shell.show_toast(message, _("Undo"), lambda: self._edit({"do": "undo"}))
 
         self._run_after_flush(delete)
 
@@ -116,9 +116,9 @@ class VariableCommands:
             uses = uses_of(self._workspace(), id)
             before = self._used_before.get(id, "")
             if uses:
-                place = (uses.index(before) + 1) % len(uses) if before in uses else 0
-                self._used_before = {id: uses[place]}
-                self._edit({"do": "show", "id": uses[place]})
+                index = (uses.index(before) + 1) % len(uses) if before in uses else 0
+                self._used_before = {id: uses[index]}
+                self._edit({"do": "show", "id": uses[index]})
 
         self._run_after_flush(show)
 
@@ -130,8 +130,8 @@ class VariableCommands:
         if name is None or not runs.active:
             return
 
-        def take(words: str) -> None:
-            if not runs.set_variable(id, parse_value(words)):
+        def take(text: str) -> None:
+            if not runs.set_variable(id, parse_value(text)):
                 self._shell.show_toast(_("The behaviour ended: “{name}” wasn't changed").format(name=name))
 
         is_number = now is not None and now.kind == "number"
@@ -143,19 +143,19 @@ class VariableCommands:
             now.text if now is not None and now.kind in ("number", "text", "boolean") else "",
         )
 
-    def rejection_reason(self, name: str, own: str = "") -> str:
+    def rejection_reason(self, name: str, own_id: str = "") -> str:
         """Return the reason why a variable name is invalid, as a sentence, or "".
 
         Args:
             name: Name to check.
-            own: Id of the variable that is renamed, which may keep its name; "" for a new variable.
+            own_id: Id of the variable that is renamed, which may keep its name; "" for a new variable.
         """
         if not name:
             return _("Enter a name for the variable.")
         if len(name) > MAX_NAME_LENGTH:
             return _("This name is too long. Use at most {most} characters.").format(most=MAX_NAME_LENGTH)
-        used = {each.casefold() for id, each in self._workspace().variables.items() if id != own}
-        if name.casefold() in used:
+        existing_names = {each.casefold() for id, each in self._workspace().variables.items() if id != own_id}
+        if name.casefold() in existing_names:
             return _("A variable named “{name}” already exists. Choose another name.").format(name=name)
         return ""
 
@@ -179,46 +179,46 @@ class VariableCommands:
 
 def uses_of(workspace: Workspace, id: str) -> list[str]:
     """Return the ids of the blocks that set, change or read a variable, in the order of the page."""
-    found: list[str] = []
+    block_ids: list[str] = []
     waiting: list[PlacedBlock] = [
-        placed for script in reversed(workspace.scripts) for placed in reversed(script)
+        block for script in reversed(workspace.scripts) for block in reversed(script)
     ]
     while waiting:
-        placed = waiting.pop()
-        if any(_refers_to(value, id) for value in placed.fields.values()):
-            found.append(placed.id)
-        waiting += [each for chain in reversed(list(placed.inputs.values())) for each in reversed(chain)]
-    return found
+        block = waiting.pop()
+        if any(_refers_to(value, id) for value in block.fields.values()):
+            block_ids.append(block.id)
+        waiting += [each for chain in reversed(list(block.inputs.values())) for each in reversed(chain)]
+    return block_ids
 
 
 def _refers_to(field: object, id: str) -> bool:
     return isinstance(field, Mapping) and field.get("id") == id
 
 
-def separator_problem(words: str) -> str:
+def separator_problem(text: str) -> str:
     """Return an error sentence if the text is a number with ambiguous separators, else ""."""
     try:
-        parse_number(words)
+        parse_number(text)
     except TypedNumberError as error:
         return str(error) if error.has_separators else ""
     return ""
 
 
-def parse_value(words: str) -> str | float | bool:
+def parse_value(text: str) -> str | float | bool:
     """Parse a typed value of a variable.
 
     Returns:
         A number, a boolean for "yes", "no" (in the user's language), "true" or "false", or else the
         text.
     """
-    plain = words.strip()
-    said = plain.casefold()
-    if said in ("true", _("yes").casefold()):
+    stripped = text.strip()
+    folded = stripped.casefold()
+    if folded in ("true", _("yes").casefold()):
         return True
-    if said in ("false", _("no").casefold()):
+    if folded in ("false", _("no").casefold()):
         return False
     try:
-        number = parse_number(plain)
-        return int(plain) if plain.lstrip("+-").isdecimal() else number
+        number = parse_number(stripped)
+        return int(stripped) if stripped.lstrip("+-").isdecimal() else number
     except ValueError:
-        return words
+        return text

@@ -130,14 +130,14 @@ class ViewCommands:
         The command "Find" has its shortcut only in the Behaviour layout; elsewhere the panels handle
         the key.
         """
-        here = self._shell.current_layout == "behaviour" and self._shell.bench is not None
-        of = self.shortcuts.keys_of
-        self._actions.set_keys(lambda name: of(name) if here or name != "blocks.find" else ())
+        is_behaviour = self._shell.current_layout == "behaviour" and self._shell.bench is not None
+        keys_of = self.shortcuts.keys_of
+        self._actions.set_keys(lambda name: keys_of(name) if is_behaviour or name != "blocks.find" else ())
 
     def run_shortcut(self, key: str) -> bool:
         """Run the command to which a shortcut is assigned; return False if none is available."""
-        holder = self.shortcuts.command_for(key)
-        return bool(holder) and self._actions.run(holder)
+        command = self.shortcuts.command_for(key)
+        return bool(command) and self._actions.run(command)
 
     def open_palette(self) -> None:
         """Open the command palette, or close it if it is open."""
@@ -146,8 +146,8 @@ class ViewCommands:
             self._palette = command_palette.CommandPalette(
                 shell.theme, shell.surface, self._entries.all, self.run_entry, self._rebind
             )
-            kept: list[object] = self._session.settings.get("palette_last", [])
-            self._palette.last = [id for id in kept if isinstance(id, str)]
+            saved_ids: list[object] = self._session.settings.get("palette_last", [])
+            self._palette.last = [id for id in saved_ids if isinstance(id, str)]
             self._palette.on_last = lambda ids: shell.state.save("palette_last", list(ids))
         self._palette.open()
 
@@ -200,10 +200,10 @@ class ViewCommands:
             dock.panel.add_alarm()
             return
         rule = self._session.alarms.create(about)
-        waits = about.kind in NUMBER_KINDS  # the limit has to be entered first
-        if waits:
+        needs_limit = about.kind in NUMBER_KINDS  # the limit has to be entered first
+        if needs_limit:
             self._session.alarms.set_rule(replace(rule, is_enabled=False))
-        dock.panel.edit(rule.id, "limit" if waits else "")
+        dock.panel.edit(rule.id, "limit" if needs_limit else "")
 
     def new_value_alarm(self, about: tuple[str, str]) -> None:
         """Create an alarm on a field of a topic.
@@ -214,8 +214,8 @@ class ViewCommands:
             about: Topic and field path.
         """
         topic, path = about
-        known = self._session.topics.get(topic)
-        newest = known.newest if known is not None else None
+        topic_state = self._session.topics.get(topic)
+        newest = topic_state.newest if topic_state is not None else None
         value: object = None
         with suppress(NepError):
             value = value_at(newest.payload, parse_path(path or ".")) if newest is not None else None
@@ -260,9 +260,9 @@ class ViewCommands:
         self._settings_sheet.open()
 
     def _restart(self) -> None:
-        why_not = self._shell.restart()
-        if why_not:
-            self._shell.show_toast(why_not)
+        reason = self._shell.restart()
+        if reason:
+            self._shell.show_toast(reason)
 
     def _voice_text(self) -> str:
         # Includes whether speech actually works: an engine can be installed without a voice.
@@ -290,11 +290,11 @@ class ViewCommands:
 
     def show_custom_layout(self, name: str) -> None:
         """Show the custom layout with this name, if it exists."""
-        own = self._shell.saved_layouts.named(name)
-        if own is not None:
-            bench = self._shell.show_layout(own.base)
-            self._shell.saved_layouts.switch(bench, own.base, name)
-            self._actions.select(f"layout.{own.base}")
+        custom_layout = self._shell.saved_layouts.named(name)
+        if custom_layout is not None:
+            bench = self._shell.show_layout(custom_layout.base)
+            self._shell.saved_layouts.switch(bench, custom_layout.base, name)
+            self._actions.select(f"layout.{custom_layout.base}")
 
     def reset_layout(self) -> None:
         """Restore the default arrangement of the panels in the current layout."""
@@ -314,13 +314,13 @@ class ViewCommands:
             return
 
         def save(name: str) -> None:
-            kept = arrangements.save_as(bench, base, name)
-            words = (
+            saved = arrangements.save_as(bench, base, name)
+            message = (
                 _("Saved layout “{name}”")
-                if kept
+                if saved
                 else _("Can't save layout “{name}”. It will be lost when Studio closes.")
             )
-            shell.show_toast(words.format(name=name))
+            shell.show_toast(message.format(name=name))
 
         self._get_name_sheet().ask(_("Save layout as"), _("Save"), arrangements.rejection_reason, save)
 
@@ -342,13 +342,13 @@ class ViewCommands:
         arrangements, shell = self._shell.saved_layouts, self._shell
         name = arrangements.custom_name(shell.current_layout)
         if name:
-            kept, undo = arrangements.delete(shell.bench, name)
-            words = (
+            saved, undo = arrangements.delete(shell.bench, name)
+            message = (
                 _("Deleted the layout “{name}”")
-                if kept
+                if saved
                 else _("Can't save this change: “{name}” will reappear when Studio restarts")
             )
-            shell.show_toast(words.format(name=name), _("Undo"), undo)
+            shell.show_toast(message.format(name=name), _("Undo"), undo)
 
     def export_layout(self) -> None:
         """Ask for a file and export the current layout to it."""
@@ -379,32 +379,38 @@ class ViewCommands:
         """Import a layout file and show the layout; an error is shown in a toast."""
         shell = self._shell
         try:
-            found = decode_layout(read_regular_file(path, MAX_BYTES), path.stem, shell.panels)
+            imported_layout = decode_layout(read_regular_file(path, MAX_BYTES), path.stem, shell.panels)
         except (OSError, LayoutFileError) as error:
             reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
             reason = f"{reason[:1].lower()}{reason[1:]}"
             shell.show_toast(_("Can't open {file}: {reason}").format(file=path.name, reason=reason))
             return
-        layouts, before = shell.saved_layouts, shell.saved_layouts.custom_name(found.base)
-        if not layouts.can_restore(shell.show_layout(found.base), found.base, found.saved):
+        layouts, before = shell.saved_layouts, shell.saved_layouts.custom_name(imported_layout.base)
+        if not layouts.can_restore(
+            shell.show_layout(imported_layout.base), imported_layout.base, imported_layout.saved
+        ):
             shell.show_toast(
                 _("Can't open {file}: {reason}").format(file=path.name, reason=_("the file is damaged"))
             )
             return
-        name, _is_kept = layouts.import_layout(found.name, found.base, found.saved)
+        name, _is_kept = layouts.import_layout(
+            imported_layout.name, imported_layout.base, imported_layout.saved
+        )
         self.show_custom_layout(name)
 
         def undo() -> None:
-            bench = shell.bench if shell.current_layout == found.base else None
+            bench = shell.bench if shell.current_layout == imported_layout.base else None
             layouts.delete(bench, name)
             if before and bench is not None:
-                layouts.switch(bench, found.base, before)
+                layouts.switch(bench, imported_layout.base, before)
 
-        words = _("Opened the layout “{name}”").format(name=name)
-        if found.unknown_panels:
-            left_out = format_list(list(found.unknown_panels[:MAX_NAMED]))
-            words = _("{opened}. Unknown panels were skipped: {panels}").format(opened=words, panels=left_out)
-        shell.show_toast(words, _("Undo"), undo)
+        message = _("Opened the layout “{name}”").format(name=name)
+        if imported_layout.unknown_panels:
+            left_out = format_list(list(imported_layout.unknown_panels[:MAX_NAMED]))
+            message = _("{opened}. Unknown panels were skipped: {panels}").format(
+                opened=message, panels=left_out
+            )
+        shell.show_toast(message, _("Undo"), undo)
 
     def freeze(self) -> None:
         """Freeze all panels, or unfreeze them if all are frozen."""

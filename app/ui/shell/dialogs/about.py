@@ -40,23 +40,23 @@ class AboutSheet(Overlay):
 
     top = 96
 
-    def __init__(self, theme: Theme, window: QWidget, say: Callable[[str], object]) -> None:
+    def __init__(self, theme: Theme, window: QWidget, notify: Callable[[str], object]) -> None:
         # `say` confirms that the versions were copied.
         super().__init__(theme, window, TITLE)
-        self._say = say
+        self._say = notify
         column = QVBoxLayout(self)
         column.setContentsMargins(20, 16, 20, 18)
         column.setSpacing(12)
-        head = QHBoxLayout()
-        head.addWidget(label(TITLE, "heading", wrap=True), 1)
+        header = QHBoxLayout()
+        header.addWidget(label(TITLE, "heading", wrap=True), 1)
         self._close = IconButton(theme, "x", _("Close"), "Esc")
         self._close.clicked.connect(self.dismiss)
-        head.addWidget(self._close)
-        column.addLayout(head)
+        header.addWidget(self._close)
+        column.addLayout(header)
         lines = QVBoxLayout()
         lines.setSpacing(6)
-        for words in TEXT_LINES:
-            lines.addWidget(label(_(words), "body", role="textSecondary", wrap=True))
+        for text in TEXT_LINES:
+            lines.addWidget(label(_(text), "body", role="textSecondary", wrap=True))
         column.addLayout(lines)
         grid = QGridLayout()
         grid.setHorizontalSpacing(16)
@@ -64,16 +64,16 @@ class AboutSheet(Overlay):
         grid.setColumnStretch(1, 1)
         for row, (name, version) in enumerate(versions()):
             grid.addWidget(label(name, "body", role="textSecondary"), row, 0, Qt.AlignmentFlag.AlignTop)
-            said = label(version, "body", wrap=True)
-            said.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-            grid.addWidget(said, row, 1)
+            version_label = label(version, "body", wrap=True)
+            version_label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+            grid.addWidget(version_label, row, 1)
         column.addLayout(grid)
         self.copy = Button(theme, _("Copy version information"), "copy", size="form")
         self.copy.clicked.connect(self._copy)
-        foot = QHBoxLayout()
-        foot.addWidget(self.copy)
-        foot.addStretch(1)
-        column.addLayout(foot)
+        footer = QHBoxLayout()
+        footer.addWidget(self.copy)
+        footer.addStretch(1)
+        column.addLayout(footer)
         self.closed.connect(self.deleteLater)
         self.closed.connect(self._scrim.deleteLater)
 
@@ -86,7 +86,7 @@ class AboutSheet(Overlay):
         return self._close
 
     def preferred_size(self, room: QSize) -> QSize:
-        wide = min(room.width(), round(self.theme.scaled(WIDTH)))
+        width = min(room.width(), round(self.theme.scaled(WIDTH)))
         layout = self.layout()
-        high = layout.totalHeightForWidth(wide) if layout is not None else 0
-        return QSize(wide, min(room.height(), high))
+        height = layout.totalHeightForWidth(width) if layout is not None else 0
+        return QSize(width, min(room.height(), height))

@@ -52,8 +52,8 @@ class _Field(QLineEdit):
         super().paintEvent(event)
         painter = QPainter(self)
         middle, side = self.height() / 2, self._theme.scaled(20)
-        square = QRectF(18, middle - side / 2, side, side)
-        paint_icon(painter, square, "search", self._theme.colour("textSecondary"))
+        icon_area = QRectF(18, middle - side / 2, side, side)
+        paint_icon(painter, icon_area, "search", self._theme.colour("textSecondary"))
         paint.key_cap(painter, self._theme, self.width() - 19, middle, shortcut_text("Esc"))
         paint.hairline(painter, QRectF(self.rect()), Qt.Edge.BottomEdge, self._theme.colour("border"))
         painter.end()
@@ -80,21 +80,21 @@ class _Footer(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
         font, quiet = theme.font("body"), theme.colour("textSecondary")
-        middle, left = self.height() / 2, 18.0
+        middle, x = self.height() / 2, 18.0
         paint.hairline(painter, QRectF(self.rect()), Qt.Edge.TopEdge, theme.colour("border"))
         count = paint.width_of(font, self.counted)
-        for keys, words in self.KEY_HINTS:
-            said = _(words)
+        for keys, hint in self.KEY_HINTS:
+            text = _(hint)
             caps = [shortcut_text(key) for key in keys]
-            wide = sum(paint.key_width(theme, cap) + 5 for cap in caps) + paint.width_of(font, said)
-            if left + wide > self.width() - count - 40:
+            width = sum(paint.key_width(theme, cap) + 5 for cap in caps) + paint.width_of(font, text)
+            if x + width > self.width() - count - 40:
                 break
             for cap in caps:
-                left = paint.key_cap(painter, theme, left + paint.key_width(theme, cap), middle, cap).right()
-                left += 5
-            area = QRectF(left + 1, 0, 400, self.height())
-            paint.text_line(painter, area, said, font, quiet)
-            left += paint.width_of(font, said) + 17
+                x = paint.key_cap(painter, theme, x + paint.key_width(theme, cap), middle, cap).right()
+                x += 5
+            area = QRectF(x + 1, 0, 400, self.height())
+            paint.text_line(painter, area, text, font, quiet)
+            x += paint.width_of(font, text) + 17
         area = QRectF(0, 0, self.width() - 19, self.height())
         paint.text_line(painter, area, self.counted, font, quiet, paint.RIGHT)
         painter.end()
@@ -166,9 +166,9 @@ class CommandPalette(Overlay):
     def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
         rows = min(self.rows.content_height(), round(scaled(40) * MAX_VISIBLE_ROWS)) + 8
-        shown = rows if self.rows.lines.lines else self.nothing.sizeHint().height()
-        high = self.field.height() + shown + self.foot.height() + 2
-        return QSize(min(room.width(), round(scaled(WIDTH))), min(room.height(), high))
+        content_height = rows if self.rows.lines.lines else self.nothing.sizeHint().height()
+        height = self.field.height() + content_height + self.foot.height() + 2
+        return QSize(min(room.width(), round(scaled(WIDTH))), min(room.height(), height))
 
     def _restyle(self) -> None:
         self.field.restyle()
@@ -179,13 +179,13 @@ class CommandPalette(Overlay):
         query = self.field.text().strip()
         lines = self._default_lines() if not query else []
         if query:
-            found, count = self._finder.find(query, MAX_RESULTS)
+            matches, count = self._finder.find(query, MAX_RESULTS)
             self.foot.counted = _("{shown} of {count}").format(shown=count, count=len(self._finder.entries))
-            for each in found:
-                heading = Heading(_(GROUP_TITLES[each.entry.kind]))
+            for match in matches:
+                heading = Heading(_(GROUP_TITLES[match.entry.kind]))
                 if heading not in lines:
                     lines.append(heading)
-                lines.append(each)
+                lines.append(match)
         self.nothing.setText(_("No results for “{words}”.").format(words=query))
         paint.show_when(self.nothing, not lines)
         paint.show_when(self.rows, bool(lines))
@@ -196,8 +196,8 @@ class CommandPalette(Overlay):
     def _default_lines(self) -> list[Line]:
         # The last used entries, then the first ones of each kind.
         entries = self._finder.entries
-        known = {entry.id: entry for entry in entries if entry.id in self.last}
-        last = [known[id] for id in self.last if id in known][:MAX_LAST_SHOWN]
+        entries_by_id = {entry.id: entry for entry in entries if entry.id in self.last}
+        last = [entries_by_id[id] for id in self.last if id in entries_by_id][:MAX_LAST_SHOWN]
         lines: list[Line] = [Heading(_(GROUP_TITLES["recent"])), *map(Match, last)] if last else []
         kinds: dict[str, list[Match]] = {}
         for entry in entries:
@@ -221,8 +221,8 @@ class CommandPalette(Overlay):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self.field and event.type() == QEvent.Type.KeyPress:
             pressed = cast("QKeyEvent", event)
-            plain = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
-            if plain and self.rows.handle(pressed.key()):
+            is_unmodified = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+            if is_unmodified and self.rows.handle(pressed.key()):
                 return True
             if pressed.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
                 if pressed.modifiers() & Qt.KeyboardModifier.ControlModifier:

@@ -105,7 +105,7 @@ def known_locations(studio: Path, recent: Iterable[Path]) -> tuple[FolderLocatio
         recent: Recent files, whose folders are included.
     """
     kinds = QStandardPaths.StandardLocation
-    found = [
+    candidates = [
         FolderLocation(_("Home"), "house", Path.home()),
         FolderLocation(_("Desktop"), "monitor", _standard_folder(kinds.DesktopLocation)),
         FolderLocation(_("Documents"), "file-text", _standard_folder(kinds.DocumentsLocation)),
@@ -113,11 +113,11 @@ def known_locations(studio: Path, recent: Iterable[Path]) -> tuple[FolderLocatio
         FolderLocation(_("Backed up by Studio"), "archive", studio),
         *(FolderLocation(path.parent.name or str(path.parent), "history", path.parent) for path in recent),
     ]
-    made: list[FolderLocation] = []
-    for place in found:
-        if place.folder.is_dir() and place.folder not in [each.folder for each in made]:
-            made.append(place)
-    return tuple(made)
+    locations: list[FolderLocation] = []
+    for location in candidates:
+        if location.folder.is_dir() and location.folder not in [each.folder for each in locations]:
+            locations.append(location)
+    return tuple(locations)
 
 
 def _standard_folder(kind: QStandardPaths.StandardLocation) -> Path:
@@ -128,11 +128,11 @@ class _Row(QTreeWidgetItem):
     """Row of a file or folder. Folders precede files in every sort order."""
 
     def __init__(self, theme: Theme, entry: FolderEntry, now: dt.datetime, icon: str) -> None:
-        then = dt.datetime.fromtimestamp(entry.changed_s, tz=now.tzinfo)
+        changed = dt.datetime.fromtimestamp(entry.changed_s, tz=now.tzinfo)
         is_behaviour = not entry.is_folder and entry.path.name.lower().endswith(SUFFIX)
         name = entry.path.name[: -len(SUFFIX)] if is_behaviour else entry.path.name
         size = "" if entry.is_folder else size_text(entry.size)
-        super().__init__([name, date_time_text(then, now), size])
+        super().__init__([name, date_time_text(changed, now), size])
         self.entry = entry
         self.setIcon(NAME, theme.icon("folder" if entry.is_folder else icon, "textSecondary"))
         self.setTextAlignment(SIZE, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -142,9 +142,9 @@ class _Row(QTreeWidgetItem):
         tree = self.treeWidget()
         if not isinstance(other, _Row) or tree is None:
             return False
-        down = tree.header().sortIndicatorOrder() == Qt.SortOrder.DescendingOrder
+        descending = tree.header().sortIndicatorOrder() == Qt.SortOrder.DescendingOrder
         if self.entry.is_folder != other.entry.is_folder:
-            return self.entry.is_folder != down
+            return self.entry.is_folder != descending
         column = tree.sortColumn()
         if column == CHANGED:
             return self.entry.changed_s < other.entry.changed_s
@@ -162,11 +162,13 @@ class FileSheet(Overlay):
     top = 56
     is_nested = True
 
-    def __init__(self, theme: Theme, window: QWidget, places: Callable[[], Sequence[FolderLocation]]) -> None:
+    def __init__(
+        self, theme: Theme, window: QWidget, locations: Callable[[], Sequence[FolderLocation]]
+    ) -> None:
         # `places` is called whenever the sheet opens.
         super().__init__(theme, window, _("Files"))
         self._scrim.pressed.disconnect(self.dismiss)  # a click outside must not discard a typed name
-        self._places = places
+        self._places = locations
         self._take: Callable[[Path], object] = lambda _path: None
         self.question = OPEN_QUESTION
         self.folder = Path.home()
@@ -226,16 +228,16 @@ class FileSheet(Overlay):
         tree.installEventFilter(self)
 
     def _lay_out(self) -> None:
-        head = self.make_header(self.heading)
-        way = QHBoxLayout()
-        way.setSpacing(8)
-        way.addWidget(self.up)
-        way.addWidget(self.path, 1)
+        header = self.make_header(self.heading)
+        path_row = QHBoxLayout()
+        path_row.setSpacing(8)
+        path_row.addWidget(self.up)
+        path_row.addWidget(self.path, 1)
         for widget in (self.folder_name, self.make_folder, self.new_folder):
-            way.addWidget(widget)
+            path_row.addWidget(widget)
         right = QVBoxLayout()
         right.setSpacing(8)
-        right.addLayout(way)
+        right.addLayout(path_row)
         right.addWidget(self.list, 1)
         right.addWidget(self.said)
         self._naming = QWidget()
@@ -247,12 +249,12 @@ class FileSheet(Overlay):
         naming.addWidget(self.ending)
         naming.addWidget(self.kind)
         right.addWidget(self._naming)
-        foot = QHBoxLayout()
-        foot.setSpacing(8)
-        foot.addStretch(1)
+        footer = QHBoxLayout()
+        footer.setSpacing(8)
+        footer.addStretch(1)
         for button in (self.cancel, self.keep_both, self.done):
-            foot.addWidget(button)
-        right.addLayout(foot)
+            footer.addWidget(button)
+        right.addLayout(footer)
         middle = QHBoxLayout()
         middle.setSpacing(16)
         middle.addWidget(self.places)
@@ -260,39 +262,39 @@ class FileSheet(Overlay):
         column = QVBoxLayout(self)
         column.setContentsMargins(20, 14, 20, 16)
         column.setSpacing(12)
-        column.addLayout(head)
+        column.addLayout(header)
         column.addLayout(middle, 1)
 
     def ask_open(
-        self, folder: Path, take: Callable[[Path], object], question: FileQuestion = OPEN_QUESTION
+        self, folder: Path, callback: Callable[[Path], object], question: FileQuestion = OPEN_QUESTION
     ) -> None:
         """Ask for a file to open.
 
         Args:
             folder: Folder to show first.
-            take: Called with the path.
+            callback: Called with the path.
             question: Kind of file, by default a behaviour.
         """
-        self._ask(question, folder, take)
+        self._ask(question, folder, callback)
 
-    def ask_picture(self, folder: Path, take: Callable[[Path], object]) -> None:
+    def ask_picture(self, folder: Path, callback: Callable[[Path], object]) -> None:
         """Ask for an image file to open."""
-        self._ask(IMAGE_QUESTION, folder, take)
+        self._ask(IMAGE_QUESTION, folder, callback)
 
-    def ask_folder(self, folder: Path, take: Callable[[Path], object]) -> None:
+    def ask_folder(self, folder: Path, callback: Callable[[Path], object]) -> None:
         """Ask for a folder, which is the selected one or else the displayed one."""
-        self._ask(FOLDER_QUESTION, folder, take)
+        self._ask(FOLDER_QUESTION, folder, callback)
 
-    def ask_save(self, suggestion: Path, take: Callable[[Path], object]) -> None:
+    def ask_save(self, suggestion: Path, callback: Callable[[Path], object]) -> None:
         """Ask for the folder and name to save a behaviour."""
-        self._ask_name(SAVE_QUESTION, suggestion, take)
+        self._ask_name(SAVE_QUESTION, suggestion, callback)
 
     def ask_save_as(
         self,
         title: str,
         suggestion: Path,
         kinds: Sequence[FileKind],
-        take: Callable[[Path, FileKind], object],
+        callback: Callable[[Path, FileKind], object],
     ) -> None:
         """Ask for folder, name and format to save a file other than a behaviour.
 
@@ -300,7 +302,7 @@ class FileSheet(Overlay):
             title: Title of the sheet.
             suggestion: Suggested path, without extension.
             kinds: Formats that are offered.
-            take: Called with the path and the format.
+            callback: Called with the path and the format.
         """
         endings = tuple(dict.fromkeys(each.suffix for each in kinds))
         question = FileQuestion(
@@ -312,9 +314,9 @@ class FileSheet(Overlay):
             is_saving=True,
             kinds=tuple(kinds),
         )
-        self._ask_name(question, suggestion, lambda path: take(*resolve_kind(path, self._kind, kinds)))
+        self._ask_name(question, suggestion, lambda path: callback(*resolve_kind(path, self._kind, kinds)))
 
-    def _ask_name(self, question: FileQuestion, suggestion: Path, take: Callable[[Path], object]) -> None:
+    def _ask_name(self, question: FileQuestion, suggestion: Path, callback: Callable[[Path], object]) -> None:
         name = suggestion.name.removesuffix(SUFFIX)
         self.name.setText(INVALID_CHARACTERS.sub(" ", name).strip(". ")[:MAX_NAME_LENGTH])
         self.kind.blockSignals(True)
@@ -325,7 +327,7 @@ class FileSheet(Overlay):
         self.kind.updateGeometry()
         paint.show_when(self.kind, len(question.kinds) > 1)
         self.ending.setText(question.kinds[0].suffix)
-        self._ask(question, suggestion.parent, take)
+        self._ask(question, suggestion.parent, callback)
         self.name.selectAll()
 
     @property
@@ -340,8 +342,8 @@ class FileSheet(Overlay):
         self.ending.setText(self._kind.suffix)
         self._validate()
 
-    def _ask(self, question: FileQuestion, folder: Path, take: Callable[[Path], object]) -> None:
-        self.question, self._take = question, take
+    def _ask(self, question: FileQuestion, folder: Path, callback: Callable[[Path], object]) -> None:
+        self.question, self._take = question, callback
         heading = _(question.heading)
         self.heading.setText(heading)
         self.setAccessibleName(heading)
@@ -376,11 +378,11 @@ class FileSheet(Overlay):
         while column.count() > 1 and (item := column.takeAt(0)) is not None:
             if (old := item.widget()) is not None:
                 old.deleteLater()
-        for number, place in enumerate(self._places()):
-            button = Button(self.theme, place.name, place.icon, kind="ghost", size="small")
+        for number, location in enumerate(self._places()):
+            button = Button(self.theme, location.name, location.icon, kind="ghost", size="small")
             button.allow_shrinking()
-            button.setToolTip(plain.tip(str(place.folder)))
-            button.clicked.connect(lambda _on=False, folder=place.folder: self.go_to(folder))
+            button.setToolTip(plain.tip(str(location.folder)))
+            button.clicked.connect(lambda _on=False, folder=location.folder: self.go_to(folder))
             column.insertWidget(number, button)
         self.places.setFixedWidth(round(self.theme.scaled(PLACES_WIDTH)))
 
@@ -390,7 +392,7 @@ class FileSheet(Overlay):
         If the folder can't be read, the reason is shown and the current folder stays.
         """
         try:
-            found = entries_of(folder, self.question.suffixes)
+            entries = entries_of(folder, self.question.suffixes)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             self._set_status(
@@ -403,17 +405,17 @@ class FileSheet(Overlay):
         now = dt.datetime.now().astimezone()
         self.list.blockSignals(True)
         self.list.clear()
-        high = round(self.theme.scaled(self.theme.size("row", "comfortable")))
+        row_height = round(self.theme.scaled(self.theme.size("row", "comfortable")))
         side = round(self.theme.scaled(self.theme.size("icon", "normal")))
         self.list.setIconSize(QSize(side, side))
-        for entry in found:
+        for entry in entries:
             row = _Row(self.theme, entry, now, self.question.icon)
-            row.setSizeHint(NAME, QSize(0, high))
+            row.setSizeHint(NAME, QSize(0, row_height))
             self.list.addTopLevelItem(row)
         self.list.sortItems(self.list.sortColumn(), self.list.header().sortIndicatorOrder())
-        place = next((row for row in self._rows() if row.entry.path == before), None)
-        if place is not None:
-            self.list.setCurrentItem(place)
+        previous_row = next((row for row in self._rows() if row.entry.path == before), None)
+        if previous_row is not None:
+            self.list.setCurrentItem(previous_row)
         self.list.blockSignals(False)
         self._validate()
 
@@ -426,8 +428,8 @@ class FileSheet(Overlay):
         """Selected file or folder in the list, or None."""
         row = self.list.currentItem()
         # QTreeWidget makes the first row current when it gets the focus, which isn't a selection.
-        meant = row is not None and (row.isSelected() or not self.question.selects_folder)
-        return row.entry if meant and isinstance(row, _Row) else None
+        is_selected = row is not None and (row.isSelected() or not self.question.selects_folder)
+        return row.entry if is_selected and isinstance(row, _Row) else None
 
     def _on_selected(self, item: QTreeWidgetItem | None) -> None:
         if self.is_saving and isinstance(item, _Row) and not item.entry.is_folder and self.list.hasFocus():
@@ -448,26 +450,26 @@ class FileSheet(Overlay):
         self.folder_name.clear()
         self.folder_name.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _show_folder_field(self, shown: bool) -> None:
+    def _show_folder_field(self, visible: bool) -> None:
         # The text field replaces the "New folder" button.
         self.folder_name.setMinimumWidth(round(self.theme.scaled(FOLDER_NAME_WIDTH)))
         for widget in (self.folder_name, self.make_folder):
-            paint.show_when(widget, shown and self._can_create_folders)
-        paint.show_when(self.new_folder, self._can_create_folders and not shown)
+            paint.show_when(widget, visible and self._can_create_folders)
+        paint.show_when(self.new_folder, self._can_create_folders and not visible)
 
     def _create_folder(self) -> None:
         name = self.folder_name.text().strip()
-        wrong = name_problem(name) or ("" if name else _("Enter a folder name."))
-        if not wrong and (self.folder / name).exists():
-            wrong = _("“{name}” already exists.").format(name=name)
-        if not wrong:
+        problem = name_problem(name) or ("" if name else _("Enter a folder name."))
+        if not problem and (self.folder / name).exists():
+            problem = _("“{name}” already exists.").format(name=name)
+        if not problem:
             try:
                 (self.folder / name).mkdir()
             except OSError as error:
                 reason = (error.strerror or str(error)).lower()
-                wrong = _("Can't create “{name}”: {reason}.").format(name=name, reason=reason)
-        if wrong:
-            self._set_status(wrong, "error")
+                problem = _("Can't create “{name}”: {reason}.").format(name=name, reason=reason)
+        if problem:
+            self._set_status(problem, "error")
             return
         self._show_folder_field(False)
         self.go_to(self.folder / name)
@@ -476,40 +478,40 @@ class FileSheet(Overlay):
     @property
     def target(self) -> Path | None:
         """Path that the primary button passes to the callback, or None if the button is disabled."""
-        chosen = self.selected_entry
+        selected = self.selected_entry
         if self.question.selects_folder:
-            return chosen.path if chosen is not None else self.folder
+            return selected.path if selected is not None else self.folder
         if not self.is_saving:
-            return chosen.path if chosen is not None and not chosen.is_folder else None
+            return selected.path if selected is not None and not selected.is_folder else None
         name = self.name.text().strip()
         ending = next((e for e in self.question.suffixes if name.lower().endswith(e)), self._kind.suffix)
         if name.lower().endswith(ending):
             name = name[: -len(ending)]
-        whole = parse_absolute_path(name)
-        if whole is not None:
-            return whole.with_name(f"{whole.name}{ending}") if whole.parent.is_dir() else None
+        path = parse_absolute_path(name)
+        if path is not None:
+            return path.with_name(f"{path.name}{ending}") if path.parent.is_dir() else None
         return self.folder / f"{name}{ending}" if name and not name_problem(name) else None
 
     def _validate(self) -> None:
         # Shows the effect of the button, such as overwriting a file, and sets its text.
         target = self.target
-        taken = self.is_saving and target is not None and target.exists()
-        paint.show_when(self.keep_both, taken)
-        self.done.set_label(_("Replace") if taken else _(self.question.verb))
-        chosen = self.selected_entry
+        already_exists = self.is_saving and target is not None and target.exists()
+        paint.show_when(self.keep_both, already_exists)
+        self.done.set_label(_("Replace") if already_exists else _(self.question.verb))
+        selected = self.selected_entry
         wants_folder = self.question.selects_folder
-        into = not self.is_saving and not wants_folder and chosen is not None and chosen.is_folder
-        inside = target if wants_folder else target.parent if target else self.folder
-        writable = not self._can_create_folders or os.access(inside or self.folder, os.W_OK)
-        self.done.setEnabled((target is not None and writable) or into)
-        wrong = self._problem() if self.is_saving else ""
-        if wrong:
-            self._set_status(wrong, "error")
+        opens_folder = not self.is_saving and not wants_folder and selected is not None and selected.is_folder
+        parent_folder = target if wants_folder else target.parent if target else self.folder
+        writable = not self._can_create_folders or os.access(parent_folder or self.folder, os.W_OK)
+        self.done.setEnabled((target is not None and writable) or opens_folder)
+        problem = self._problem() if self.is_saving else ""
+        if problem:
+            self._set_status(problem, "error")
         elif not writable:
             self._set_status(
                 _("You don't have permission to save in this folder. Choose another one."), "error"
             )
-        elif taken and target is not None:
+        elif already_exists and target is not None:
             name = target.name.removesuffix(SUFFIX)
             self._set_status(
                 _("“{name}” already exists. Replace it, or keep both.").format(name=name), "text"
@@ -524,32 +526,32 @@ class FileSheet(Overlay):
 
     def _problem(self) -> str:
         name = self.name.text().strip()
-        whole = parse_absolute_path(name)
-        if whole is None:
+        path = parse_absolute_path(name)
+        if path is None:
             return name_problem(name)
         return (
             ""
-            if whole.parent.is_dir()
-            else _("The folder “{folder}” doesn't exist.").format(folder=whole.parent)
+            if path.parent.is_dir()
+            else _("The folder “{folder}” doesn't exist.").format(folder=path.parent)
         )
 
-    def _set_status(self, words: str, role: str) -> None:
-        if self.said.text() == words:
+    def _set_status(self, text: str, role: str) -> None:
+        if self.said.text() == text:
             return
-        self.said.setText(words)
+        self.said.setText(text)
         self.said.setProperty("role", role)
         self.said.style().unpolish(self.said)
         self.said.style().polish(self.said)
-        paint.show_when(self.said, bool(words))
-        if words:
-            paint.announce(self.said, words)
+        paint.show_when(self.said, bool(text))
+        if text:
+            paint.announce(self.said, text)
 
     def _accept(self) -> None:
-        target, chosen = self.target, self.selected_entry
+        target, selected = self.target, self.selected_entry
         if target is not None and self.done.isEnabled():
             self._finish(target)
-        elif not self.is_saving and chosen is not None and chosen.is_folder:
-            self.go_to(chosen.path)
+        elif not self.is_saving and selected is not None and selected.is_folder:
+            self.go_to(selected.path)
 
     def _keep_both(self) -> None:
         target = self.target

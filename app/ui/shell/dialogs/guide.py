@@ -70,15 +70,15 @@ class GuidePage:
     text: str
     folders: tuple[Path, ...] = ()
 
-    def matches(self, words: str) -> bool:
+    def matches(self, query: str) -> bool:
         """Return True if the page contains all words of a query, also in alternative texts of images."""
-        said = _MARKUP_PATTERN.sub(" ", _IMAGE_PATTERN.sub(r"\1", self.text)).casefold()
-        return all(word in said for word in words.casefold().split())
+        text = _MARKUP_PATTERN.sub(" ", _IMAGE_PATTERN.sub(r"\1", self.text)).casefold()
+        return all(word in text for word in query.casefold().split())
 
     @property
     def pictures(self) -> tuple[tuple[str, str], ...]:
         """Images of the page, as pairs of name and alternative text."""
-        return tuple((name, words) for words, name in _IMAGE_PATTERN.findall(self.text))
+        return tuple((name, alt_text) for alt_text, name in _IMAGE_PATTERN.findall(self.text))
 
     def picture(self, name: str, *, dark: bool) -> Path | None:
         """Return the file of an image for the dark or the light theme, or None if it doesn't exist."""
@@ -94,15 +94,15 @@ def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tup
         language: Language code, such as "es".
         key_of: Returns the first shortcut of a command by name, or "".
     """
-    made = []
-    own = folder / language.split("-", maxsplit=1)[0].split("_", maxsplit=1)[0]
+    pages = []
+    language_folder = folder / language.split("-", maxsplit=1)[0].split("_", maxsplit=1)[0]
     for path in sorted((folder / ENGLISH).glob("*.md")):
-        translated = own / path.name
+        translated = language_folder / path.name
         text = read_regular_file(translated if translated.is_file() else path).decode("utf-8")
         text = _KEY_PATTERN.sub(lambda found: f"**{shortcut_text(key_of(found[1])) or '-'}**", text)
         title = text.partition("\n")[0].lstrip("# ")
-        made.append(GuidePage(title, text, (own, folder / ENGLISH)))
-    return tuple(made)
+        pages.append(GuidePage(title, text, (language_folder, folder / ENGLISH)))
+    return tuple(pages)
 
 
 class PageView(QTextBrowser):
@@ -125,7 +125,7 @@ class PageView(QTextBrowser):
         """Show a page and scroll to its start."""
         self._page = page
         self.setMarkdown(page.text)
-        self.setAccessibleDescription(" ".join(words for _name, words in page.pictures))
+        self.setAccessibleDescription(" ".join(alt_text for _name, alt_text in page.pictures))
         self._fit_pictures()
 
     def loadResource(self, kind: int, name: QUrl | str) -> object:
@@ -147,15 +147,17 @@ class PageView(QTextBrowser):
         self._laid_for = self._available_width()
         document, ratio = self.document(), self.devicePixelRatioF()
         cursor = QTextCursor(document)
-        for place in self._image_positions():
-            cursor.setPosition(place)
-            cursor.setPosition(place + 1, QTextCursor.MoveMode.KeepAnchor)
-            look = cursor.charFormat().toImageFormat()
-            whole = self.loadResource(QTextDocument.ResourceType.ImageResource.value, QUrl(look.name()))
-            if not isinstance(whole, QImage) or whole.isNull():
+        for position in self._image_positions():
+            cursor.setPosition(position)
+            cursor.setPosition(position + 1, QTextCursor.MoveMode.KeepAnchor)
+            image_format = cursor.charFormat().toImageFormat()
+            image = self.loadResource(
+                QTextDocument.ResourceType.ImageResource.value, QUrl(image_format.name())
+            )
+            if not isinstance(image, QImage) or image.isNull():
                 continue
-            width = min(self._laid_for, round(whole.width() / IMAGE_PIXEL_RATIO))
-            plain_image = whole.convertToFormat(QImage.Format.Format_RGB32)
+            width = min(self._laid_for, round(image.width() / IMAGE_PIXEL_RATIO))
+            plain_image = image.convertToFormat(QImage.Format.Format_RGB32)
             pixels = plain_image.scaledToWidth(
                 round(width * ratio), Qt.TransformationMode.SmoothTransformation
             )
@@ -164,21 +166,23 @@ class PageView(QTextBrowser):
             painter.drawRect(pixels.rect().adjusted(0, 0, -1, -1))
             painter.end()
             pixels.setDevicePixelRatio(ratio)
-            document.addResource(QTextDocument.ResourceType.ImageResource.value, QUrl(look.name()), pixels)
-            look.setWidth(width)
-            look.setHeight(pixels.height() / ratio)
-            look.setToolTip(plain.tip(str(look.property(QTextFormat.Property.ImageAltText))))
-            cursor.setCharFormat(look)
+            document.addResource(
+                QTextDocument.ResourceType.ImageResource.value, QUrl(image_format.name()), pixels
+            )
+            image_format.setWidth(width)
+            image_format.setHeight(pixels.height() / ratio)
+            image_format.setToolTip(plain.tip(str(image_format.property(QTextFormat.Property.ImageAltText))))
+            cursor.setCharFormat(image_format)
 
     def _image_positions(self) -> list[int]:
         # Text positions of images.
-        found = []
+        positions = []
         block = self.document().begin()
         while block.isValid():
             fragments = [each.fragment() for each in cast("Iterable[QTextBlock.iterator]", block)]
-            found += [part.position() for part in fragments if part.charFormat().isImageFormat()]
+            positions += [part.position() for part in fragments if part.charFormat().isImageFormat()]
             block = block.next()
-        return found
+        return positions
 
 
 class GuideSheet(Overlay):
@@ -209,7 +213,7 @@ class GuideSheet(Overlay):
         theme.changed.connect(self._restyle)
 
     def _lay_out(self) -> None:
-        head = self.make_header(label(_("Guide"), "heading"))
+        header = self.make_header(label(_("Guide"), "heading"))
         left = QVBoxLayout()
         left.setSpacing(8)
         left.addWidget(self.search)
@@ -225,7 +229,7 @@ class GuideSheet(Overlay):
         column = QVBoxLayout(self)
         column.setContentsMargins(20, 14, 20, 18)
         column.setSpacing(12)
-        column.addLayout(head)
+        column.addLayout(header)
         column.addLayout(sides, 1)
 
     def first(self) -> QWidget:
@@ -236,11 +240,11 @@ class GuideSheet(Overlay):
         return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
 
     def open(self) -> None:
-        place = max(0, self.list.currentRow())
+        row = max(0, self.list.currentRow())
         self._pages = tuple(self._read())
         self.search.clear()
         self._apply_filter("")
-        self.list.setCurrentRow(place)
+        self.list.setCurrentRow(row)
         super().open()
 
     @property
@@ -248,7 +252,7 @@ class GuideSheet(Overlay):
         """Pages that match the search."""
         return tuple(page for page in self._pages if page.matches(self.search.text()))
 
-    def _apply_filter(self, words: str) -> None:
+    def _apply_filter(self, query: str) -> None:
         self.list.blockSignals(True)
         self.list.clear()
         self._left.setFixedWidth(round(self.theme.scaled(LIST_WIDTH)))
@@ -259,7 +263,7 @@ class GuideSheet(Overlay):
         self.list.blockSignals(False)
         count = self.list.count()
         paint.show_when(self.none, count == 0)
-        if words:
+        if query:
             paint.announce(self, ngettext("{count} page", "{count} pages", count).format(count=count))
         if count:
             self.list.setCurrentRow(0)
@@ -281,9 +285,9 @@ class GuideSheet(Overlay):
             if isinstance(frame, QTextTable):
                 self._format_table(frame)
         self._set_text(document)
-        found = self.search.text().split()
-        if found:
-            self.page.find(found[0])
+        query_words = self.search.text().split()
+        if query_words:
+            self.page.find(query_words[0])
         else:
             self.page.verticalScrollBar().setValue(0)
 
@@ -294,15 +298,15 @@ class GuideSheet(Overlay):
         while block.isValid():
             cursor.setPosition(block.position())
             if cursor.currentTable() is None:
-                look = block.blockFormat()
-                heading = look.headingLevel()
+                block_format = block.blockFormat()
+                heading = block_format.headingLevel()
                 picture = "\ufffc" in block.text()
-                look.setBottomMargin(self.theme.scaled(4 if block.textList() is not None else 10))
-                look.setTopMargin(self.theme.scaled(12 if heading > 1 else 6 if picture else 0))
+                block_format.setBottomMargin(self.theme.scaled(4 if block.textList() is not None else 10))
+                block_format.setTopMargin(self.theme.scaled(12 if heading > 1 else 6 if picture else 0))
                 # above an image the larger line height would look like a gap
                 percent = 100.0 if picture else LINE_HEIGHT_PERCENT
-                look.setLineHeight(percent, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
-                cursor.setBlockFormat(look)
+                block_format.setLineHeight(percent, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
+                cursor.setBlockFormat(block_format)
             for part in [each.fragment() for each in cast("Iterable[QTextBlock.iterator]", block)]:
                 if part.charFormat().fontItalic():
                     strong = part.charFormat()
@@ -326,13 +330,13 @@ class GuideSheet(Overlay):
 
     def _format_table(self, table: QTextTable) -> None:
         # Sets row lines, cell padding and full width of tables.
-        look = table.format().toTableFormat()
-        look.setBorderStyle(QTextFrameFormat.BorderStyle.BorderStyle_Solid)
-        look.setBorderBrush(self.theme.colour("border"))
-        look.setBorderCollapse(True)
-        look.setBorder(1)
-        look.setCellPadding(7)
-        table.setFormat(look)
+        table_format = table.format().toTableFormat()
+        table_format.setBorderStyle(QTextFrameFormat.BorderStyle.BorderStyle_Solid)
+        table_format.setBorderBrush(self.theme.colour("border"))
+        table_format.setBorderCollapse(True)
+        table_format.setBorder(1)
+        table_format.setCellPadding(7)
+        table.setFormat(table_format)
 
     def _restyle(self) -> None:
         if self.isVisible():

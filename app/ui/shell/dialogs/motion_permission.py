@@ -76,25 +76,25 @@ class MotionPermissionCard(QWidget):
         self.hide()
 
     def _lay_out(self, theme: Theme) -> None:
-        words = QVBoxLayout()
-        words.setSpacing(4)
-        words.addWidget(self.title)
-        words.addWidget(self.sentence)
+        text_column = QVBoxLayout()
+        text_column.setSpacing(4)
+        text_column.addWidget(self.title)
+        text_column.addWidget(self.sentence)
         top = QHBoxLayout()
         top.setSpacing(14)
         top.addWidget(_Tile(theme), 0, Qt.AlignmentFlag.AlignTop)
-        top.addLayout(words, 1)
-        foot = QHBoxLayout()
-        foot.setSpacing(BETWEEN)
-        foot.addWidget(self.always)
-        foot.addStretch(1)
-        foot.addWidget(self.not_now)
-        foot.addWidget(self.let)
+        top.addLayout(text_column, 1)
+        footer = QHBoxLayout()
+        footer.setSpacing(BETWEEN)
+        footer.addWidget(self.always)
+        footer.addStretch(1)
+        footer.addWidget(self.not_now)
+        footer.addWidget(self.let)
         column = QVBoxLayout(self)
         column.setContentsMargins(EDGE, 18, EDGE, 16)
         column.setSpacing(16)
         column.addLayout(top)
-        column.addLayout(foot)
+        column.addLayout(footer)
 
     def refresh(self) -> None:
         """Show the pending question, or hide the card if there is none."""
@@ -142,23 +142,23 @@ class MotionPermissionCard(QWidget):
         window = self.parentWidget()
         if window is None:
             return
-        wide = min(round(self._theme.scaled(WIDTH)), window.width() - 32)
-        self.setFixedWidth(wide)
-        self._set_always_text(wide)
+        width = min(round(self._theme.scaled(WIDTH)), window.width() - 32)
+        self.setFixedWidth(width)
+        self._set_always_text(width)
         layout = self.layout()
         if layout is not None:
             layout.invalidate()
             layout.activate()
-        high = layout.heightForWidth(wide) if layout is not None else -1
-        self.resize(wide, max(high, self.minimumSizeHint().height()))
+        height = layout.heightForWidth(width) if layout is not None else -1
+        self.resize(width, max(height, self.minimumSizeHint().height()))
         top = round(window.height() * TOP_SHARE)
-        self.move((window.width() - wide) // 2, min(top, max(8, window.height() - self.height() - 8)))
+        self.move((window.width() - width) // 2, min(top, max(8, window.height() - self.height() - 8)))
 
-    def _set_always_text(self, wide: int) -> None:
+    def _set_always_text(self, width: int) -> None:
         # The robot's name is on the switch only if it fits there; the title always contains it.
         self.always.setText(self._always_for)
         buttons = self.not_now.sizeHint().width() + self.let.sizeHint().width()
-        if self.always.sizeHint().width() > wide - 2 * EDGE - 2 * BETWEEN - buttons:
+        if self.always.sizeHint().width() > width - 2 * EDGE - 2 * BETWEEN - buttons:
             self.always.setText(_("Always"))
         self.always.updateGeometry()
 

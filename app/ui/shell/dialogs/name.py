@@ -78,38 +78,38 @@ class NameSheet(Overlay):
         return self.field
 
     def preferred_size(self, room: QSize) -> QSize:
-        wide = min(room.width(), round(self.theme.scaled(WIDTH)))
+        width = min(room.width(), round(self.theme.scaled(WIDTH)))
         layout = self.layout()
-        high = layout.totalHeightForWidth(wide) if layout is not None else 0
-        return QSize(wide, min(room.height(), max(high, self.sizeHint().height())))
+        height = layout.totalHeightForWidth(width) if layout is not None else 0
+        return QSize(width, min(room.height(), max(height, self.sizeHint().height())))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self._submit()
         super().keyPressEvent(event)
 
-    def _show_error(self, sentence: str) -> None:
-        self.wrong.setText(sentence)
-        paint.show_when(self.wrong, bool(sentence))
-        self.field.setProperty("wrong", "true" if sentence else "false")
+    def _show_error(self, message: str) -> None:
+        self.wrong.setText(message)
+        paint.show_when(self.wrong, bool(message))
+        self.field.setProperty("wrong", "true" if message else "false")
         self.field.style().unpolish(self.field)
         self.field.style().polish(self.field)
         self.place()
-        if sentence:
-            paint.announce(self.wrong, sentence)
+        if message:
+            paint.announce(self.wrong, message)
 
     def _on_edited(self, text: str) -> None:
         # No error is shown for an empty field until the button is pressed.
         name = text.strip()
-        sentence = self._refusal(name) if name else ""
-        self._show_error(sentence)
-        self.button.setEnabled(not sentence and bool(name or not self._refusal("")))
+        message = self._refusal(name) if name else ""
+        self._show_error(message)
+        self.button.setEnabled(not message and bool(name or not self._refusal("")))
 
     def _submit(self) -> None:
         name = self.field.text().strip()
-        sentence = self._refusal(name)
-        if sentence:
-            self._show_error(sentence)
+        message = self._refusal(name)
+        if message:
+            self._show_error(message)
             return
         self.dismiss()
         self._take(name)

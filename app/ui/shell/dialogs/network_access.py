@@ -74,9 +74,9 @@ class NetworkAccessSheet(Overlay):
     def preferred_size(self, room: QSize) -> QSize:
         layout = self.layout()
         hint = self.sizeHint()
-        wide = min(room.width(), max(round(self.theme.scaled(WIDTH)), self.minimumSizeHint().width()))
-        high = layout.totalHeightForWidth(wide) if layout is not None else hint.height()
-        return QSize(wide, min(room.height(), high))
+        width = min(room.width(), max(round(self.theme.scaled(WIDTH)), self.minimumSizeHint().width()))
+        height = layout.totalHeightForWidth(width) if layout is not None else hint.height()
+        return QSize(width, min(room.height(), height))
 
     def open(self) -> None:
         """Update the sheet to the current settings and open it."""
@@ -94,14 +94,14 @@ class NetworkAccessSheet(Overlay):
             self.choice.deleteLater()
             self.choice = None
         if can_open and not is_open:
-            options = [(own.host, f"{own.host} ({own.interface})") for own in addresses]
+            options = [(address.host, f"{address.host} ({address.interface})") for address in addresses]
             self.choice = ComboBox(self.theme, options, name=_("Address"))
             self.choice.currentIndexChanged.connect(lambda _index: self._show_selected())
             self.where.insertWidget(1, self.choice)
         paint.show_when(self.where_word, self.choice is not None)
         self._show_setting(access.hosts[0] if is_open else addresses[0].host if addresses else "")
-        for shown in (self.typed, self.copy, self.typed_word):
-            paint.show_when(shown, is_open or can_open)
+        for widget in (self.typed, self.copy, self.typed_word):
+            paint.show_when(widget, is_open or can_open)
         paint.show_when(self.yes, can_open and not is_open)
         paint.show_when(self.end, is_open and access.is_local)
         self.no.set_label(_("Cancel"))

@@ -39,14 +39,14 @@ class OtherNetworksSheet(Overlay):
         self.introduction = label(_(INTRODUCTION), "body", role="textSecondary", wrap=True)
         self._inside = QWidget()
         self._inside.setProperty("bare", "true")
-        inside = QVBoxLayout(self._inside)
-        inside.setContentsMargins(SIDE, 0, SIDE, 0)
-        inside.setSpacing(GAP)
-        inside.addWidget(self.introduction)
+        content_column = QVBoxLayout(self._inside)
+        content_column.setContentsMargins(SIDE, 0, SIDE, 0)
+        content_column.setSpacing(GAP)
+        content_column.addWidget(self.introduction)
         for row in self.rows:
             row.changed.connect(self.place)
-            inside.addWidget(Separator(theme))
-            inside.addWidget(row)
+            content_column.addWidget(Separator(theme))
+            content_column.addWidget(row)
         self._area = QScrollArea()
         self._area.setWidgetResizable(True)
         self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -69,13 +69,13 @@ class OtherNetworksSheet(Overlay):
         return self.rows[0].switch
 
     def preferred_size(self, room: QSize) -> QSize:
-        least = max(row.minimumSizeHint().width() for row in self.rows) + 2 + 2 * SIDE + SCROLL_BAR
-        wide = min(room.width(), max(round(self.theme.scaled(WIDTH)), least))
-        inner = wide - 2 - 2 * SIDE - SCROLL_BAR
-        high = self.introduction.heightForWidth(inner)
+        min_width = max(row.minimumSizeHint().width() for row in self.rows) + 2 + 2 * SIDE + SCROLL_BAR
+        width = min(room.width(), max(round(self.theme.scaled(WIDTH)), min_width))
+        inner = width - 2 - 2 * SIDE - SCROLL_BAR
+        height = self.introduction.heightForWidth(inner)
         # measured per row, because layout items are updated late after a change of text
-        high += sum(row.height_for(inner) + 1 + 2 * GAP for row in self.rows)
-        return QSize(wide, min(room.height(), high + self._head.sizeHint().height() + 14 + 10 + 16 + 4))
+        height += sum(row.height_for(inner) + 1 + 2 * GAP for row in self.rows)
+        return QSize(width, min(room.height(), height + self._head.sizeHint().height() + 14 + 10 + 16 + 4))
 
     def open(self) -> None:
         """Open the sheet and update the states until it is closed."""
@@ -111,16 +111,18 @@ class NetworkRow(QWidget):
         kind = network.kind
         self.switch = Switch(theme, kind.product_name)
         self.switch.setMinimumWidth(round(theme.scaled(SWITCH_WIDTH)))
-        place = _(kind.address_label)
-        self.address = AddressField(theme, f"{kind.product_name}: {place}", kind.default_address, self.apply)
-        said = label(place, "small", role="textTertiary")
+        address_label = _(kind.address_label)
+        self.address = AddressField(
+            theme, f"{kind.product_name}: {address_label}", kind.default_address, self.apply
+        )
+        caption = label(address_label, "small", role="textTertiary")
         self.state = label("", "small", role="textSecondary", wrap=True)
         self._wrong = ""
         above = QHBoxLayout()
         above.setSpacing(10)
         above.addWidget(self.switch)
         above.addStretch(1)
-        above.addWidget(said)
+        above.addWidget(caption)
         above.addWidget(self.address)
         self._lines = QVBoxLayout(self)
         self._lines.setContentsMargins(0, 0, 0, 0)
@@ -145,12 +147,12 @@ class NetworkRow(QWidget):
 
     def show_state(self) -> None:
         """Update the text of the state, which shows an error if the last change failed."""
-        words = self._wrong or state_text(self._network)
+        text = self._wrong or state_text(self._network)
         role = "error" if self._wrong else "warn" if self._network.state == "lost" else "textSecondary"
         set_role(self.state, role)
-        if words != self.state.text():
-            self.state.setText(words)
-            self.switch.setAccessibleDescription(words)
+        if text != self.state.text():
+            self.state.setText(text)
+            self.switch.setAccessibleDescription(text)
             self.changed.emit()
 
     def _on_toggled(self, on: bool) -> None:
@@ -176,20 +178,20 @@ class NetworkRow(QWidget):
             if self._network.is_selected:
                 self.address.setText(self._network.address)
 
-    def _show_error(self, sentence: str) -> None:
-        self._wrong = sentence
-        self.address.set_invalid(wrong=bool(sentence))
+    def _show_error(self, message: str) -> None:
+        self._wrong = message
+        self.address.set_invalid(is_invalid=bool(message))
         self.show_state()
-        if sentence:
-            paint.announce(self.state, sentence)
+        if message:
+            paint.announce(self.state, message)
 
 
 class AddressField(QLineEdit):
     """Text field for an address. Enter applies the address without moving the focus."""
 
-    def __init__(self, theme: Theme, name: str, example: str, take: Callable[[], object]) -> None:
+    def __init__(self, theme: Theme, name: str, example: str, callback: Callable[[], object]) -> None:
         super().__init__()
-        self._take = take
+        self._take = callback
         self.setAccessibleName(name)
         self.setPlaceholderText(example)
         self.setProperty("focusRadius", theme.radius("control"))
@@ -197,9 +199,9 @@ class AddressField(QLineEdit):
         self.setMaxLength(400)
         ContextMenuFilter(theme, self)
 
-    def set_invalid(self, *, wrong: bool) -> None:
-        """Show the address as invalid if `wrong`, else as valid."""
-        self.setProperty("wrong", "true" if wrong else "false")
+    def set_invalid(self, *, is_invalid: bool) -> None:
+        """Show the address as invalid if `is_invalid`, else as valid."""
+        self.setProperty("wrong", "true" if is_invalid else "false")
         self.style().unpolish(self)
         self.style().polish(self)
 

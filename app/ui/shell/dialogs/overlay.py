@@ -95,12 +95,12 @@ class Scrim(QWidget):
         if window is None:
             return
         self.setGeometry(window.rect())
-        whole = QRegion(self.rect())
+        region = QRegion(self.rect())
         for stop in stop_buttons_in(window):
             body = stop.size() - QSize(2 * STOP_INSET, 2 * STOP_INSET)
             hole = round_region(body, float(stop.property("focusRadius") or 0))
-            whole -= hole.translated(stop.mapTo(window, QPoint(STOP_INSET, STOP_INSET)))
-        self.setMask(whole)
+            region -= hole.translated(stop.mapTo(window, QPoint(STOP_INSET, STOP_INSET)))
+        self.setMask(region)
         self.update()
 
     def set_opacity(self, strength: float) -> None:
@@ -121,7 +121,7 @@ class Scrim(QWidget):
             self._paint_shadow(painter, QRectF(self.surface.geometry()))
         painter.end()
 
-    def _paint_shadow(self, painter: QPainter, over: QRectF) -> None:
+    def _paint_shadow(self, painter: QPainter, rect: QRectF) -> None:
         # Painted as many thin boxes, because QGraphicsDropShadowEffect would repaint the sheet on every key.
         steps = SHADOW_PX // 2
         shade = self._theme.colour("shadow")
@@ -129,7 +129,7 @@ class Scrim(QWidget):
         radius = self._theme.radius("palette")
         for step in range(steps):
             out = 2.0 * step - SHADOW_PX / 2
-            box = over.translated(0, SHADOW_OFFSET_PX).adjusted(-out, -out, out, out)
+            box = rect.translated(0, SHADOW_OFFSET_PX).adjusted(-out, -out, out, out)
             paint.box(painter, box, radius + max(0.0, out), shade)
 
 
@@ -218,7 +218,7 @@ class Overlay(QWidget):
         """Close the sheet and restore the previous focus."""
         if not self.isVisible():
             return
-        inside = self._has_focus()
+        had_focus = self._has_focus()
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.focusChanged.disconnect(self._focus_changed)
@@ -227,7 +227,7 @@ class Overlay(QWidget):
         self._opening.stop()
         self._finish_opening()
         before = self._before
-        if inside and before is not None and isValid(before) and before.isVisible():
+        if had_focus and before is not None and isValid(before) and before.isVisible():
             before.setFocus(Qt.FocusReason.PopupFocusReason)
         self.hide()
         self._scrim.hide()
@@ -244,13 +244,13 @@ class Overlay(QWidget):
         The sheet is moved further down if it would cover Stop.
         """
         window = self.covered_window()
-        place = self._geometry_at(self.top)
+        geometry = self._geometry_at(self.top)
         stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stop_buttons_in(window)]
-        covered = [stop for stop in stops if stop.intersects(place)]
+        covered = [stop for stop in stops if stop.intersects(geometry)]
         if covered:
-            place = self._geometry_at(max(stop.bottom() for stop in covered) + STOP_GAP)
-        if place != self.geometry() or self._scrim.size() != window.size() or not self.isVisible():
-            self.setGeometry(place)
+            geometry = self._geometry_at(max(stop.bottom() for stop in covered) + STOP_GAP)
+        if geometry != self.geometry() or self._scrim.size() != window.size() or not self.isVisible():
+            self.setGeometry(geometry)
             self._scrim.cover()
 
     def _on_stop_moved(self) -> None:
@@ -270,10 +270,10 @@ class Overlay(QWidget):
         return super().eventFilter(watched, event)
 
     def event(self, event: QEvent) -> bool:
-        done = super().event(event)
+        handled = super().event(event)
         if event.type() == QEvent.Type.LayoutRequest and self.isVisible():
             self.place()
-        return done
+        return handled
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:

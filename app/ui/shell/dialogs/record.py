@@ -100,19 +100,19 @@ class RecordSheet(Overlay):
         theme: Theme,
         window: QWidget,
         session: Session,
-        keep: Callable[[], None],
-        say: ShowToast,
+        save_last: Callable[[], None],
+        show_toast: ShowToast,
     ) -> None:
         # `keep` saves the contents of the flight recorder.
         super().__init__(theme, window, _("Record"))
-        self._session, self._recordings, self._say = session, session.recordings, say
+        self._session, self._recordings, self._say = session, session.recordings, show_toast
         self._seen: object = None
         self._included: set[str] = set()
         self._written: tuple[float, int] | None = None
         self._speed: float | None = None
         self._make_meters()
         self._make_form()
-        self._make_flight_recorder(keep)
+        self._make_flight_recorder(save_last)
         self._make_footer()
         self._arrange()
         self._timer = QTimer(self)
@@ -131,8 +131,8 @@ class RecordSheet(Overlay):
         row.setContentsMargins(1, 1, 1, 1)
         row.setSpacing(0)
         meters = (self.length, self.size_so_far, self.unkept, self.disk, self.at_end)
-        for place, meter in enumerate(meters):
-            if place:
+        for index, meter in enumerate(meters):
+            if index:
                 self._end_line = Separator(self.theme, upright=True)
                 row.addWidget(self._end_line)
             row.addWidget(meter, 1)
@@ -176,15 +176,15 @@ class RecordSheet(Overlay):
         self.ends_words = label("", "small", role="textSecondary", wrap=True)
 
     def _field(self, name: str, example: str) -> QLineEdit:
-        made = QLineEdit()
-        made.setAccessibleName(name)
-        made.setPlaceholderText(example)
-        made.setProperty("focusRadius", self.theme.radius("control"))
-        made.setMaxLength(400)
-        ContextMenuFilter(self.theme, made)
-        return made
+        field = QLineEdit()
+        field.setAccessibleName(name)
+        field.setPlaceholderText(example)
+        field.setProperty("focusRadius", self.theme.radius("control"))
+        field.setMaxLength(400)
+        ContextMenuFilter(self.theme, field)
+        return field
 
-    def _make_flight_recorder(self, keep: Callable[[], None]) -> None:
+    def _make_flight_recorder(self, save_last: Callable[[], None]) -> None:
         theme = self.theme
         self.ring = Switch(theme, _("Flight recorder"))
         self.ring.clicked.connect(self._toggle_flight_recorder)
@@ -203,7 +203,7 @@ class RecordSheet(Overlay):
         self.ring_words = label("", "small", role="textSecondary", wrap=True)
         self.keep = Button(theme, "", "history", size="small")
         assign_command(self.keep, "recording.keep")
-        self.keep.clicked.connect(keep)
+        self.keep.clicked.connect(save_last)
 
     def _make_footer(self) -> None:
         theme = self.theme
@@ -223,9 +223,9 @@ class RecordSheet(Overlay):
         form.setColumnMinimumWidth(0, round(self.theme.scaled(LABEL_WIDE)))
         form.setColumnStretch(1, 1)
         modes = _flow(self.mode, self.count)
-        for place, (words, field) in enumerate(((_("Name"), self.name), (_("Note"), self.note))):
-            form.addWidget(label(words, "body", role="textSecondary"), place, 0)
-            form.addWidget(field, place, 1)
+        for row, (text, field) in enumerate(((_("Name"), self.name), (_("Note"), self.note))):
+            form.addWidget(label(text, "body", role="textSecondary"), row, 0)
+            form.addWidget(field, row, 1)
         form.addWidget(label(_("Topics"), "body", role="textSecondary"), 2, 0)
         form.addLayout(modes, 2, 1)
         form.addWidget(self.patterns, 3, 1)
@@ -235,21 +235,21 @@ class RecordSheet(Overlay):
     def _limits_row(self) -> Flow:
         title = label(_("Stop"), "body", role="textSecondary")
         title.setMinimumWidth(round(self.theme.scaled(LABEL_WIDE)))
-        words = [label(_("after")), label(_("or at"))]
-        return _flow(title, words[0], self.ends_min, words[1], self.ends_gb, self.ends_words)
+        labels = [label(_("after")), label(_("or at"))]
+        return _flow(title, labels[0], self.ends_min, labels[1], self.ends_gb, self.ends_words)
 
     def _flight_recorder_card(self) -> Card:
         box = Card(self.theme, fill="sunken")
         rows = QVBoxLayout(box)
         rows.setContentsMargins(12, 10, 12, 10)
         rows.setSpacing(8)
-        words = [label(each) for each in (_("keeps the last"), _("using up to"), _("on disk"))]
+        labels = [label(each) for each in (_("keeps the last"), _("using up to"), _("on disk"))]
         self.ring_bar.setFixedWidth(round(self.theme.scaled(BAR_WIDE)))
-        wish = _flow(self.ring, words[0], self.seconds, words[1], self.size_gb, words[2])
-        there = _flow(self.ring_bar, self.ring_words, self.keep)
-        rows.addLayout(wish)
+        settings_row = _flow(self.ring, labels[0], self.seconds, labels[1], self.size_gb, labels[2])
+        state_row = _flow(self.ring_bar, self.ring_words, self.keep)
+        rows.addLayout(settings_row)
         rows.addWidget(self.ring_topics)
-        rows.addLayout(there)
+        rows.addLayout(state_row)
         return box
 
     def _make_scroll_area(self) -> QScrollArea:
@@ -274,29 +274,29 @@ class RecordSheet(Overlay):
 
     def _arrange(self) -> None:
         self._area = self._make_scroll_area()
-        head = self.make_header(label(_("Record"), "heading"))
-        head.setContentsMargins(SIDE, 0, 12, 0)
-        foot = QHBoxLayout()
-        foot.setContentsMargins(SIDE, 0, SIDE, 0)
-        foot.setSpacing(8)
-        foot.addWidget(self.foot, 1)
-        foot.addWidget(self.bookmark)
-        foot.addWidget(self.record)
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(1, 12, 1, 12)
-        whole.setSpacing(10)
-        whole.addLayout(head)
-        whole.addWidget(self._area, 1)
-        whole.addWidget(Separator(self.theme))
-        whole.addLayout(foot)
+        header = self.make_header(label(_("Record"), "heading"))
+        header.setContentsMargins(SIDE, 0, 12, 0)
+        footer = QHBoxLayout()
+        footer.setContentsMargins(SIDE, 0, SIDE, 0)
+        footer.setSpacing(8)
+        footer.addWidget(self.foot, 1)
+        footer.addWidget(self.bookmark)
+        footer.addWidget(self.record)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(1, 12, 1, 12)
+        column.setSpacing(10)
+        column.addLayout(header)
+        column.addWidget(self._area, 1)
+        column.addWidget(Separator(self.theme))
+        column.addLayout(footer)
 
     def first(self) -> QWidget:
         return self.record
 
     def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
-        least = self._inside.minimumSizeHint().width() + 2
-        return QSize(max(round(scaled(WIDE)), least), round(scaled(HIGH))).boundedTo(room)
+        min_width = self._inside.minimumSizeHint().width() + 2
+        return QSize(max(round(scaled(WIDE)), min_width), round(scaled(HIGH))).boundedTo(room)
 
     def _is_docked(self) -> bool:
         return self.covered_window().width() >= self.theme.scaled(MIN_DOCKED_WIDTH)
@@ -328,18 +328,20 @@ class RecordSheet(Overlay):
 
     def _columns(self) -> tuple[Column[Topic], ...]:
         def size_cell(topic: Topic) -> Cell:
-            known = self._recordings.client.state.topics.get(topic.name)
+            recorded = self._recordings.client.state.topics.get(topic.name)
             if not self._is_included(topic.name):
                 return Cell(_("excluded"), role="textTertiary")
-            return Cell(size_text(known.size_bytes) if known is not None else "")
+            return Cell(size_text(recorded.size_bytes) if recorded is not None else "")
 
         def lost_cell(topic: Topic) -> Cell:
-            known = self._recordings.client.state.topics.get(topic.name)
-            if known is None or known.lost is None:
+            recorded = self._recordings.client.state.topics.get(topic.name)
+            if recorded is None or recorded.lost is None:
                 return Cell()
-            bad = known.lost > 0
+            has_lost = recorded.lost > 0
             return Cell(
-                group_digits(known.lost), "triangle-alert" if bad else None, "warn" if bad else "text"
+                group_digits(recorded.lost),
+                "triangle-alert" if has_lost else None,
+                "warn" if has_lost else "text",
             )
 
         def included_cell(topic: Topic) -> Cell:
@@ -384,7 +386,7 @@ class RecordSheet(Overlay):
         return topic in self._included
 
     def _show_settings(self) -> None:
-        choice, wish = self.choice, self._recordings.wish
+        choice, settings = self.choice, self._recordings.wish
         self.mode.set_value(choice.mode)
         self.patterns.show_patterns(choice.patterns, choice.excluded)
         self.patterns.setVisible(choice.mode == "pattern")
@@ -396,11 +398,11 @@ class RecordSheet(Overlay):
             else:
                 field.clear()
         self._show_limits_problem("")
-        self.ring.setChecked(wish.is_on)
-        self.ring_topics.show_patterns(wish.patterns, wish.excluded)
-        self.ring_topics.set_invalid(bool(wish.problem))
-        self.seconds.show_number(wish.seconds)
-        self.size_gb.show_number(wish.size_gb)
+        self.ring.setChecked(settings.is_on)
+        self.ring_topics.show_patterns(settings.patterns, settings.excluded)
+        self.ring_topics.set_invalid(bool(settings.problem))
+        self.seconds.show_number(settings.seconds)
+        self.size_gb.show_number(settings.size_gb)
         self._seen = None
 
     def _show_pattern_problem(self, problem: str) -> None:
@@ -411,12 +413,12 @@ class RecordSheet(Overlay):
     def show_state(self) -> None:
         """Update the sheet to the state of the recording and of the flight recorder."""
         recordings = self._recordings
-        going = recordings.is_recording
-        self.record.set_label(_("Stop recording") if going else _("Record"))
+        is_recording = recordings.is_recording
+        self.record.set_label(_("Stop recording") if is_recording else _("Record"))
         self.record.setEnabled(recordings.client.state.phase != "ending")
         self.bookmark.setEnabled(recordings.client.state.phase == "recording")
         for field in (self.name, self.note, self.mode, self.patterns, self.ends_min, self.ends_gb):
-            field.setEnabled(not going)
+            field.setEnabled(not is_recording)
         self._show_meters()
         self._show_topics()
         self._show_flight_recorder()
@@ -463,25 +465,25 @@ class RecordSheet(Overlay):
 
     def _show_end(self, end: tuple[float, float] | None) -> None:
         # Only for a recording with limits and a known data rate.
-        for each in (self._end_line, self.at_end):
-            each.setVisible(end is not None)
+        for widget in (self._end_line, self.at_end):
+            widget.setVisible(end is not None)
         if end is not None:
             at_s, size_bytes = end
             self.at_end.set_value(size_text(size_bytes), _("at {time}").format(time=length_text(at_s)))
 
-    def _show_limits_problem(self, sentence: str) -> None:
+    def _show_limits_problem(self, message: str) -> None:
         # Explains the limits, or what is wrong with them.
         both = bool(self.ends_min.text() and self.ends_gb.text())
         none = not (self.ends_min.text() or self.ends_gb.text())
         usual = _("whichever comes first") if both else _("no limit") if none else ""
-        self.ends_words.setText(sentence or usual)
-        set_role(self.ends_words, "error" if sentence else "textSecondary")
+        self.ends_words.setText(message or usual)
+        set_role(self.ends_words, "error" if message else "textSecondary")
 
     def _show_topics(self) -> None:
         topics = sorted(self._session.topics.existing_topics(), key=lambda topic: topic.name)
-        facts = (self._session.topics.revision, self.choice)
-        if facts != self._seen:
-            self._seen = facts
+        state = (self._session.topics.revision, self.choice)
+        if state != self._seen:
+            self._seen = state
             selection = self._selection()
             self._included = {
                 each.name for each in topics if selection is not None and selection.has(each.name)
@@ -493,28 +495,28 @@ class RecordSheet(Overlay):
         included = [each for each in topics if each.name in self._included]
         bandwidth = sum(each.bandwidth_Bps or 0.0 for each in included)
         count = ngettext("{count} of {all}", "{count} of {all}", len(topics))
-        words = count.format(count=group_digits(len(included)), all=group_digits(len(topics)))
+        text = count.format(count=group_digits(len(included)), all=group_digits(len(topics)))
         if bandwidth:
-            words = _("{topics}, {bandwidth}").format(topics=words, bandwidth=bandwidth_text(bandwidth))
-        self.count.setText(words)
+            text = _("{topics}, {bandwidth}").format(topics=text, bandwidth=bandwidth_text(bandwidth))
+        self.count.setText(text)
         self.later.setVisible(self.choice.mode != "chosen")
 
     def _show_flight_recorder(self) -> None:
         recordings, state = self._recordings, self._recordings.client.state
-        wish = recordings.wish
-        self.keep.set_label(_("Save last {count} s").format(count=wish.seconds))
+        settings = recordings.wish
+        self.keep.set_label(_("Save last {count} s").format(count=settings.seconds))
         self.keep.setEnabled(state.ring_s is not None)
         if state.ring_s is None:
             self.ring_bar.set_fraction(None)
-            self.ring_words.setText(_("Starting…") if wish.is_on else _("Off: nothing is saved."))
+            self.ring_words.setText(_("Starting…") if settings.is_on else _("Off: nothing is saved."))
             return
-        self.ring_bar.set_fraction(state.ring_s / wish.seconds)
-        words = _("{count} s buffered, {size} of {most}").format(
-            count=round(min(state.ring_s, wish.seconds)),
+        self.ring_bar.set_fraction(state.ring_s / settings.seconds)
+        text = _("{count} s buffered, {size} of {most}").format(
+            count=round(min(state.ring_s, settings.seconds)),
             size=size_text(state.ring_bytes),
-            most=size_text(wish.size_gb * _BYTES_PER_GB),
+            most=size_text(settings.size_gb * _BYTES_PER_GB),
         )
-        self.ring_words.setText(words)
+        self.ring_words.setText(text)
 
     def _set_mode(self, mode: str) -> None:
         recordings = self._recordings
@@ -546,8 +548,8 @@ class RecordSheet(Overlay):
         self._show_limits_problem("")
 
     def _apply_patterns(self) -> None:
-        wanted, unwanted = self.patterns.patterns()
-        choice = replace(self._recordings.choice, patterns=wanted, excluded=unwanted)
+        included, unwanted = self.patterns.patterns()
+        choice = replace(self._recordings.choice, patterns=included, excluded=unwanted)
         self._show_pattern_problem(choice.problem)
         self._recordings.set_choice(choice)
         self.show_state()
@@ -557,22 +559,22 @@ class RecordSheet(Overlay):
 
     def _update_flight_recorder(self, **changes: object) -> None:
         recordings = self._recordings
-        wish = replace(recordings.wish, **changes)  # type: ignore[arg-type]
-        if wish != recordings.wish:
-            recordings.set_ring_settings(wish)
+        settings = replace(recordings.wish, **changes)  # type: ignore[arg-type]
+        if settings != recordings.wish:
+            recordings.set_ring_settings(settings)
         self._show_flight_recorder()
 
     def _apply_flight_recorder_topics(self) -> None:
-        wanted, unwanted = self.ring_topics.patterns()
-        problem = replace(self._recordings.wish, patterns=wanted, excluded=unwanted).problem
+        included, unwanted = self.ring_topics.patterns()
+        problem = replace(self._recordings.wish, patterns=included, excluded=unwanted).problem
         self.ring_topics.set_invalid(bool(problem))
         if problem:
             self._show_flight_recorder_problem(problem)
         else:
-            self._update_flight_recorder(patterns=wanted, excluded=unwanted)
+            self._update_flight_recorder(patterns=included, excluded=unwanted)
 
-    def _show_flight_recorder_problem(self, sentence: str) -> None:
-        self.ring_words.setText(sentence or self.ring_words.text())
+    def _show_flight_recorder_problem(self, message: str) -> None:
+        self.ring_words.setText(message or self.ring_words.text())
 
     def _add_bookmark(self) -> None:
         self._recordings.client.add_bookmark("")
@@ -583,14 +585,14 @@ class RecordSheet(Overlay):
         if recordings.is_recording:
             recordings.stop()
         else:
-            why_not = recordings.record(self.name.text(), self.note.text())
-            if why_not:
-                self._say(why_not)
+            reason = recordings.record(self.name.text(), self.note.text())
+            if reason:
+                self._say(reason)
         self.show_state()
 
 
 def _flow(*widgets: QWidget) -> Flow:
-    made = Flow(gap=8, row_gap=6)
-    for each in widgets:
-        made.addWidget(each)
-    return made
+    flow = Flow(gap=8, row_gap=6)
+    for widget in widgets:
+        flow.addWidget(widget)
+    return flow

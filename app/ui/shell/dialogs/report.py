@@ -54,8 +54,8 @@ ReportedWorkGetter = Callable[[], Sequence[ReportedWork]]
 
 def documents_folder() -> Path:
     """Return the system's documents folder, or the home folder if there is none."""
-    place = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
-    return Path(place) if place and Path(place).is_dir() else Path.home()
+    folder = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
+    return Path(folder) if folder and Path(folder).is_dir() else Path.home()
 
 
 class ReportSheet(Overlay):
@@ -70,13 +70,13 @@ class ReportSheet(Overlay):
         self,
         theme: Theme,
         window: QWidget,
-        asks: FileDialogs,
-        say: Callable[[str], object],
+        dialogs: FileDialogs,
+        notify: Callable[[str], object],
         clock: Callable[[], float],
     ) -> None:
         # `say` announces a finished report if the sheet is closed; `clock` returns seconds since 1970.
         super().__init__(theme, window, _("Report a problem"))
-        self._asks, self._say, self._clock = asks, say, clock
+        self._asks, self._say, self._clock = dialogs, notify, clock
         self._parts: ReportParts | None = None
         self._behaviours: ReportedWorkGetter = tuple
         self._writer: ReportWriter | None = None
@@ -128,27 +128,27 @@ class ReportSheet(Overlay):
         column.addLayout(self._said)
         column.addLayout(self._foot)
 
-    def _fill(self, inside: QVBoxLayout) -> None:
-        inside.setContentsMargins(SIDE, 0, SIDE, 4)
-        inside.setSpacing(6)
-        inside.addWidget(self.introduction)
-        inside.addSpacing(6)
-        inside.addWidget(label(_("What happened?"), "title"))
-        inside.addWidget(self.happened)
-        inside.addSpacing(6)
-        inside.addWidget(label(_("Included"), "title"))
-        inside.addLayout(self.list)
-        inside.addSpacing(6)
-        inside.addWidget(label(_("Not included"), "title"))
+    def _fill(self, column: QVBoxLayout) -> None:
+        column.setContentsMargins(SIDE, 0, SIDE, 4)
+        column.setSpacing(6)
+        column.addWidget(self.introduction)
+        column.addSpacing(6)
+        column.addWidget(label(_("What happened?"), "title"))
+        column.addWidget(self.happened)
+        column.addSpacing(6)
+        column.addWidget(label(_("Included"), "title"))
+        column.addLayout(self.list)
+        column.addSpacing(6)
+        column.addWidget(label(_("Not included"), "title"))
         left_out = QVBoxLayout()
         left_out.setSpacing(4)
-        self._left_out = [_PartRow(self.theme, _(words), "x") for words in EXCLUDED_PARTS]
+        self._left_out = [_PartRow(self.theme, _(text), "x") for text in EXCLUDED_PARTS]
         for line in self._left_out:
             left_out.addWidget(line)
-        inside.addLayout(left_out)
-        inside.addSpacing(6)
-        inside.addWidget(self.work)
-        inside.addWidget(self.names)
+        column.addLayout(left_out)
+        column.addSpacing(6)
+        column.addWidget(self.work)
+        column.addWidget(self.names)
 
     def show_for(self, parts: ReportParts, names: Sequence[str], behaviours: ReportedWorkGetter) -> None:
         """Open the sheet.
@@ -165,8 +165,8 @@ class ReportSheet(Overlay):
             if line is not None:
                 line.hide()
                 line.deleteLater()
-        for words in describe_contents(parts):
-            self.list.addWidget(_PartRow(self.theme, words, "check"))
+        for text in describe_contents(parts):
+            self.list.addWidget(_PartRow(self.theme, text, "check"))
         self._left_out[0].words.setText(_(NO_BEHAVIOURS_UNLESS if names else NO_BEHAVIOURS))
         self.work.setChecked(False)
         self.names.setText(work_text(names) if names else "")
@@ -181,29 +181,29 @@ class ReportSheet(Overlay):
 
     def preferred_size(self, room: QSize) -> QSize:
         buttons = self.write.sizeHint().width() + self.show_file.sizeHint().width() + 2 * SIDE + 40
-        wide = min(room.width(), max(round(self.theme.scaled(WIDE)), buttons))
+        width = min(room.width(), max(round(self.theme.scaled(WIDE)), buttons))
         layout = self._inside.layout()
-        inner = wide - 2 - SCROLL_BAR
-        inside = layout.totalHeightForWidth(inner) if layout is not None else 0
-        foot = self._foot.sizeHint().height()
+        inner = width - 2 - SCROLL_BAR
+        content_height = layout.totalHeightForWidth(inner) if layout is not None else 0
+        footer_height = self._foot.sizeHint().height()
         if self.state.text():
-            foot += self.state.heightForWidth(wide - 2 - 2 * SIDE) + 10
-        high = inside + self._head.sizeHint().height() + foot + 14 + 2 * 10 + 16 + 4
-        return QSize(wide, min(room.height(), high))
+            footer_height += self.state.heightForWidth(width - 2 - 2 * SIDE) + 10
+        height = content_height + self._head.sizeHint().height() + footer_height + 14 + 2 * 10 + 16 + 4
+        return QSize(width, min(room.height(), height))
 
-    def _set_status(self, words: str, role: str = "textSecondary", path: Path | None = None) -> None:
+    def _set_status(self, text: str, role: str = "textSecondary", path: Path | None = None) -> None:
         # If there is a path, the button to show the file appears.
         self.written = path
         set_role(self.state, role)
-        self.state.setText(words)
-        paint.show_when(self.state, bool(words))
+        self.state.setText(text)
+        paint.show_when(self.state, bool(text))
         paint.show_when(self.show_file, path is not None)
         self.write.setEnabled(self._writer is None)
         self.write.set_kind("plain" if path is not None else "primary")
         if self.isVisible():
             self.place()
-            if words:
-                paint.announce(self.state, words)
+            if text:
+                paint.announce(self.state, text)
 
     def _ask_path(self) -> None:
         suggestion = documents_folder() / file_name(self._clock())
@@ -214,10 +214,10 @@ class ReportSheet(Overlay):
         if parts is None or self._writer is not None:
             return
         happened = self.happened.text()
-        work = tuple(self._behaviours()) if self.work.isChecked() else ()
+        behaviours = tuple(self._behaviours()) if self.work.isChecked() else ()
         # A copy, because settings may change while the thread reads them.
-        still = replace(parts, settings=dict(parts.settings))
-        self._writer = ReportWriter(path, lambda: create_report(still, happened, work))
+        parts_copy = replace(parts, settings=dict(parts.settings))
+        self._writer = ReportWriter(path, lambda: create_report(parts_copy, happened, behaviours))
         self._set_status(_("Writing the report."))
         self._looking.start()
 
@@ -229,15 +229,15 @@ class ReportSheet(Overlay):
         self._writer = None
         if writer.problem:
             self._set_status(f"{writer.problem[:1].upper()}{writer.problem[1:]}.", "error")
-            said = self.state.text()
+            message = self.state.text()
         else:
-            said = _("The report is in {file}").format(file=without_home(str(writer.path)))
-            self._set_status(said, path=writer.path)
+            message = _("The report is in {file}").format(file=without_home(str(writer.path)))
+            self._set_status(message, path=writer.path)
             self.happened.set_text("")
         if self.isVisible():
             (self.show_file if not writer.problem else self.write).setFocus(Qt.FocusReason.OtherFocusReason)
         else:
-            self._say(said)
+            self._say(message)
 
     def _show_file(self) -> None:
         if self.written is not None:
@@ -249,10 +249,10 @@ class ReportSheet(Overlay):
 class _PartRow(QWidget):
     """Line that names a part of the report, with an icon for included or omitted."""
 
-    def __init__(self, theme: Theme, words: str, icon: str) -> None:
+    def __init__(self, theme: Theme, text: str, icon: str) -> None:
         super().__init__()
         self._theme, self._icon = theme, icon
-        self.words: QLabel = label(words, "body", wrap=True)
+        self.words: QLabel = label(text, "body", wrap=True)
         row = QHBoxLayout(self)
         row.setContentsMargins(ICON_SIZE + 8, 0, 0, 0)
         row.addWidget(self.words, 1)

@@ -62,12 +62,12 @@ class SettingsSheet(Overlay):
         if restart is not None:
             self.restart.clicked.connect(restart)
         modes = [(mode, _(MODE_LABELS[mode][0]), MODE_LABELS[mode][1]) for mode in MODES]
-        look = pgettext("colours of the window", "Appearance")
-        self.mode = Segments(theme, modes, check=True, size="form", name=look)
+        mode_name = pgettext("colours of the window", "Appearance")
+        self.mode = Segments(theme, modes, check=True, size="form", name=mode_name)
         self.text = Segments(
             theme, [(p, f"{p} %", None) for p in TEXT_SIZES], check=True, size="form", name=_("Text size")
         )
-        wishes = [(wish, _(PREFERENCE_LABELS[wish]), None) for wish in PREFERENCES]
+        wishes = [(preference, _(PREFERENCE_LABELS[preference]), None) for preference in PREFERENCES]
         self.contrast = Segments(theme, wishes, check=True, size="form", name=_("High contrast"))
         self.motion = Segments(theme, wishes, check=True, size="form", name=_("Reduce motion"))
         self.robots = Switch(theme, _("Reopen at startup"))
@@ -98,8 +98,8 @@ class SettingsSheet(Overlay):
         return segments
 
     def _lay_out(self) -> None:
-        head = self.make_header(label(_("Settings"), "heading"))
-        head.setContentsMargins(19, 0, 19, 0)
+        header = self.make_header(label(_("Settings"), "heading"))
+        header.setContentsMargins(19, 0, 19, 0)
         self._inside = QWidget()
         self._inside.setProperty("bare", "true")
         self._fill(QGridLayout(self._inside))
@@ -111,7 +111,7 @@ class SettingsSheet(Overlay):
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 14, 1, 16)
         column.setSpacing(12)
-        column.addLayout(head)
+        column.addLayout(header)
         column.addWidget(self._area, 1)
 
     def _fill(self, grid: QGridLayout) -> None:
@@ -122,27 +122,27 @@ class SettingsSheet(Overlay):
         pictures = QHBoxLayout()
         pictures.addWidget(self.folder, 1)
         pictures.addWidget(self.choose)
-        spoken = QHBoxLayout()
-        spoken.addWidget(self.language)
-        spoken.addWidget(self.from_next_start)
-        spoken.addWidget(self.restart)
-        spoken.addStretch(1)
-        heard = QHBoxLayout()
-        heard.addWidget(self.voice, 1)
+        language_row = QHBoxLayout()
+        language_row.addWidget(self.language)
+        language_row.addWidget(self.from_next_start)
+        language_row.addWidget(self.restart)
+        language_row.addStretch(1)
+        voice_row = QHBoxLayout()
+        voice_row.addWidget(self.voice, 1)
         rows: tuple[tuple[str, QWidget | QHBoxLayout], ...] = (
-            (_("Language"), spoken),
+            (_("Language"), language_row),
             (pgettext("colours of the window", "Appearance"), self.mode),
             (_("Text size"), self.text),
             (_("High contrast"), self.contrast),
             (_("Reduce motion"), self.motion),
             (_("Virtual robots"), self.robots),
-            (_("Robot voice"), heard),
+            (_("Robot voice"), voice_row),
             (_("Keyboard"), self.shortcuts),
             (_("Images"), pictures),
         )
-        for row, (words, control) in enumerate(rows):
-            said = label(words, "bodyLarge", role="textSecondary")
-            grid.addWidget(said, row, 0, Qt.AlignmentFlag.AlignVCenter)
+        for row, (text, control) in enumerate(rows):
+            caption = label(text, "bodyLarge", role="textSecondary")
+            grid.addWidget(caption, row, 0, Qt.AlignmentFlag.AlignVCenter)
             if isinstance(control, QWidget):
                 grid.addWidget(control, row, 1, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
             else:
@@ -154,10 +154,10 @@ class SettingsSheet(Overlay):
         return self.language.selected_button() or self
 
     def preferred_size(self, room: QSize) -> QSize:
-        inside = self._inside.sizeHint()
-        wide = max(round(self.theme.scaled(WIDTH)), inside.width() + 14)
-        high = inside.height() + self.sizeHint().height() - self._area.sizeHint().height() + 4
-        return QSize(min(room.width(), wide), min(room.height(), high))
+        content_size = self._inside.sizeHint()
+        width = max(round(self.theme.scaled(WIDTH)), content_size.width() + 14)
+        height = content_size.height() + self.sizeHint().height() - self._area.sizeHint().height() + 4
+        return QSize(min(room.width(), width), min(room.height(), height))
 
     def open(self) -> None:
         """Update the sheet to the current settings and open it."""
@@ -167,9 +167,9 @@ class SettingsSheet(Overlay):
 
     def _show(self) -> None:
         theme = self.theme
-        chosen = self._selected_language()
-        self.language.set_value(chosen)
-        is_new = chosen != i18n.language()
+        language = self._selected_language()
+        self.language.set_value(language)
+        is_new = language != i18n.language()
         self.from_next_start.setVisible(is_new and not self._can_restart)
         self.restart.setVisible(is_new and self._can_restart)
         self.mode.set_value(theme.mode)
@@ -187,24 +187,24 @@ class SettingsSheet(Overlay):
 
     def _selected_language(self) -> str:
         # The language that was chosen here if it is available, else the current one.
-        chosen = self._settings.get("language", "")
-        return chosen if chosen in dict(i18n.selectable_languages()) else i18n.language()
+        language = self._settings.get("language", "")
+        return language if language in dict(i18n.selectable_languages()) else i18n.language()
 
-    def _set_language(self, chosen: str) -> None:
-        self._state.save("language", chosen)
+    def _set_language(self, language: str) -> None:
+        self._state.save("language", language)
         self._show()
 
-    def _set_mode(self, chosen: str) -> None:
-        mode = next(mode for mode in MODES if mode == chosen)
+    def _set_mode(self, selected: str) -> None:
+        mode = next(mode for mode in MODES if mode == selected)
         self._apply(lambda: self.theme.set_mode(mode))
 
-    def _set_contrast(self, chosen: str) -> None:
-        wish = next(wish for wish in PREFERENCES if wish == chosen)
-        self._apply(lambda: self.theme.set_contrast(wish))
+    def _set_contrast(self, selected: str) -> None:
+        preference = next(preference for preference in PREFERENCES if preference == selected)
+        self._apply(lambda: self.theme.set_contrast(preference))
 
-    def _set_motion(self, chosen: str) -> None:
-        wish = next(wish for wish in PREFERENCES if wish == chosen)
-        self._apply(lambda: self.theme.set_motion(wish))
+    def _set_motion(self, selected: str) -> None:
+        preference = next(preference for preference in PREFERENCES if preference == selected)
+        self._apply(lambda: self.theme.set_motion(preference))
 
     def _ask_folder(self) -> None:
         before = str(snapshots.folder(self._settings))

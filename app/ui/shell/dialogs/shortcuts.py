@@ -63,16 +63,16 @@ class ShortcutSheet(Overlay):
         shortcuts.changed.connect(self._show)
 
     def _lay_out(self) -> None:
-        head = self.make_header(label(_("Keyboard shortcuts"), "heading"))
-        foot = QHBoxLayout()
-        foot.setSpacing(8)
-        foot.addWidget(self.said, 1)
+        header = self.make_header(label(_("Keyboard shortcuts"), "heading"))
+        footer = QHBoxLayout()
+        footer.setSpacing(8)
+        footer.addWidget(self.said, 1)
         for button in (self.swap, self.reset, self.reset_all):
-            foot.addWidget(button)
+            footer.addWidget(button)
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 14, 1, 14)
         column.setSpacing(10)
-        for part, sides in ((head, 19), (self.field, 19), (self.rows, 0), (foot, 19)):
+        for part, sides in ((header, 19), (self.field, 19), (self.rows, 0), (footer, 19)):
             row = QHBoxLayout()
             row.setContentsMargins(sides, 0, sides, 0)
             if isinstance(part, QWidget):
@@ -102,22 +102,24 @@ class ShortcutSheet(Overlay):
         self._show(f"command:{name}")
         self.record()
 
-    def _show(self, chosen: str = "") -> None:
+    def _show(self, selected_id: str = "") -> None:
         query = self.field.text().strip()
         before = self.rows.entry
         lines: list[Line] = []
         for heading, entry in self._entries():
             text = f"{entry.text} {shortcut_text(entry.key)}" if query else entry.text
-            fits = match(query, text)
-            if fits is None:
+            text_match = match(query, text)
+            if text_match is None:
                 continue
             if Heading(heading) not in lines:
                 lines.append(Heading(heading))
             end = len(entry.text)
-            spans = tuple((begin, min(stop, end)) for begin, stop in fits[1] if begin < end)
+            spans = tuple((begin, min(stop, end)) for begin, stop in text_match[1] if begin < end)
             lines.append(Match(entry, 0.0, spans if query else ()))
-        keep = chosen if chosen.startswith(("command:", "fixed:")) else before.id if before else ""
-        self.rows.show_lines(lines, keep)
+        entry_id = (
+            selected_id if selected_id.startswith(("command:", "fixed:")) else before.id if before else ""
+        )
+        self.rows.show_lines(lines, entry_id)
         self._on_selection_changed()
 
     def _entries(self) -> list[tuple[str, Entry]]:
@@ -127,8 +129,8 @@ class ShortcutSheet(Overlay):
                 continue
             keys = "\n".join(self._shortcuts.keys_of(row.id))
             note = _("custom") if self._shortcuts.is_customised(row.id) else ""
-            place = row.menu or GROUP_LABELS.get(row.id.partition(".")[0], "View")
-            group = groups.setdefault(_(place), [])
+            group_name = row.menu or GROUP_LABELS.get(row.id.partition(".")[0], "View")
+            group = groups.setdefault(_(group_name), [])
             group.append(Entry(f"command:{row.id}", row.label, "", note, keys))
         for number, fixed in enumerate(FIXED_KEYS):
             keys = "\n".join(fixed.key.split(", "))
@@ -159,21 +161,21 @@ class ShortcutSheet(Overlay):
         self.rows.look.waiting = entry.id
         paint.show_when(self.swap, False)
         self.field.setFocus(Qt.FocusReason.OtherFocusReason)
-        words = _("Press the new shortcut for “{command}”. Esc cancels.")
-        self._set_status(words.format(command=entry.text))
+        message = _("Press the new shortcut for “{command}”. Esc cancels.")
+        self._set_status(message.format(command=entry.text))
         self.rows.viewport().update()
 
-    def _stop_recording(self, said: str = "") -> None:
+    def _stop_recording(self, message: str = "") -> None:
         self._waiting = self.rows.look.waiting = ""
         self._offer = None
         paint.show_when(self.swap, False)
-        self._set_status(said or _(HINT))
+        self._set_status(message or _(HINT))
         self.rows.viewport().update()
 
-    def _set_status(self, said: str) -> None:
-        self.said.setText(said)
-        if said != _(HINT) and self.isVisible():
-            paint.announce(self.said, said)
+    def _set_status(self, message: str) -> None:
+        self.said.setText(message)
+        if message != _(HINT) and self.isVisible():
+            paint.announce(self.said, message)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is not self.field:
@@ -199,40 +201,40 @@ class ShortcutSheet(Overlay):
         if key == Qt.Key.Key_Delete and not self.field.text():
             self._remove_shortcut()
             return True
-        plain = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
-        return plain and self.rows.handle(key)
+        is_unmodified = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+        return is_unmodified and self.rows.handle(key)
 
     def _assign(self, pressed: QKeyEvent) -> None:
         name, key = self._waiting, format_key(pressed.keyCombination())
         if pressed.key() == Qt.Key.Key_Escape:
             self._stop_recording()
             return
-        refusal = self._shortcuts.rejection_reason(name, pressed.keyCombination())
-        if refusal:
-            self._set_status(refusal)
+        reason = self._shortcuts.rejection_reason(name, pressed.keyCombination())
+        if reason:
+            self._set_status(reason)
             return
-        words = self._shortcuts.commands[name].label
-        holder = self._shortcuts.command_for(key)
-        if holder and holder != name:
-            other = self._shortcuts.commands[holder].label
-            said = _(
+        text = self._shortcuts.commands[name].label
+        owner = self._shortcuts.command_for(key)
+        if owner and owner != name:
+            other = self._shortcuts.commands[owner].label
+            message = _(
                 "{key} is already the shortcut of “{command}”. Swap them, or press Enter again to replace it."
             )
-            self._stop_recording(said.format(key=shortcut_text(key), command=other))
+            self._stop_recording(message.format(key=shortcut_text(key), command=other))
             self._offer = (name, key)
             paint.show_when(self.swap, True)
             return
         self._stop_recording(
-            _("The shortcut of “{command}” is now {key}.").format(command=words, key=shortcut_text(key))
+            _("The shortcut of “{command}” is now {key}.").format(command=text, key=shortcut_text(key))
         )
         self._shortcuts.assign(name, key)
 
     def _swap(self) -> None:
         if self._offer is not None:
             name, key = self._offer
-            words = self._shortcuts.commands[name].label
+            text = self._shortcuts.commands[name].label
             self._stop_recording(
-                _("The shortcut of “{command}” is now {key}.").format(command=words, key=shortcut_text(key))
+                _("The shortcut of “{command}” is now {key}.").format(command=text, key=shortcut_text(key))
             )
             self._shortcuts.swap(name, key)
             self.field.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -244,9 +246,9 @@ class ShortcutSheet(Overlay):
         if entry.name == STOP_COMMAND and len(self._shortcuts.keys_of(STOP_COMMAND)) == 1:
             self._set_status(_("F12 can't be removed: it always triggers Stop."))
             return
-        said = _("“{command}” no longer has a shortcut.").format(command=entry.text)
+        message = _("“{command}” no longer has a shortcut.").format(command=entry.text)
         self._stop_recording(
-            _("F12 is now the only shortcut for Stop.") if entry.name == STOP_COMMAND else said
+            _("F12 is now the only shortcut for Stop.") if entry.name == STOP_COMMAND else message
         )
         self._shortcuts.assign(entry.name, "")
 

@@ -30,39 +30,39 @@ class StudioDialogs:
         self._theme, self._window, self._settings = theme, window, settings
         self._sheet: FileSheet | None = None
 
-    def open(self, folder: str, take: Callable[[Path], None]) -> None:
+    def open(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Ask for a behaviour to open."""
-        self._get_sheet().ask_open(Path(folder or Path.home()), take)
+        self._get_sheet().ask_open(Path(folder or Path.home()), callback)
 
-    def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
+    def save(self, suggestion: str, callback: Callable[[Path], None]) -> None:
         """Ask for the folder and name to save a behaviour."""
-        self._get_sheet().ask_save(Path(suggestion), take)
+        self._get_sheet().ask_save(Path(suggestion), callback)
 
     def save_as(
         self,
         title: str,
         suggestion: Path,
         kinds: Sequence[FileKind],
-        take: Callable[[Path, FileKind], None],
+        callback: Callable[[Path, FileKind], None],
     ) -> None:
         """Ask for folder, name and format to save a file other than a behaviour."""
-        self._get_sheet().ask_save_as(title, suggestion, kinds, take)
+        self._get_sheet().ask_save_as(title, suggestion, kinds, callback)
 
-    def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
+    def open_picture(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Ask for an image file."""
-        self._get_sheet().ask_picture(Path(folder or pictures_folder()), take)
+        self._get_sheet().ask_picture(Path(folder or pictures_folder()), callback)
 
-    def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
+    def open_recording(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Ask for a recording to open."""
-        self._get_sheet().ask_open(_nearest_folder(folder), take, RECORDING_QUESTION)
+        self._get_sheet().ask_open(_nearest_folder(folder), callback, RECORDING_QUESTION)
 
-    def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
+    def open_layout(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Ask for a layout file to import."""
-        self._get_sheet().ask_open(_nearest_folder(folder), take, LAYOUT_QUESTION)
+        self._get_sheet().ask_open(_nearest_folder(folder), callback, LAYOUT_QUESTION)
 
-    def select_folder(self, folder: str, take: Callable[[Path], None]) -> None:
+    def select_folder(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Ask for a folder."""
-        self._get_sheet().ask_folder(_nearest_folder(folder), take)
+        self._get_sheet().ask_folder(_nearest_folder(folder), callback)
 
     def _get_sheet(self) -> FileSheet:
         if self._sheet is None:
@@ -76,5 +76,5 @@ class StudioDialogs:
 
 def _nearest_folder(folder: str) -> Path:
     # Nearest existing ancestor of a missing folder.
-    wanted = Path(folder)
-    return next((each for each in (wanted, *wanted.parents) if each.is_dir()), Path.home())
+    path = Path(folder)
+    return next((each for each in (path, *path.parents) if each.is_dir()), Path.home())

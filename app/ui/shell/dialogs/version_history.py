@@ -36,23 +36,23 @@ SAVE_FIRST_TEXT = lazy(
 )
 
 
-def difference_text(found: Difference) -> str:
+def difference_text(diff: Difference) -> str:
     """Format the difference of a version from the current blocks.
 
     The text is such as "14 blocks; since then 3 added, 1 removed".
     """
     counts = (
-        (found.added, ngettext("{count} added", "{count} added", found.added)),
-        (found.removed, ngettext("{count} removed", "{count} removed", found.removed)),
-        (found.changed, ngettext("{count} changed", "{count} changed", found.changed)),
+        (diff.added, ngettext("{count} added", "{count} added", diff.added)),
+        (diff.removed, ngettext("{count} removed", "{count} removed", diff.removed)),
+        (diff.changed, ngettext("{count} changed", "{count} changed", diff.changed)),
     )
-    changes = ", ".join(words.format(count=count) for count, words in counts if count)
-    blocks = ngettext("{count} block", "{count} blocks", found.block_count).format(
-        count=group_digits(found.block_count)
+    changes = ", ".join(text.format(count=count) for count, text in counts if count)
+    blocks = ngettext("{count} block", "{count} blocks", diff.block_count).format(
+        count=group_digits(diff.block_count)
     )
     if changes:
         return _("{blocks}, {changes} since").format(blocks=blocks, changes=changes)
-    same = _("{blocks}, reordered") if found.is_rearranged else _("{blocks}, unchanged since")
+    same = _("{blocks}, reordered") if diff.is_rearranged else _("{blocks}, unchanged since")
     return same.format(blocks=blocks)
 
 
@@ -92,19 +92,19 @@ class VersionHistorySheet(Overlay):
         self.button.clicked.connect(self.open_selected)
 
     def _lay_out(self) -> None:
-        head = self.make_header(self.heading)
-        head.setContentsMargins(19, 0, 19, 0)
+        header = self.make_header(self.heading)
+        header.setContentsMargins(19, 0, 19, 0)
         self._foot = QWidget()
         self._foot.setProperty("bare", "true")
-        foot = QHBoxLayout(self._foot)
-        foot.setContentsMargins(19, 0, 19, 0)
-        foot.setSpacing(12)
-        foot.addWidget(self.hint, 1)
-        foot.addWidget(self.button)
+        footer = QHBoxLayout(self._foot)
+        footer.setContentsMargins(19, 0, 19, 0)
+        footer.setSpacing(12)
+        footer.addWidget(self.hint, 1)
+        footer.addWidget(self.button)
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 14, 1, 14)
         column.setSpacing(10)
-        column.addLayout(head)
+        column.addLayout(header)
         column.addWidget(self.rows, 1)
         column.addWidget(self.empty, 1)
         column.addWidget(self._foot)
@@ -128,11 +128,11 @@ class VersionHistorySheet(Overlay):
         """
         self._name, self._now = name, workspace
         moment = now if now is not None else dt.datetime.now().astimezone()
-        own = versions_of(path) if path is not None else []
+        own_versions = versions_of(path) if path is not None else []
         others = namesakes_of(path) if path is not None else []
-        self._versions = {f"version:{each.copy}": each for each in (*own, *others)}
+        self._versions = {f"version:{each.copy}": each for each in (*own_versions, *others)}
         self._unread = deque(self._versions)
-        lines: list[Line] = [self._version_entry(each, moment) for each in own]
+        lines: list[Line] = [self._version_entry(each, moment) for each in own_versions]
         if others:
             lines += [
                 Heading(_("Versions of other files named {name}").format(name=name)),
@@ -141,8 +141,8 @@ class VersionHistorySheet(Overlay):
         self.heading.setText(_("Earlier versions of {name}").format(name=title or name))
         self.setAccessibleName(self.heading.text())
         self._show_empty_state(name, path)
-        for widget, shown in ((self.rows, True), (self._foot, True), (self.empty, False)):
-            paint.show_when(widget, shown == bool(lines))
+        for widget, needs_lines in ((self.rows, True), (self._foot, True), (self.empty, False)):
+            paint.show_when(widget, needs_lines == bool(lines))
         self.rows.show_lines(lines)
         self._reading.start(0)
         self.open()
@@ -156,21 +156,21 @@ class VersionHistorySheet(Overlay):
             self.empty.set_actions([EmptyAction(_("Close"), self.dismiss)])
 
     def _version_entry(self, version: Version, now: dt.datetime) -> Match:
-        then = dt.datetime.fromtimestamp(version.written_s, tz=now.tzinfo)
-        return Match(Entry(f"version:{version.copy}", date_time_text(then, now), "history"))
+        written = dt.datetime.fromtimestamp(version.written_s, tz=now.tzinfo)
+        return Match(Entry(f"version:{version.copy}", date_time_text(written, now), "history"))
 
     def first(self) -> QWidget:
         return self.rows if self._versions else self.empty.findChild(Button) or self
 
     def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
-        wide = min(room.width(), round(scaled(WIDTH)))
+        width = min(room.width(), round(scaled(WIDTH)))
         layout = self.layout()
         if not self._versions or layout is None:
-            return QSize(wide, min(room.height(), round(scaled(EMPTY_HEIGHT))))
-        rest = layout.totalHeightForWidth(wide) - self.rows.sizeHint().height()
-        high = rest + self.rows.content_height() + 8
-        return QSize(wide, min(room.height(), round(scaled(MAX_HEIGHT)), high))
+            return QSize(width, min(room.height(), round(scaled(EMPTY_HEIGHT))))
+        rest = layout.totalHeightForWidth(width) - self.rows.sizeHint().height()
+        height = rest + self.rows.content_height() + 8
+        return QSize(width, min(room.height(), round(scaled(MAX_HEIGHT)), height))
 
     def _read_next(self) -> None:
         if not self._unread or not self.isVisible():
@@ -205,10 +205,12 @@ class VersionHistorySheet(Overlay):
         if entry is None or entry.reason:
             return
         version = self._versions[entry.id]
-        then = dt.datetime.fromtimestamp(version.written_s).astimezone()
+        written = dt.datetime.fromtimestamp(version.written_s).astimezone()
         self.dismiss()
         name = _("{name}, {day} {clock}").format(
-            name=self._name, day=day_text(then.day, then.month), clock=f"{then.hour}.{then.minute:02d}"
+            name=self._name,
+            day=day_text(written.day, written.month),
+            clock=f"{written.hour}.{written.minute:02d}",
         )
         self._open_copy(version.copy, name)
 

@@ -90,18 +90,18 @@ class DockBody(QWidget):
         left.raise_()
         right.raise_()
 
-    def show_error(self, sentence: str, again: Callable[[], object]) -> None:
+    def show_error(self, message: str, retry: Callable[[], object]) -> None:
         """Show an error in place of the panel.
 
         Args:
-            sentence: Error message.
-            again: Callback of the button "Try again".
+            message: Error message.
+            retry: Callback of the button "Try again".
         """
         if self._failure is None:
-            self._failure = EmptyState(self._theme, "circle-x", _("This panel stopped"), sentence)
+            self._failure = EmptyState(self._theme, "circle-x", _("This panel stopped"), message)
             self._stack.addWidget(self._failure)
-        self._failure.set_texts(_("This panel stopped"), sentence)
-        self._failure.set_actions([EmptyAction(_("Try again"), again, "rotate-ccw")])
+        self._failure.set_texts(_("This panel stopped"), message)
+        self._failure.set_actions([EmptyAction(_("Try again"), retry, "rotate-ccw")])
         self._stack.setCurrentWidget(self._failure)
 
     def show_panel(self) -> None:
@@ -194,8 +194,8 @@ class Dock(QDockWidget):
         """Replace the placeholder by a panel."""
         old = (self.title, self.body)
         self._set_panel(panel)
-        for each in old:
-            each.deleteLater()
+        for widget in old:
+            widget.deleteLater()
         self.visibilityChanged.emit(self.front)  # the new title needs the tabs, too
 
     def _restyle(self) -> None:
@@ -244,9 +244,9 @@ class Dock(QDockWidget):
         """
         if self.front or self.failed:
             return None
-        found: list[tuple[str, str] | None] = []
-        self._try(lambda: found.append(self.panel.badge()))
-        return found[0] if found else None
+        badges: list[tuple[str, str] | None] = []
+        self._try(lambda: badges.append(self.panel.badge()))
+        return badges[0] if badges else None
 
     def _try(self, act: Callable[[], object]) -> str | None:
         try:
@@ -255,12 +255,12 @@ class Dock(QDockWidget):
             self.failed = True
             with suppress(*CAUGHT_ERRORS):  # a failed panel needs no subscriptions
                 self.panel.suspend()
-            sentence = error_text(error)[:MAX_MESSAGE_LENGTH]
-            said = ("the panel '%s' stopped: %s", self.description.name, sentence)
-            _log.error(*said, exc_info=error, extra=CONSOLE_EXTRA)
+            message = error_text(error)[:MAX_MESSAGE_LENGTH]
+            log_args = ("the panel '%s' stopped: %s", self.description.name, message)
+            _log.error(*log_args, exc_info=error, extra=CONSOLE_EXTRA)
             traceback.clear_frames(error.__traceback__)
-            self.body.show_error(sentence, self.retry)
-            return sentence
+            self.body.show_error(message, self.retry)
+            return message
         return None
 
     def retry(self) -> None:
@@ -276,12 +276,12 @@ class Dock(QDockWidget):
             The state, or {} if the panel raises an exception or the state can't be encoded as JSON.
         """
         try:
-            found = self.panel.save_state()
-            json.dumps(found)
+            state = self.panel.save_state()
+            json.dumps(state)
         except CAUGHT_ERRORS:
             _log.exception("saving the state of panel '%s' failed", self.description.name)
             return {}
-        return found
+        return state
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         """Restore the state of the panel.
@@ -314,13 +314,13 @@ class Dock(QDockWidget):
     def menu(self) -> Menu:
         """Return a new menu with the actions of the panel, and with Float and Close."""
         menu = Menu(self._theme, self)
-        own: list[QAction] = []
+        actions: list[QAction] = []
         try:
-            own.extend(self.panel.more_actions())
+            actions.extend(self.panel.more_actions())
         except CAUGHT_ERRORS:  # the dock can still be closed
             _log.exception("reading the actions of panel '%s' failed", self.description.name)
-        menu.addActions(own)
-        if own:
+        menu.addActions(actions)
+        if actions:
             menu.addSeparator()
         if self.description.allows_multiple:
             more = menu.addAction(self._theme.icon("plus"), _("Open another panel to the side"))
@@ -339,8 +339,8 @@ class Dock(QDockWidget):
         stops = tab_stops(self.panel, self.panel)
         first = next(stops, self.panel)
         if isinstance(first, QScrollArea):  # the first item inside is a better target than the whole area
-            inside = next(stops, None)
-            return inside if inside is not None and first.isAncestorOf(inside) else first
+            inner = next(stops, None)
+            return inner if inner is not None and first.isAncestorOf(inner) else first
         return first
 
     def _float(self) -> None:
@@ -418,9 +418,9 @@ def dock_for_kinds(docks: Mapping[str, Dock], names: Iterable[str], kinds: set[s
         names: Keys of the docks to check, in order.
         kinds: Message type and codec of a topic.
     """
-    there = [docks[name] for name in names]
-    for wanted in (kinds, {ANY_TYPE}):
-        for dock in there:
-            if wanted & set(dock.description.accepted_types):
+    candidates = [docks[name] for name in names]
+    for accepted in (kinds, {ANY_TYPE}):
+        for dock in candidates:
+            if accepted & set(dock.description.accepted_types):
                 return dock
     return None

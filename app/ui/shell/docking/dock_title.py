@@ -29,18 +29,18 @@ class TitleTab(PaintedButton):
 
     elides_text = True
 
-    def __init__(self, theme: Theme, text: str, icon: str, chosen: bool) -> None:
+    def __init__(self, theme: Theme, text: str, icon: str, checked: bool) -> None:
         super().__init__(theme, text, checkable=True)
         self._icon = icon
         self._bare = False
         self.badge: tuple[str, str] | None = None
-        self.setChecked(chosen)
+        self.setChecked(checked)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
-    def set_icon_only(self, bare: bool) -> None:
-        """Show only the icon if `bare`, else the icon and the name."""
-        if bare != self._bare:
-            self._bare = bare
+    def set_icon_only(self, icon_only: bool) -> None:
+        """Show only the icon if `icon_only`, else the icon and the name."""
+        if icon_only != self._bare:
+            self._bare = icon_only
             self.updateGeometry()
             self.update()
 
@@ -60,16 +60,16 @@ class TitleTab(PaintedButton):
         return self._badge_width() + GAP if self.badge else 0.0
 
     def _badge_width(self) -> float:
-        words = self.badge[0] if self.badge else ""
-        return max(self._theme.scaled(BADGE_SIZE), paint.width_of(self._theme.font("caption"), words) + 10)
+        text = self.badge[0] if self.badge else ""
+        return max(self._theme.scaled(BADGE_SIZE), paint.width_of(self._theme.font("caption"), text) + 10)
 
     def icon_only_width(self) -> int:
         """Return the width in px with the icon only."""
         return round(self._theme.scaled(ICON) + 16 + self._badge_room())
 
     def sizeHint(self) -> QSize:
-        high = max(26, round(paint.height_of(self._theme.font("title"))) + 6)
-        return QSize(self.icon_only_width() if self._bare else self.full_width(), high)
+        height = max(26, round(paint.height_of(self._theme.font("title"))) + 6)
+        return QSize(self.icon_only_width() if self._bare else self.full_width(), height)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(min(self.icon_only_width(), self.full_width()), self.sizeHint().height())
@@ -84,26 +84,30 @@ class TitleTab(PaintedButton):
         theme = self._theme
         if self.isChecked() or self.is_hovered:
             paint.box(painter, rect, theme.radius("small"), theme.colour("hover"))
-        ink = theme.colour("text" if self.isChecked() else "textSecondary")
+        colour = theme.colour("text" if self.isChecked() else "textSecondary")
         room = rect.adjusted(0, 0, -self._badge_room(), 0)
         if self._bare:
             side = theme.scaled(ICON)
-            square = QRectF(0, 0, side, side)
-            square.moveCenter(room.center())
+            icon_area = QRectF(0, 0, side, side)
+            icon_area.moveCenter(room.center())
             if room.width() >= side or not self.badge:  # a badge is preferred over a clipped icon
-                paint_icon(painter, square, self._icon, ink)
+                paint_icon(painter, icon_area, self._icon, colour)
         else:
-            paint.text_line(painter, room, self.text(), theme.font("title"), ink, paint.CENTRE)
+            paint.text_line(painter, room, self.text(), theme.font("title"), colour, paint.CENTRE)
         if self.badge:
             self._paint_badge(painter, rect, *self.badge)
 
-    def _paint_badge(self, painter: QPainter, rect: QRectF, words: str, status: str) -> None:
-        theme, high, wide = self._theme, self._theme.scaled(BADGE_SIZE), self._badge_width()
-        left = max(rect.left() + 1, rect.right() - wide - 8)  # the badge is never clipped
-        place = QRectF(left, rect.center().y() - high / 2, min(wide, rect.width() - 2), high)
-        look = theme.status(status)
-        paint.box(painter, place, high / 2, theme.colour(look.tint or "sunken"), theme.colour(look.colour))
-        paint.text_line(painter, place, words, theme.font("caption"), theme.colour(look.colour), paint.CENTRE)
+    def _paint_badge(self, painter: QPainter, rect: QRectF, text: str, status: str) -> None:
+        theme, height, width = self._theme, self._theme.scaled(BADGE_SIZE), self._badge_width()
+        left = max(rect.left() + 1, rect.right() - width - 8)  # the badge is never clipped
+        badge_rect = QRectF(left, rect.center().y() - height / 2, min(width, rect.width() - 2), height)
+        style = theme.status(status)
+        paint.box(
+            painter, badge_rect, height / 2, theme.colour(style.tint or "sunken"), theme.colour(style.colour)
+        )
+        paint.text_line(
+            painter, badge_rect, text, theme.font("caption"), theme.colour(style.colour), paint.CENTRE
+        )
 
 
 class DockTitle(QWidget):
@@ -132,10 +136,10 @@ class DockTitle(QWidget):
         self._shared_row.addStretch(1)
         self._shared.hide()
         column.addWidget(self._shared)
-        own = QWidget()  # a widget, because the size of a nested layout is updated late
-        own.installEventFilter(self)
-        self._row = QHBoxLayout(own)
-        column.addWidget(own, 1)
+        row_widget = QWidget()  # a widget, because the size of a nested layout is updated late
+        row_widget.installEventFilter(self)
+        self._row = QHBoxLayout(row_widget)
+        column.addWidget(row_widget, 1)
         self._fill()
         panel.title_changed.connect(self.show_title)
         self.show_title()
@@ -200,8 +204,8 @@ class DockTitle(QWidget):
             old.deleteLater()
         self._tabs = []
         paint.show_when(self.name, not names and self._whole is None)
-        for index, (text, icon, chosen, bring) in enumerate(names):
-            tab = TitleTab(self._theme, text, icon, chosen)
+        for index, (text, icon, is_current, bring) in enumerate(names):
+            tab = TitleTab(self._theme, text, icon, is_current)
             tab.clicked.connect(lambda _on=False, bring=bring: bring())
             row.insertWidget(index, tab)
             self._tabs.append(tab)
@@ -231,37 +235,37 @@ class DockTitle(QWidget):
                 chip.set_icon_only(False)
             return
         room = self._room_for_tabs()
-        words = sum(chip.full_width() - chip.icon_only_width() for chip in chips)
-        whole = sum(tab.full_width() for tab in self._tabs)
-        behind = sum(tab.icon_only_width() for tab in self._tabs if not tab.isChecked())
-        front = behind + sum(tab.full_width() for tab in self._tabs if tab.isChecked())
-        silent = whole > room and (whole <= room + words or front > room)
-        room += words if silent else 0
-        bare = whole > room
-        least = room - behind < self._theme.scaled(MIN_NAME_WIDTH)
+        chip_texts_width = sum(chip.full_width() - chip.icon_only_width() for chip in chips)
+        full_width = sum(tab.full_width() for tab in self._tabs)
+        background_width = sum(tab.icon_only_width() for tab in self._tabs if not tab.isChecked())
+        front = background_width + sum(tab.full_width() for tab in self._tabs if tab.isChecked())
+        silent = full_width > room and (full_width <= room + chip_texts_width or front > room)
+        room += chip_texts_width if silent else 0
+        icon_only = full_width > room
+        is_narrow = room - background_width < self._theme.scaled(MIN_NAME_WIDTH)
         for chip in chips:
             chip.set_icon_only(silent)
         for tab in self._tabs:
-            tab.set_icon_only(bare and (not tab.isChecked() or least))
+            tab.set_icon_only(icon_only and (not tab.isChecked() or is_narrow))
 
     def _other_widgets(self) -> list[QWidget]:
         row = self._tab_row
-        items = (row.itemAt(place) for place in range(row.count()))
+        items = (row.itemAt(index) for index in range(row.count()))
         widgets = (item.widget() for item in items if item is not None)
         return [each for each in widgets if each and not each.isHidden() and each not in self._tabs]
 
     def _room_for_tabs(self) -> int:
         # Width in px with the full text of all chips.
         row, others = self._tab_row, self._other_widgets()
-        margins, taken = row.contentsMargins(), 0
-        for each in others:
-            if isinstance(each, Chip):
-                taken += each.full_width()
+        margins, used_width = row.contentsMargins(), 0
+        for widget in others:
+            if isinstance(widget, Chip):
+                used_width += widget.full_width()
             else:
-                hint = each.minimumSizeHint() if each is self._subtitle else each.sizeHint()
-                taken += hint.width()
+                hint = widget.minimumSizeHint() if widget is self._subtitle else widget.sizeHint()
+                used_width += hint.width()
         gaps = row.spacing() * (len(others) + len(self._tabs) - 1)
-        return self.width() - margins.left() - margins.right() - taken - gaps
+        return self.width() - margins.left() - margins.right() - used_width - gaps
 
     def show_badges(self, badges: Sequence[tuple[str, str] | None]) -> None:
         """Set the badges of the tabs, in the order of the tabs; None for no badge."""

@@ -49,7 +49,7 @@ def encode_layout(name: str, base: str, saved: Mapping[str, object]) -> bytes:
         base: Name of the built-in layout on which it is based.
         saved: Arrangement returned by `Workbench.save`.
     """
-    plain = {
+    document = {
         "format": FORMAT,
         "version": VERSION,
         "studio": __version__,
@@ -58,13 +58,13 @@ def encode_layout(name: str, base: str, saved: Mapping[str, object]) -> bytes:
         "arrangement": dict(saved),
         "sum": _checksum(saved),
     }
-    return orjson.dumps(plain, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+    return orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
 
 
 def _checksum(saved: Mapping[str, object]) -> str:
     # A checksum is needed because Qt doesn't validate its part of the state and may crash if it is damaged.
-    plain = orjson.dumps(dict(saved), option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
-    return hashlib.sha256(plain).hexdigest()
+    encoded = orjson.dumps(dict(saved), option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
+    return hashlib.sha256(encoded).hexdigest()
 
 
 def decode_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
@@ -79,45 +79,49 @@ def decode_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile
         LayoutFileError: The file isn't a valid layout.
     """
     try:
-        told = deep_json.loads(data)
+        content = deep_json.loads(data)
     except (ValueError, RecursionError) as error:
         raise LayoutFileError(_("it is damaged or not a Studio layout")) from error
-    if not isinstance(told, dict) or told.get("format") != FORMAT:
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise LayoutFileError(_("it isn't a Studio layout"))
-    version = told.get("version")
+    version = content.get("version")
     if type(version) is not int or version < 1:
         raise LayoutFileError(_("the file is damaged"))
     if version > VERSION:
         raise LayoutFileError(_("it was saved by a newer version of Studio; update Studio to open it"))
-    base, saved = told.get("base"), told.get("arrangement")
+    base, saved = content.get("base"), content.get("arrangement")
     if not isinstance(base, str) or base not in {layout.name for layout in LAYOUTS}:
         raise LayoutFileError(_("it belongs to a layout that this version of Studio doesn't have"))
     opened = saved.get("open") if isinstance(saved, dict) else None
     if not isinstance(saved, dict) or not isinstance(opened, list) or not isinstance(saved.get("docks"), str):
         raise LayoutFileError(_("the file is damaged"))
-    if told.get("sum") != _checksum(saved):
+    if content.get("sum") != _checksum(saved):
         raise LayoutFileError(_("the file is damaged"))
     keys = list(dict.fromkeys(key for key in opened if isinstance(key, str)))
-    known = [key for key in keys if parse_key(key)[0] in panels]
-    unknown = tuple(dict.fromkeys(parse_key(key)[0] for key in keys if key not in known))
+    known_keys = [key for key in keys if parse_key(key)[0] in panels]
+    unknown = tuple(dict.fromkeys(parse_key(key)[0] for key in keys if key not in known_keys))
     about = saved.get("panels")
-    kept = {
+    panel_states = {
         key: each
         for key, each in (about if isinstance(about, dict) else {}).items()
         if parse_key(key)[0] in panels and isinstance(each, dict)
     }
     return LayoutFile(
-        _layout_name(told.get("name"), stem), base, {**saved, "open": known, "panels": kept}, unknown
+        _layout_name(content.get("name"), stem),
+        base,
+        {**saved, "open": known_keys, "panels": panel_states},
+        unknown,
     )
 
 
-def _layout_name(told: object, stem: str) -> str:
+def _layout_name(name: object, stem: str) -> str:
     # Shortened to one line for menus.
-    for each in (told, stem):
+    for candidate in (name, stem):
         letters = (
-            letter if letter.isprintable() else " " for letter in (each if isinstance(each, str) else "")
+            letter if letter.isprintable() else " "
+            for letter in (candidate if isinstance(candidate, str) else "")
         )
-        plain = " ".join("".join(letters).split())[:MAX_NAME_LENGTH].strip()
-        if plain:
-            return plain
+        cleaned = " ".join("".join(letters).split())[:MAX_NAME_LENGTH].strip()
+        if cleaned:
+            return cleaned
     return _("Layout")

@@ -40,23 +40,23 @@ class SavedLayouts:
     def all(self) -> tuple[CustomLayout, ...]:
         """Return all custom layouts, sorted by name."""
         bases = {layout.name for layout in LAYOUTS}
-        found = []
-        for key, kept in self._state.layouts().items():
-            if key.startswith(CUSTOM_PREFIX) and isinstance(kept, Mapping) and kept.get("base") in bases:
-                found.append(CustomLayout(key.removeprefix(CUSTOM_PREFIX), str(kept["base"])))
-        return tuple(sorted(found, key=lambda own: own.name.lower()))
+        layouts = []
+        for key, saved in self._state.layouts().items():
+            if key.startswith(CUSTOM_PREFIX) and isinstance(saved, Mapping) and saved.get("base") in bases:
+                layouts.append(CustomLayout(key.removeprefix(CUSTOM_PREFIX), str(saved["base"])))
+        return tuple(sorted(layouts, key=lambda own: own.name.lower()))
 
     def named(self, name: str) -> CustomLayout | None:
         """Return the custom layout with this name, or None."""
-        return next((own for own in self.all() if own.name == name), None)
+        return next((layout for layout in self.all() if layout.name == name), None)
 
     def custom_name(self, base: str) -> str:
         """Return the name of the custom layout that a workbench shows, or "" for the built-in one."""
-        chosen = self._current.get(base)
-        if chosen is None:
-            chosen = self._current[base] = self._state.selected_layout(base)
-        found = self.named(chosen) if chosen else None
-        return chosen if found is not None and found.base == base else ""
+        name = self._current.get(base)
+        if name is None:
+            name = self._current[base] = self._state.selected_layout(base)
+        layout = self.named(name) if name else None
+        return name if layout is not None and layout.base == base else ""
 
     def rejection_reason(self, name: str, but: str = "") -> str:
         """Return the reason why a name for a custom layout is invalid, as a sentence, or "".
@@ -70,44 +70,46 @@ class SavedLayouts:
             return _("Enter a name for the layout.")
         if len(name) > MAX_NAME_LENGTH:
             return _("The name is too long. Use at most {count} characters.").format(count=MAX_NAME_LENGTH)
-        taken = {_(layout.title).lower() for layout in LAYOUTS} | {own.name.lower() for own in self.all()}
-        is_taken = name.lower() in taken - {but.lower()}
+        taken_names = {_(layout.title).lower() for layout in LAYOUTS} | {
+            custom.name.lower() for custom in self.all()
+        }
+        is_taken = name.lower() in taken_names - {but.lower()}
         return _("“{name}” already exists.").format(name=name) if is_taken else ""
 
     def restore(self, bench: Workbench, base: str) -> None:
         """Restore the last arrangement of a workbench; if there is none or it is invalid, use the default."""
-        own = self.custom_name(base)
-        saved = self._state.layout_state(CUSTOM_PREFIX + own if own else base)
+        name = self.custom_name(base)
+        saved = self._state.layout_state(CUSTOM_PREFIX + name if name else base)
         if not saved:
             bench.reset_layout()
             return
         try:
-            well = bench.restore(saved)
+            restored = bench.restore(saved)
         except Exception as error:  # noqa: BLE001  whatever was in the file, the window opens
-            well = False
+            restored = False
             self._complain(f"{type(error).__name__}: {error}")
-        if not well:
+        if not restored:
             bench.reset_layout()
-            words = _("Can't restore the layout “{name}”; using its default.")
-            self._complain(words.format(name=own or _(layout_named(base).title)))
+            message = _("Can't restore the layout “{name}”; using its default.")
+            self._complain(message.format(name=name or _(layout_named(base).title)))
 
     def save(self, bench: Workbench, base: str) -> None:
         """Save the arrangement of a workbench for its current layout."""
-        own = self.custom_name(base)
-        self._state.save_layouts({CUSTOM_PREFIX + own if own else base: {**bench.save(), "base": base}})
+        name = self.custom_name(base)
+        self._state.save_layouts({CUSTOM_PREFIX + name if name else base: {**bench.save(), "base": base}})
 
-    def switch(self, bench: Workbench, base: str, own: str) -> None:
+    def switch(self, bench: Workbench, base: str, name: str) -> None:
         """Save the current layout of a workbench and switch to another one.
 
         Args:
             bench: Workbench.
             base: Name of its built-in layout.
-            own: Name of the custom layout to show, or "" for the built-in one.
+            name: Name of the custom layout to show, or "" for the built-in one.
         """
-        if own == self.custom_name(base):
+        if name == self.custom_name(base):
             return
         self.save(bench, base)
-        self._set_current(base, own)
+        self._set_current(base, name)
         self.restore(bench, base)
 
     def save_as(self, bench: Workbench, base: str, name: str) -> bool:
@@ -118,9 +120,9 @@ class SavedLayouts:
         Returns:
             False if the layout can't be saved and exists only until Studio closes.
         """
-        kept = self._state.save_layouts({CUSTOM_PREFIX + name.strip(): {**bench.save(), "base": base}})
+        saved = self._state.save_layouts({CUSTOM_PREFIX + name.strip(): {**bench.save(), "base": base}})
         self._set_current(base, name.strip())
-        return kept
+        return saved
 
     def can_restore(self, bench: Workbench, base: str, saved: Mapping[str, object]) -> bool:
         """Return True if a workbench can restore an imported arrangement.
@@ -152,14 +154,14 @@ class SavedLayouts:
 
     def rename(self, old: str, new: str) -> None:
         """Rename a custom layout. Has no effect if there is no layout with the old name."""
-        found = self.named(old)
-        if found is None or new.strip() == old:
+        layout = self.named(old)
+        if layout is None or new.strip() == old:
             return
-        shown = self.custom_name(found.base) == old
+        is_current = self.custom_name(layout.base) == old
         self._state.save_layouts({CUSTOM_PREFIX + new.strip(): self._state.layout_state(CUSTOM_PREFIX + old)})
         self._state.delete_layout(CUSTOM_PREFIX + old)
-        if shown:
-            self._set_current(found.base, new.strip())
+        if is_current:
+            self._set_current(layout.base, new.strip())
 
     def delete(self, bench: Workbench | None, name: str) -> tuple[bool, Callable[[], None]]:
         """Delete a custom layout and show the built-in layout in its place.
@@ -171,22 +173,22 @@ class SavedLayouts:
         Returns:
             True if the deletion was saved, and a function that undoes the deletion.
         """
-        found = self.named(name)
-        if found is None:
+        layout = self.named(name)
+        if layout is None:
             return True, lambda: None
-        base, shown = found.base, self.custom_name(found.base) == name
-        if shown and bench is not None:
+        base, is_current = layout.base, self.custom_name(layout.base) == name
+        if is_current and bench is not None:
             self.switch(bench, base, "")
         saved = dict(self._state.layout_state(CUSTOM_PREFIX + name))
-        kept = self._state.delete_layout(CUSTOM_PREFIX + name)
+        deleted = self._state.delete_layout(CUSTOM_PREFIX + name)
 
         def undo() -> None:
             self._state.save_layouts({CUSTOM_PREFIX + name: saved})
-            if shown and bench is not None:
+            if is_current and bench is not None:
                 self.switch(bench, base, name)
 
-        return kept, undo
+        return deleted, undo
 
-    def _set_current(self, base: str, own: str) -> None:
-        self._current[base] = own
-        self._state.save_selected_layout(base, own)
+    def _set_current(self, base: str, name: str) -> None:
+        self._current[base] = name
+        self._state.save_selected_layout(base, name)

@@ -17,26 +17,28 @@ from app.ui.shell.docking.layouts import Layout
 MIN_SIZE_PX = 120
 
 
-def shares(wanted: Sequence[int], room: int, *, keep: Sequence[bool]) -> list[int]:
+def shares(default_sizes: Sequence[int], room: int, *, fixed: Sequence[bool]) -> list[int]:
     """Distribute a length among widgets and return their sizes.
 
     Args:
-        wanted: Default sizes in px.
+        default_sizes: Default sizes in px.
         room: Length in px to distribute.
-        keep: True for each widget whose size is fixed; the others are scaled in proportion. If this
+        fixed: True for each widget whose size is fixed; the others are scaled in proportion. If this
             left less than `MIN_SIZE_PX` for one of them, all widgets are scaled.
     """
-    whole = max(1, sum(wanted))
-    least = sum(size if kept else MIN_SIZE_PX for size, kept in zip(wanted, keep, strict=True))
-    sizes = list(wanted)
-    if least > room:
-        sizes = [min(size, max(MIN_SIZE_PX, round(room * size / whole))) for size in wanted]
-    kept = sum(size for size, kept in zip(sizes, keep, strict=True) if kept)
-    free = sum(size for size, kept in zip(wanted, keep, strict=True) if not kept)
-    left = max(room - kept, MIN_SIZE_PX * sum(1 for kept in keep if not kept))
+    total = max(1, sum(default_sizes))
+    min_total = sum(
+        size if fixed_size else MIN_SIZE_PX for size, fixed_size in zip(default_sizes, fixed, strict=True)
+    )
+    sizes = list(default_sizes)
+    if min_total > room:
+        sizes = [min(size, max(MIN_SIZE_PX, round(room * size / total))) for size in default_sizes]
+    fixed_size = sum(size for size, fixed_size in zip(sizes, fixed, strict=True) if fixed_size)
+    free = sum(size for size, fixed_size in zip(default_sizes, fixed, strict=True) if not fixed_size)
+    remaining = max(room - fixed_size, MIN_SIZE_PX * sum(1 for fixed_size in fixed if not fixed_size))
     return [
-        own if kept else round(left * size / max(1, free))
-        for own, size, kept in zip(sizes, wanted, keep, strict=True)
+        current_size if fixed_size else round(remaining * size / max(1, free))
+        for current_size, size, fixed_size in zip(sizes, default_sizes, fixed, strict=True)
     ]
 
 
@@ -64,43 +66,45 @@ def fit(
     columns = []
     before: list[QDockWidget] = []
     for column in layout.columns:
-        there = []
+        dock_rows = []
         for names, height in column.rows:
             dock = _first_dock(bench, docks, [name for name in names if name not in folded])
             if dock is not None and not any(dock in bench.tabifiedDockWidgets(b) for b in before):
                 before.append(dock)
                 shared = [dock, *bench.tabifiedDockWidgets(dock)]
                 tall = [
-                    least
-                    for each, least in layout.min_heights.items()
+                    min_height
+                    for each, min_height in layout.min_heights.items()
                     if docks.get(each) in shared and not docks[each].isHidden()
                 ]
-                there.append((dock, max([height, *tall]), set(names) <= layout.deferred_panels))
-        if there:
-            columns.append((column, there))
+                dock_rows.append((dock, max([height, *tall]), set(names) <= layout.deferred_panels))
+        if dock_rows:
+            columns.append((column, dock_rows))
     if not columns:
         return
     margins = bench.contentsMargins()
-    wide = bench.width() - margins.left() - margins.right() - gap * (len(columns) - 1)
-    high = bench.height() - margins.top() - margins.bottom() - below
-    wanted = [
-        round(min(max(column.width * scale, column.share * wide), column.max_share * wide))
+    total_width = bench.width() - margins.left() - margins.right() - gap * (len(columns) - 1)
+    total_height = bench.height() - margins.top() - margins.bottom() - below
+    widths = [
+        round(min(max(column.width * scale, column.share * total_width), column.max_share * total_width))
         if column.width
         else MIN_SIZE_PX
         for column, _ in columns
     ]
-    keep = [bool(column.width) for column, _ in columns]
-    if all(keep):
-        keep[-1] = False
-    heads = [there[0][0] for _, there in columns]
-    for _, there in columns:
-        room = high - gap * (len(there) - 1)
-        heights = [height for _, height, _ in there]
-        fixed = [place > 0 and all(late for *_, late in there[place + 1 :]) for place in range(len(there))]
+    fixed_columns = [bool(column.width) for column, _ in columns]
+    if all(fixed_columns):
+        fixed_columns[-1] = False
+    top_docks = [dock_rows[0][0] for _, dock_rows in columns]
+    for _, dock_rows in columns:
+        room = total_height - gap * (len(dock_rows) - 1)
+        heights = [height for _, height, _ in dock_rows]
+        fixed = [
+            index > 0 and all(late for *_, late in dock_rows[index + 1 :]) for index in range(len(dock_rows))
+        ]
         bench.resizeDocks(
-            [dock for dock, *_ in there], shares(heights, room, keep=fixed), Qt.Orientation.Vertical
+            [dock for dock, *_ in dock_rows], shares(heights, room, fixed=fixed), Qt.Orientation.Vertical
         )
-    bench.resizeDocks(heads, shares(wanted, wide, keep=keep), Qt.Orientation.Horizontal)
+    bench.resizeDocks(top_docks, shares(widths, total_width, fixed=fixed_columns), Qt.Orientation.Horizontal)
 
 
 def shrink_above(
@@ -126,10 +130,10 @@ def shrink_above(
         if is_seen and bench.dockWidgetArea(dock) == area:
             columns.setdefault(dock.x(), []).append(dock)
     margins = bench.contentsMargins()
-    high = bench.height() - margins.top() - margins.bottom() - below
+    height = bench.height() - margins.top() - margins.bottom() - below
     for column in columns.values():
-        room, whole = high - gap * (len(column) - 1), sum(dock.height() for dock in column)
-        heights = [round(room * dock.height() / whole) for dock in column]
+        room, total = height - gap * (len(column) - 1), sum(dock.height() for dock in column)
+        heights = [round(room * dock.height() / total) for dock in column]
         bench.resizeDocks(column, heights, Qt.Orientation.Vertical)
 
 

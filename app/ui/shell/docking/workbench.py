@@ -86,8 +86,8 @@ class Workbench(QMainWindow):
         """Create a panel in advance to avoid a delay when it is opened. The panel is suspended until then."""
         description = self._panels.get(name)
         if description is not None and name not in self.docks and name not in self._ahead:
-            self._ahead[name] = made = make_dock(description, self._context, self._layout.density)
-            made.update_suspension(0.0)
+            self._ahead[name] = dock = make_dock(description, self._context, self._layout.density)
+            dock.update_suspension(0.0)
 
     def reset_layout(self) -> None:
         """Restore the default arrangement of the panels."""
@@ -105,12 +105,12 @@ class Workbench(QMainWindow):
         for column in self._layout.columns:
             rows = [names for names, _ in column.rows if any(n in self._panels for n in names)]
             rows = [names for names in rows if not set(names) <= self._layout.deferred_panels]
-            head = self._add_docks(rows[0], None, last) if rows else None
-            if head is not None:
-                waiting.append((head, rows[1:]))
-                last = head
-        for head, rows in waiting:
-            above = head
+            top_dock = self._add_docks(rows[0], None, last) if rows else None
+            if top_dock is not None:
+                waiting.append((top_dock, rows[1:]))
+                last = top_dock
+        for top_dock, rows in waiting:
+            above = top_dock
             for names in rows:
                 above = self._add_docks(names, above, None) or above
         self._arranged, self._moved, self._folded = True, False, ()
@@ -143,8 +143,8 @@ class Workbench(QMainWindow):
         # Has no effect if the user has moved a separator.
         halves, self._halves = self._halves, None
         if halves is not None:
-            way = HORIZONTAL if halves[0].y() == halves[1].y() else VERTICAL
-            self.resizeDocks(halves, [1, 1], way)
+            orientation = HORIZONTAL if halves[0].y() == halves[1].y() else VERTICAL
+            self.resizeDocks(halves, [1, 1], orientation)
         reopened, self._reopened = self._reopened, None
         if reopened is not None and self._moved:
             gap = self._theme.size("gap", self._layout.density)
@@ -174,10 +174,10 @@ class Workbench(QMainWindow):
                 or self.dockWidgetArea(dock) != BOTTOM_AREA
             ):
                 continue
-            high = self._heights.get(name) if self._moved else None
-            high = high or round(min(height * scale, MAX_BOTTOM_SHARE * self.height()))
-            self.resizeDocks([dock], [high], VERTICAL)
-            return high
+            dock_height = self._heights.get(name) if self._moved else None
+            dock_height = dock_height or round(min(height * scale, MAX_BOTTOM_SHARE * self.height()))
+            self.resizeDocks([dock], [dock_height], VERTICAL)
+            return dock_height
         return 0
 
     def event(self, event: QEvent) -> bool:
@@ -255,8 +255,8 @@ class Workbench(QMainWindow):
         )
         number = next(free, 0)
         if not number:
-            said = _("The maximum of {count} panels of this kind is already open")
-            self._context.show_toast(said.format(count=MAX_PANELS_PER_KIND))
+            message = _("The maximum of {count} panels of this kind is already open")
+            self._context.show_toast(message.format(count=MAX_PANELS_PER_KIND))
             return None
         if number == 1:
             return self.open(name)
@@ -303,9 +303,9 @@ class Workbench(QMainWindow):
         self._schedule_tabs()
 
         def reopen() -> None:
-            again = self.open(key)
-            if again is not None:
-                again.restore_state(state)
+            reopened = self.open(key)
+            if reopened is not None:
+                reopened.restore_state(state)
 
         title = numbered_title(_(dock.description.title), dock.number)
         self._context.show_toast(_("Closed {panel}").format(panel=title), _("Undo"), reopen)
@@ -331,7 +331,7 @@ class Workbench(QMainWindow):
         self._tabs_timer.start(0)
 
     def _update_tabs(self) -> None:
-        later = {name: place for place, name in enumerate(n for f in self._folded for n in f.panels)}
+        later = {name: index for index, name in enumerate(n for f in self._folded for n in f.panels)}
         order = sorted(self.docks.values(), key=lambda dock: later.get(dock.key, -1))
         for dock in order:
             together = [
@@ -365,19 +365,19 @@ class Workbench(QMainWindow):
         # Folds or unfolds panels depending on the available space.
         scale = self._theme.scaled(1)
         room = self.width() / scale, self.height() / scale
-        wanted = tuple(fold for fold in self._layout.folds if fold.applies(*room) and self._can_fold(fold))
-        if not self._arranged or wanted == self._folded or self._fold_timer.isActive():
+        folds = tuple(fold for fold in self._layout.folds if fold.applies(*room) and self._can_fold(fold))
+        if not self._arranged or folds == self._folded or self._fold_timer.isActive():
             return
-        if set(self._folded) - set(wanted):
+        if set(self._folded) - set(folds):
             self._fold_timer.start(0)  # Qt creates no tabs in the event loop turn in which it restores docks
             self._unfold()
             return
-        if not self._folded and wanted:
+        if not self._folded and folds:
             self._wide = self.saveState(STATE_VERSION)
-        for fold in wanted:
+        for fold in folds:
             if fold not in self._folded:
                 self._fold(fold)
-        self._folded = wanted
+        self._folded = folds
         self._size_timer.start(0)
         self._schedule_tabs()
 
@@ -390,14 +390,14 @@ class Workbench(QMainWindow):
 
     def _fold(self, fold: Fold) -> None:
         # Moves the panels with those that share their places; the target panel stays in front.
-        into = self.docks[fold.target]
+        target = self.docks[fold.target]
         for name in fold.panels:
             dock = self.docks[name]
-            if dock in self.tabifiedDockWidgets(into):
+            if dock in self.tabifiedDockWidgets(target):
                 continue
-            for each in (dock, *self.tabifiedDockWidgets(dock)):
-                self.tabifyDockWidget(into, each)
-        into.raise_()
+            for tab_dock in (dock, *self.tabifiedDockWidgets(dock)):
+                self.tabifyDockWidget(target, tab_dock)
+        target.raise_()
 
     def _folded_names(self) -> set[str]:
         return {
@@ -465,9 +465,9 @@ class Workbench(QMainWindow):
             if dock.is_displayed():
                 dock.title.show_badges([other.badge() for other in self._sharing.get(dock, ())])
 
-    def _report_failure(self, name: str, sentence: str | None) -> None:
-        if sentence is not None:
-            self.panel_failed.emit(name, sentence)
+    def _report_failure(self, name: str, message: str | None) -> None:
+        if message is not None:
+            self.panel_failed.emit(name, message)
 
     def focus_main_panel(self) -> None:
         """Set the focus to the main panel of the layout, which is the first open one."""
@@ -516,9 +516,9 @@ class Workbench(QMainWindow):
         self._wide = decode_state(saved.get("wide"))
         self._folded, self._moved = self._folds_of(saved), saved.get("moved") is True
         for name, dock in self.docks.items():
-            kept = panels.get(name) if isinstance(panels, Mapping) else None
-            if isinstance(kept, Mapping):
-                dock.restore_state(kept)
+            panel_state = panels.get(name) if isinstance(panels, Mapping) else None
+            if isinstance(panel_state, Mapping):
+                dock.restore_state(panel_state)
         self._update_folds()  # the size of window or text may have changed
         self._schedule_tabs()
         return True
@@ -551,7 +551,7 @@ def insert_dock(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], d
     panel.
     """
     name = dock.description.name
-    placed = {
+    docks_by_key = {
         other.key: other
         for other in docks.values()
         if other is not dock
@@ -563,10 +563,16 @@ def insert_dock(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], d
         return
     above = _panel_above(layout, name)
     home = name if dock.number > 1 else layout.tab_targets.get(name, "")
-    if above in placed and not placed[above].isHidden() and not bench.tabifiedDockWidgets(placed[above]):
-        bench.splitDockWidget(placed[above], dock, Qt.Orientation.Vertical)
-    elif placed:
-        bench.tabifyDockWidget(placed[home] if home in placed else list(placed.values())[-1], dock)
+    if (
+        above in docks_by_key
+        and not docks_by_key[above].isHidden()
+        and not bench.tabifiedDockWidgets(docks_by_key[above])
+    ):
+        bench.splitDockWidget(docks_by_key[above], dock, Qt.Orientation.Vertical)
+    elif docks_by_key:
+        bench.tabifyDockWidget(
+            docks_by_key[home] if home in docks_by_key else list(docks_by_key.values())[-1], dock
+        )
     else:
         bench.addDockWidget(MAIN_AREA, dock)
 
@@ -586,23 +592,23 @@ def insert_beside(
     if other is None or other.isHidden() or other.isFloating():
         insert_dock(bench, layout, docks, dock)
         return
-    ways = (HORIZONTAL, VERTICAL) if other.width() >= other.height() else (VERTICAL, HORIZONTAL)
+    orientations = (HORIZONTAL, VERTICAL) if other.width() >= other.height() else (VERTICAL, HORIZONTAL)
     # Qt adds a tab when a tabbed dock is split, so the place is reduced to one panel for a moment. In one
     # direction Qt may still see tabs; if in both, an additional tab is the result.
-    together = [each for each in bench.tabifiedDockWidgets(other) if isinstance(each, Dock)]
-    shown = [each for each in together if not each.isHidden()]
-    for way in ways:
-        for each in together:
-            bench.removeDockWidget(each)
-        bench.splitDockWidget(other, dock, way)
+    together = [tab_dock for tab_dock in bench.tabifiedDockWidgets(other) if isinstance(tab_dock, Dock)]
+    visible_docks = [tab_dock for tab_dock in together if not tab_dock.isHidden()]
+    for orientation in orientations:
+        for tab_dock in together:
+            bench.removeDockWidget(tab_dock)
+        bench.splitDockWidget(other, dock, orientation)
         is_tab = dock in bench.tabifiedDockWidgets(other)
-        for each in together:
-            bench.tabifyDockWidget(other, each)
-        for each in shown:
-            each.show()
+        for tab_dock in together:
+            bench.tabifyDockWidget(other, tab_dock)
+        for tab_dock in visible_docks:
+            tab_dock.show()
         if not is_tab and dock not in bench.tabifiedDockWidgets(other):
             break
-        if way is ways[0]:
+        if orientation is orientations[0]:
             bench.removeDockWidget(dock)
     other.raise_()
 

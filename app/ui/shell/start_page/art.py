@@ -94,23 +94,23 @@ class EmptyPageArt(Art):
         left, top = area.left() + max(24.0, area.width() / 2 - 108), area.top() + 41
         font = theme.font("body")
         font.setWeight(font.Weight.Bold)
-        words = pgettext("block", "when started")
-        block = QRectF(left, top, max(138.0, paint.width_of(font, words) + 32), 34)
+        text = pgettext("block", "when started")
+        block = QRectF(left, top, max(138.0, paint.width_of(font, text) + 32), 34)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(theme.block_colour("events"))
         painter.drawPath(block_path(block, radius=5, notch=12))
-        paint.text_line(painter, block.adjusted(14, 0, 0, 0), words, font, theme.block_text("events"))
+        paint.text_line(painter, block.adjusted(14, 0, 0, 0), text, font, theme.block_text("events"))
         quiet = theme.font("body")
         quiet.setWeight(quiet.Weight.Medium)
-        words = _("drop a block here")
-        wide = max(200.0, paint.width_of(quiet, words) + 40)
-        place = QRectF(left, block.bottom(), wide, 34)
+        text = _("drop a block here")
+        width = max(200.0, paint.width_of(quiet, text) + 40)
+        slot_rect = QRectF(left, block.bottom(), width, 34)
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.setPen(QPen(theme.colour("controlBorder"), 1.25, Qt.PenStyle.DashLine))
-        painter.drawPath(block_path(place, radius=5, notch=12))
+        painter.drawPath(block_path(slot_rect, radius=5, notch=12))
         colour = theme.colour("textSecondary")
-        paint.text_line(painter, place, words, quiet, colour, paint.CENTRE)
-        self._paint_mouse_pointer(painter, QPointF(place.right() - 18, place.bottom() + 8))
+        paint.text_line(painter, slot_rect, text, quiet, colour, paint.CENTRE)
+        self._paint_mouse_pointer(painter, QPointF(slot_rect.right() - 18, slot_rect.bottom() + 8))
 
     def _paint_mouse_pointer(self, painter: QPainter, tip: QPointF) -> None:
         shape = ((0, 0), (0, 17), (4, 13.3), (6.8, 19.5), (9.6, 18.2), (6.9, 12.2), (12.3, 12))
@@ -132,18 +132,18 @@ class StepsArt(Art):
         painter.fillRect(area, theme.colour("workspace"))
         font, strong = theme.font("body"), theme.font("body")
         strong.setWeight(strong.Weight.DemiBold)
-        start, say = pgettext("block", "when started"), pgettext("robot", "say")
-        words = (
-            _("Place “{block}” below “{start}”").format(block=say, start=start),
+        start, say_label = pgettext("block", "when started"), pgettext("robot", "say")
+        steps = (
+            _("Place “{block}” below “{start}”").format(block=say_label, start=start),
             _("Press Run and listen"),
             _("Make it turn"),
         )
         side, left = 20.0, area.left() + 24
-        for place, said in enumerate(words):
-            middle = area.center().y() + (place - 1) * 36
+        for index, text in enumerate(steps):
+            middle = area.center().y() + (index - 1) * 36
             mark = QRectF(left, middle - side / 2, side, side)
-            done = place < len(words) - 1
-            if done:
+            is_done = index < len(steps) - 1
+            if is_done:
                 paint_icon(painter, mark, "circle-check", theme.colour("ok"))
             else:
                 paint.box(
@@ -152,5 +152,5 @@ class StepsArt(Art):
                 number = theme.font("caption")
                 paint.text_line(painter, mark, "3", number, theme.colour("textSecondary"), paint.CENTRE)
             line = QRectF(mark.right() + 12, middle - 12, area.right() - mark.right() - 24, 24)
-            ink = theme.colour("textSecondary" if done else "text")
-            paint.text_line(painter, line, said, font if done else strong, ink)
+            colour = theme.colour("textSecondary" if is_done else "text")
+            paint.text_line(painter, line, text, font if is_done else strong, colour)

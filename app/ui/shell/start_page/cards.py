@@ -38,8 +38,8 @@ class CardTitle(QLabel):
         self.setWordWrap(True)
 
     def sizeHint(self) -> QSize:
-        wide = self.fontMetrics().horizontalAdvance(self.text()) + 2
-        return QSize(wide, self.heightForWidth(wide))
+        width = self.fontMetrics().horizontalAdvance(self.text()) + 2
+        return QSize(width, self.heightForWidth(width))
 
 
 class StartCard(Card):
@@ -58,13 +58,13 @@ class StartCard(Card):
         body = QVBoxLayout()
         body.setContentsMargins(20, 16, 20, 20)
         body.setSpacing(0)
-        head = QHBoxLayout()
-        head.setSpacing(10)
+        header = QHBoxLayout()
+        header.setSpacing(10)
         self.title = CardTitle(title)
-        head.addWidget(self.title)
-        head.addWidget(self.chip)
-        head.addStretch(1)
-        body.addLayout(head)
+        header.addWidget(self.title)
+        header.addWidget(self.chip)
+        header.addStretch(1)
+        body.addLayout(header)
         body.addSpacing(4)
         body.addWidget(self.text, 1)
         body.addSpacing(14)
@@ -125,8 +125,8 @@ class RecentRow(PaintedButton):
     def __init__(self, theme: Theme, recent: RecentFile, now: dt.datetime) -> None:
         super().__init__(theme, radius="panel")
         self.path = recent.path
-        then = dt.datetime.fromtimestamp(recent.opened_s, tz=now.tzinfo)
-        self._when = relative_day_text(then, now)
+        opened = dt.datetime.fromtimestamp(recent.opened_s, tz=now.tzinfo)
+        self._when = relative_day_text(opened, now)
         self.set_text(recent.name, _("Open {name}, {day}").format(name=recent.name, day=self._when))
         self.setToolTip(plain.tip(str(recent.path)))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -167,8 +167,8 @@ class _CommandLabel(QWidget):
         painter = QPainter(self)
         theme = self._theme
         paint.box(painter, QRectF(self.rect()), theme.radius("key"), theme.colour("sunken"))
-        ink = theme.colour("textSecondary")
-        paint.text_line(painter, QRectF(self.rect()), self._text, theme.font("code"), ink, paint.CENTRE)
+        colour = theme.colour("textSecondary")
+        paint.text_line(painter, QRectF(self.rect()), self._text, theme.font("code"), colour, paint.CENTRE)
         painter.end()
 
 

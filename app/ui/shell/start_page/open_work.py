@@ -71,8 +71,8 @@ class OpenRow(PaintedButton):
 
     def sizeHint(self) -> QSize:
         theme = self._theme
-        words = paint.height_of(theme.font("label")) + paint.height_of(theme.font("body"))
-        return QSize(240, max(HEIGHT, round(words) + 18))
+        text_height = paint.height_of(theme.font("label")) + paint.height_of(theme.font("body"))
+        return QSize(240, max(HEIGHT, round(text_height) + 18))
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
@@ -83,23 +83,23 @@ class OpenRow(PaintedButton):
         paint.box(painter, tile, theme.radius("control"), theme.block_colour("robot"))
         icon = tile.adjusted(7, 7, -7, -7)
         paint_icon(painter, icon, theme.icon_name("behaviour"), theme.block_text("robot"))
-        link, words = theme.font("button"), _("Resume")
+        link, text = theme.font("button"), _("Resume")
         side = theme.scaled(14)
-        wide = paint.width_of(link, words) + 6 + side
-        room = QRectF(LEFT, rect.top(), rect.width() - LEFT - wide - 26, rect.height())
+        link_width = paint.width_of(link, text) + 6 + side
+        room = QRectF(LEFT, rect.top(), rect.width() - LEFT - link_width - 26, rect.height())
         self._paint_text(painter, room)
         accent = theme.colour("accentText")
-        area = QRectF(rect.right() - 14 - wide, rect.top(), wide - side - 6, rect.height())
-        paint.text_line(painter, area, words, link, accent)
+        area = QRectF(rect.right() - 14 - link_width, rect.top(), link_width - side - 6, rect.height())
+        paint.text_line(painter, area, text, link, accent)
         arrow = QRectF(rect.right() - 14 - side, rect.center().y() - side / 2, side, side)
         paint_icon(painter, arrow, "arrow-right", accent)
 
     def _paint_text(self, painter: QPainter, room: QRectF) -> None:
         theme, work = self._theme, self.work
         name, state = theme.font("label"), theme.font("body")
-        high = paint.height_of(name)
-        top = room.center().y() - (high + paint.height_of(state)) / 2
-        line = QRectF(room.left(), top, room.width() - (DOT_SIZE + 8 if work.is_unsaved else 0), high)
+        name_height = paint.height_of(name)
+        top = room.center().y() - (name_height + paint.height_of(state)) / 2
+        line = QRectF(room.left(), top, room.width() - (DOT_SIZE + 8 if work.is_unsaved else 0), name_height)
         paint.text_line(painter, line, work.name, name, theme.colour("text"))
         if work.is_unsaved:
             left = room.left() + min(paint.width_of(name, work.name), line.width()) + 8
@@ -107,7 +107,7 @@ class OpenRow(PaintedButton):
             painter.setBrush(theme.colour("textSecondary"))
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.drawEllipse(QRectF(left, line.center().y() - DOT_SIZE / 2, DOT_SIZE, DOT_SIZE))
-        line = QRectF(room.left(), top + high, room.width(), paint.height_of(state))
+        line = QRectF(room.left(), top + name_height, room.width(), paint.height_of(state))
         paint.text_line(painter, line, self._state, state, theme.colour("textTertiary"))
 
 
@@ -137,28 +137,28 @@ class OpenWorkList(QWidget):
         self._grid = QGridLayout()
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setSpacing(8)
-        for place in range(COLUMNS):
-            self._grid.setColumnStretch(place, 1)
+        for index in range(COLUMNS):
+            self._grid.setColumnStretch(index, 1)
         column.addLayout(self._grid)
         self.hide()
 
-    def show_work(self, work: Sequence[OpenWork]) -> None:
+    def show_work(self, items: Sequence[OpenWork]) -> None:
         """Set the open behaviours; unchanged rows are not recreated."""
-        if tuple(work) == self._shown:
+        if tuple(items) == self._shown:
             return
-        self._shown = tuple(work)
-        had = self._focused_key(self.rows)
+        self._shown = tuple(items)
+        focused_key = self._focused_key(self.rows)
         for row in self.rows:
             self._grid.removeWidget(row)
             row.hide()
             row.deleteLater()
-        self.rows = [OpenRow(self._theme, each) for each in work]
-        for place, row in enumerate(self.rows):
+        self.rows = [OpenRow(self._theme, each) for each in items]
+        for index, row in enumerate(self.rows):
             row.clicked.connect(lambda _on=False, key=row.work.key: self.selected.emit(key))
-            self._grid.addWidget(row, place // COLUMNS, place % COLUMNS)
+            self._grid.addWidget(row, index // COLUMNS, index % COLUMNS)
         paint.show_when(self, bool(self.rows))
         for row in self.rows:
-            if row.work.key == had:
+            if row.work.key == focused_key:
                 row.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _focused_key(self, rows: Iterable[OpenRow]) -> str:

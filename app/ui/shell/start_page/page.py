@@ -84,7 +84,7 @@ class Example:
 
 def read_examples(folder: Path) -> tuple[Example, ...]:
     """Return the examples in a folder, sorted by file name; invalid files are skipped."""
-    found = []
+    examples = []
     for path in sorted(folder.glob("*.nepb")) if folder.is_dir() else []:
         try:
             data = json.loads(read_regular_file(path))
@@ -94,8 +94,8 @@ def read_examples(folder: Path) -> tuple[Example, ...]:
         if isinstance(workspace, dict):
             name = translate(NAME, str(data.get("name", path.stem)))
             text = translate(ABOUT, str(data.get("description", "")))
-            found.append(Example(path, name, text, rows(workspace)))
-    return tuple(found)
+            examples.append(Example(path, name, text, rows(workspace)))
+    return tuple(examples)
 
 
 def all_examples_text(count: int) -> str:
@@ -188,16 +188,16 @@ class StartPage(QWidget):
         column.addWidget(self.open_work)
         cards = self._cards = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         cards.setSpacing(CARD_GAP)
-        for place, card in enumerate(self._ordered_cards()):
-            cards.addWidget(card, OTHER if place else FIRST)
+        for index, card in enumerate(self._ordered_cards()):
+            cards.addWidget(card, OTHER if index else FIRST)
         column.addLayout(cards)
         column.addSpacing(26)
         self._all = LinkButton(self._theme, all_examples_text(len(examples)), "arrow-right")
         self._all.clicked.connect(lambda: self.show_all(not self._shows_all))
-        head = self._heading_row(label(_("Open an example"), "heading"), self._open)
-        head.addSpacing(8)
-        head.addWidget(self._all)
-        column.addLayout(head)
+        header = self._heading_row(label(_("Open an example"), "heading"), self._open)
+        header.addSpacing(8)
+        header.addWidget(self._all)
+        column.addLayout(header)
         column.addSpacing(10)
         column.addLayout(self._example_grid(examples))
         column.addSpacing(22)
@@ -224,16 +224,16 @@ class StartPage(QWidget):
         area.viewport().setAutoFillBackground(False)
         line = DevelopersLine(self._theme)
         line.developer_pressed.connect(self.developer_pressed)
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.setSpacing(0)
-        whole.addWidget(area, 1)
-        whole.addWidget(line)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(area, 1)
+        column.addWidget(line)
 
     def banner_area(self) -> QRect:
         """Return the area for an alert, above the heading of the page."""
-        high = TOP_MARGIN + self._banner_room.sizeHint().height() - 2 * BANNER_GAP
-        return QRect(BANNER_GAP, BANNER_GAP, self.width() - 2 * BANNER_GAP, high)
+        height = TOP_MARGIN + self._banner_room.sizeHint().height() - 2 * BANNER_GAP
+        return QRect(BANNER_GAP, BANNER_GAP, self.width() - 2 * BANNER_GAP, height)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -241,14 +241,14 @@ class StartPage(QWidget):
         self._fit_cards()
 
     def event(self, event: QEvent) -> bool:
-        done = super().event(event)
+        handled = super().event(event)
         if event.type() in {QEvent.Type.LayoutRequest, QEvent.Type.FontChange, QEvent.Type.Polish}:
             self._fit_cards()
-        return done
+        return handled
 
     def _fit_room(self) -> None:
-        least = round(self._theme.scaled(BANNER_LINE)) + 2 * BANNER_GAP - TOP_MARGIN
-        room = max(BANNER_ROOM if self.height() >= HIGH else 0, least)
+        min_room = round(self._theme.scaled(BANNER_LINE)) + 2 * BANNER_GAP - TOP_MARGIN
+        room = max(BANNER_ROOM if self.height() >= HIGH else 0, min_room)
         if room != self._banner_room.sizeHint().height():
             self._banner_room.changeSize(0, room, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
             self._content.invalidate()
@@ -258,12 +258,12 @@ class StartPage(QWidget):
         # visible.
         cards = (self.robot_card, self.new_card, self.learn_card)
         needed = sum(card.minimumSizeHint().width() for card in cards) + CARD_GAP * (len(cards) - 1)
-        beside = needed <= min(WIDTH, self.width() - 2 * MARGIN)
-        wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
-        if self._cards.direction() != wanted:
-            self._cards.setDirection(wanted)
+        fits_in_row = needed <= min(WIDTH, self.width() - 2 * MARGIN)
+        direction = QBoxLayout.Direction.LeftToRight if fits_in_row else QBoxLayout.Direction.TopToBottom
+        if self._cards.direction() != direction:
+            self._cards.setDirection(direction)
         for card in cards:
-            card.art.setVisible(beside or self.height() >= HIGH)
+            card.art.setVisible(fits_in_row or self.height() >= HIGH)
 
     def _ordered_cards(self) -> list[StartCard]:
         # The first card is the widest and has the primary button.
@@ -281,7 +281,7 @@ class StartPage(QWidget):
         if offers == self._offers:
             return
         self._offers = offers
-        had = self._not_now.hasFocus()
+        had_focus = self._not_now.hasFocus()
         self._learn.set_kind("primary" if offers else "plain")
         self._use.set_kind("plain" if offers else "primary")
         title, text = OFFER_TEXTS if offers else LEARN_TEXTS
@@ -289,14 +289,14 @@ class StartPage(QWidget):
         self.learn_card.border = "accent" if offers else "border"
         paint.show_when(self._not_now, offers)
         cards = self._ordered_cards()
-        for place, card in enumerate(cards):
+        for index, card in enumerate(cards):
             self._cards.removeWidget(card)
-            self._cards.insertWidget(place, card, OTHER if place else FIRST)
+            self._cards.insertWidget(index, card, OTHER if index else FIRST)
         for before, after in itertools.pairwise(
             [each for card in cards for each in card.findChildren(Button)]
         ):
             QWidget.setTabOrder(before, after)
-        if had:
+        if had_focus:
             self.focus_first()
 
     def _decline(self) -> None:
@@ -320,19 +320,19 @@ class StartPage(QWidget):
             card.clicked.connect(lambda _on=False, path=example.path: self.example_selected.emit(path))
             grid.addWidget(card, index // EXAMPLES_PER_ROW, index % EXAMPLES_PER_ROW)
             self.example_cards.append(card)
-        for place in range(EXAMPLES_PER_ROW):
-            grid.setColumnStretch(place, 1)
+        for column in range(EXAMPLES_PER_ROW):
+            grid.setColumnStretch(column, 1)
         self.show_all(False)
         return grid
 
-    def show_all(self, shown: bool) -> None:
-        """Show all examples if `shown`, else only the first row."""
-        self._shows_all = shown
+    def show_all(self, visible: bool) -> None:
+        """Show all examples if `visible`, else only the first row."""
+        self._shows_all = visible
         for card in self.example_cards[EXAMPLES_PER_ROW:]:
-            paint.show_when(card, shown)
+            paint.show_when(card, visible)
         paint.show_when(self._all, len(self.example_cards) > EXAMPLES_PER_ROW)
-        words = _("Fewer examples") if shown else all_examples_text(len(self.example_cards))
-        self._all.set_label(words, None if shown else "arrow-right")
+        text = _("Fewer examples") if visible else all_examples_text(len(self.example_cards))
+        self._all.set_label(text, None if visible else "arrow-right")
 
     def focus_examples(self) -> None:
         """Show all examples and focus the first one."""
@@ -368,33 +368,33 @@ class StartPage(QWidget):
             return
         other = Button(self._theme, _("Open a file"), "folder-open", kind="ghost")
         other.clicked.connect(self.open_pressed)
-        head = QWidget()
-        head.setLayout(self._heading_row(label(_("Recent"), "heading"), other))
-        layout.addWidget(head)
-        holder = QWidget()
-        row = QHBoxLayout(holder)
+        header = QWidget()
+        header.setLayout(self._heading_row(label(_("Recent"), "heading"), other))
+        layout.addWidget(header)
+        container = QWidget()
+        row = QHBoxLayout(container)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(8)
         for file in recent[:MAX_RECENT]:
-            shown = RecentRow(self._theme, file, moment)
-            shown.clicked.connect(lambda _on=False, path=file.path: self.file_selected.emit(path))
-            row.addWidget(shown, 1)
-            self.recent_rows.append(shown)
+            recent_row = RecentRow(self._theme, file, moment)
+            recent_row.clicked.connect(lambda _on=False, path=file.path: self.file_selected.emit(path))
+            row.addWidget(recent_row, 1)
+            self.recent_rows.append(recent_row)
         for _place in range(MAX_RECENT - len(recent[:MAX_RECENT])):
             row.addStretch(1)
-        layout.addWidget(holder)
+        layout.addWidget(container)
 
     def show_robot(self, chip: str, status: str) -> None:
         """Set text and status of the chip on the card "Connect a robot"; an empty text hides the chip."""
         self.robot_card.chip.set(chip, status)
 
-    def show_open(self, work: Sequence[OpenWork]) -> None:
+    def show_open(self, items: Sequence[OpenWork]) -> None:
         """Set the open behaviours; the section is hidden if there are none.
 
         If there are any, the card with the first steps is no longer the primary one.
         """
-        self.open_work.show_work(work)
-        if work:
+        self.open_work.show_work(items)
+        if items:
             self.offer_first_steps(False)
 
     def focus_first(self) -> None:

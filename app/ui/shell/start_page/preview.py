@@ -61,14 +61,14 @@ def _chain(block: Mapping[str, object], depth: int) -> Iterator[Row]:
     while isinstance(current, Mapping) and count < MAX_ROWS:
         count += 1
         inputs = current.get("inputs")
-        held = dict(inputs) if isinstance(inputs, Mapping) else {}
-        inside = [_child(value) for name, value in held.items() if _is_statement(str(name))]
+        slots = dict(inputs) if isinstance(inputs, Mapping) else {}
+        children = [_child(value) for name, value in slots.items() if _is_statement(str(name))]
         fields = current.get("fields")
-        values = len(held) - len(inside) + (len(fields) if isinstance(fields, Mapping) else 0)
+        values = len(slots) - len(children) + (len(fields) if isinstance(fields, Mapping) else 0)
         kind = str(current.get("type", ""))
         yield Row(depth, category_of(kind), len(kind.rsplit("_", 1)[-1]), min(values, 3))
         if depth < MAX_DEPTH:
-            for child in inside:
+            for child in children:
                 if child is not None:
                     yield from _chain(child, depth + 1)
         current = _child(current.get("next"))
@@ -92,20 +92,20 @@ def block_path(rect: QRectF, *, radius: float = 4.0, notch: float = 11.0) -> QPa
         notch: Distance of the notch from the left edge, and its width, in px.
     """
     left, top, right, bottom = rect.left(), rect.top(), rect.right(), rect.bottom()
-    wide, deep = notch, notch * 0.36
+    notch_width, notch_depth = notch, notch * 0.36
     path = QPainterPath(QPointF(left + radius, top))
-    path.lineTo(left + wide, top)
-    path.lineTo(left + wide + deep, top + deep)
-    path.lineTo(left + 2 * wide, top + deep)
-    path.lineTo(left + 2 * wide + deep, top)
+    path.lineTo(left + notch_width, top)
+    path.lineTo(left + notch_width + notch_depth, top + notch_depth)
+    path.lineTo(left + 2 * notch_width, top + notch_depth)
+    path.lineTo(left + 2 * notch_width + notch_depth, top)
     path.lineTo(right - radius, top)
     path.quadTo(right, top, right, top + radius)
     path.lineTo(right, bottom - radius)
     path.quadTo(right, bottom, right - radius, bottom)
-    path.lineTo(left + 2 * wide + deep, bottom)
-    path.lineTo(left + 2 * wide, bottom + deep)
-    path.lineTo(left + wide + deep, bottom + deep)
-    path.lineTo(left + wide, bottom)
+    path.lineTo(left + 2 * notch_width + notch_depth, bottom)
+    path.lineTo(left + 2 * notch_width, bottom + notch_depth)
+    path.lineTo(left + notch_width + notch_depth, bottom + notch_depth)
+    path.lineTo(left + notch_width, bottom)
     path.lineTo(left + radius, bottom)
     path.quadTo(left, bottom, left, bottom - radius)
     path.lineTo(left, top + radius)
@@ -114,11 +114,11 @@ def block_path(rect: QRectF, *, radius: float = 4.0, notch: float = 11.0) -> QPa
     return path
 
 
-def paint_rows(painter: QPainter, area: QRectF, theme: Theme, found: tuple[Row, ...]) -> None:
+def paint_rows(painter: QPainter, area: QRectF, theme: Theme, preview_rows: tuple[Row, ...]) -> None:
     """Paint blocks from the top of an area. The painter must be clipped to the area."""
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     top = area.top()
-    for row in found:
+    for row in preview_rows:
         if top > area.bottom():
             break
         left = area.left() + row.depth * INDENT
@@ -132,18 +132,18 @@ def paint_rows(painter: QPainter, area: QRectF, theme: Theme, found: tuple[Row, 
 
 
 def _paint_content(painter: QPainter, rect: QRectF, theme: Theme, row: Row) -> None:
-    ink = theme.block_text(row.category)
+    colour = theme.block_text(row.category)
     middle = rect.center().y() + 1
-    paint.box(painter, QRectF(rect.left() + 9, middle - 4, 8, 8), 2, ink)
-    words = QRectF(rect.left() + 24, middle - 2.5, 10 + 5.0 * row.text_length, 5)
+    paint.box(painter, QRectF(rect.left() + 9, middle - 4, 8, 8), 2, colour)
+    text_bar = QRectF(rect.left() + 24, middle - 2.5, 10 + 5.0 * row.text_length, 5)
     faint = theme.block_text(row.category)
     faint.setAlphaF(0.75)
-    paint.box(painter, words, 2.5, faint)
-    left = words.right() + 7
+    paint.box(painter, text_bar, 2.5, faint)
+    left = text_bar.right() + 7
     for _ in range(row.values):
         if left + 26 > rect.right() - 4:
             break
-        paint.box(painter, QRectF(left, middle - 5, 26, 10), 5, ink)
+        paint.box(painter, QRectF(left, middle - 5, 26, 10), 5, colour)
         left += 32
 
 

@@ -28,17 +28,19 @@ class CheckBox(PaintedButton):
         return QSize(round(width) + 1, max(MIN_HEIGHT, round(paint.height_of(font)) + 6))
 
     def minimumSizeHint(self) -> QSize:
-        wanted = self.sizeHint()
-        return QSize(min(round(self._theme.scaled(72)), wanted.width()), wanted.height())
+        preferred = self.sizeHint()
+        return QSize(min(round(self._theme.scaled(72)), preferred.width()), preferred.height())
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme, side = self._theme, self._theme.scaled(SIDE)
-        square = QRectF(1, rect.center().y() - side / 2, side, side)
+        box_rect = QRectF(1, rect.center().y() - side / 2, side, side)
         if self.isChecked():
-            paint.box(painter, square, theme.radius("key"), theme.colour("accent"))
-            paint_icon(painter, square.adjusted(2, 2, -2, -2), "check", theme.colour("onAccent"))
+            paint.box(painter, box_rect, theme.radius("key"), theme.colour("accent"))
+            paint_icon(painter, box_rect.adjusted(2, 2, -2, -2), "check", theme.colour("onAccent"))
         else:
             fill = theme.colour("hover" if self.is_highlighted else "sunken" if theme.dark else "panel")
-            paint.box(painter, square, theme.radius("key"), fill, theme.colour("controlBorder"))
-        ink = theme.colour("text" if self.isEnabled() else "textDisabled")
-        paint.text_line(painter, rect.adjusted(side + GAP + 1, 0, 0, 0), self.text(), theme.font("body"), ink)
+            paint.box(painter, box_rect, theme.radius("key"), fill, theme.colour("controlBorder"))
+        colour = theme.colour("text" if self.isEnabled() else "textDisabled")
+        paint.text_line(
+            painter, rect.adjusted(side + GAP + 1, 0, 0, 0), self.text(), theme.font("body"), colour
+        )

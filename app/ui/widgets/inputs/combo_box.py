@@ -27,8 +27,8 @@ class ComboBox(QComboBox):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setProperty("focusRadius", theme.radius("control"))
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
-        for value, words in options:
-            self.addItem(words, value)
+        for value, text in options:
+            self.addItem(text, value)
         self.setItemDelegate(QStyledItemDelegate(self))  # lets the style sheet set the padding of items
         self.setMaxVisibleItems(MAX_VISIBLE_ITEMS)
         set_round_corners(self.view().window())
@@ -70,8 +70,8 @@ class ComboBox(QComboBox):
         rect = QRectF(self.rect())
         fill = theme.colour("hover" if self.underMouse() else "sunken" if theme.dark else "panel")
         paint.box(painter, rect, theme.radius("control"), fill, theme.colour("controlBorder"))
-        ink = theme.colour("text" if self.isEnabled() else "textDisabled")
-        paint.text_line(painter, rect.adjusted(10, 0, -30, 0), self.currentText(), self.font(), ink)
-        square = QRectF(rect.right() - 26, rect.center().y() - 8, 16, 16)
-        paint_icon(painter, square, "chevron-down", theme.colour("textSecondary"))
+        colour = theme.colour("text" if self.isEnabled() else "textDisabled")
+        paint.text_line(painter, rect.adjusted(10, 0, -30, 0), self.currentText(), self.font(), colour)
+        icon_rect = QRectF(rect.right() - 26, rect.center().y() - 8, 16, 16)
+        paint_icon(painter, icon_rect, "chevron-down", theme.colour("textSecondary"))
         painter.end()

@@ -149,14 +149,14 @@ class NumberEdit(QLineEdit):
     def _limit_text(self, value: float) -> str:
         return f"{number_text(value)} {self._unit}".rstrip()
 
-    def _set_problem(self, sentence: str) -> None:
-        if sentence == self.sentence:
+    def _set_problem(self, message: str) -> None:
+        if message == self.sentence:
             return
-        self.sentence = sentence
-        self.setProperty("wrong", "true" if sentence else "false")
+        self.sentence = message
+        self.setProperty("wrong", "true" if message else "false")
         self.style().unpolish(self)
         self.style().polish(self)
-        self.problem_changed.emit(sentence)
+        self.problem_changed.emit(message)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
@@ -167,8 +167,8 @@ class NumberEdit(QLineEdit):
             painter, rect, self._unit, theme.font("body"), theme.colour("textTertiary"), paint.RIGHT
         )
         if self.sentence:
-            square = QRectF(7, self.height() / 2 - 7, 14, 14)
-            paint_icon(painter, square, theme.status("error").icon, theme.colour("error"))
+            icon_rect = QRectF(7, self.height() / 2 - 7, 14, 14)
+            paint_icon(painter, icon_rect, theme.status("error").icon, theme.colour("error"))
         painter.end()
 
 
@@ -198,8 +198,10 @@ class _MultiLineEdit(QPlainTextEdit):
         self.exited.emit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier)
-        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and held:
+        modifiers = event.modifiers() & (
+            Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier
+        )
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and modifiers:
             event.ignore()  # handled by the card, which tries the action
         else:
             super().keyPressEvent(event)
@@ -247,10 +249,10 @@ class LongTextField(QWidget):
         """True while the text is shown as invalid."""
         return self._wrong
 
-    def set_invalid(self, *, wrong: bool) -> None:
-        """Show the text as invalid if `wrong`, else as valid."""
-        if wrong != self._wrong:
-            self._wrong = wrong
+    def set_invalid(self, *, is_invalid: bool) -> None:
+        """Show the text as invalid if `is_invalid`, else as valid."""
+        if is_invalid != self._wrong:
+            self._wrong = is_invalid
             self.update()
 
     def _lines(self) -> int:
@@ -267,12 +269,12 @@ class LongTextField(QWidget):
     def _grow(self) -> None:
         lines = self._lines()
         text = round(lines * self._line_height()) + SHEET_PADDING
-        high = max(round(self._theme.scaled(MIN_HEIGHT)), text + 8)
+        height = max(round(self._theme.scaled(MIN_HEIGHT)), text + 8)
         self.edit.setFixedHeight(text)
-        shown = Qt.ScrollBarPolicy.ScrollBarAsNeeded if lines == MAX_LINES else None
-        self.edit.setVerticalScrollBarPolicy(shown or Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        if high != self.height():
-            self.setFixedHeight(high)
+        policy = Qt.ScrollBarPolicy.ScrollBarAsNeeded if lines == MAX_LINES else None
+        self.edit.setVerticalScrollBarPolicy(policy or Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        if height != self.height():
+            self.setFixedHeight(height)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -49,13 +49,13 @@ class _JsonHighlighter(QSyntaxHighlighter):
     def highlightBlock(self, text: str) -> None:
         if not self.is_on:
             return
-        for found in _TOKEN_PATTERN.finditer(text):
-            role = _HIGHLIGHT_RULES[int((found.lastgroup or "r0")[1:])][0]
-            shown = QTextCharFormat()
-            shown.setForeground(self._theme.colour(role))
+        for match in _TOKEN_PATTERN.finditer(text):
+            role = _HIGHLIGHT_RULES[int((match.lastgroup or "r0")[1:])][0]
+            text_format = QTextCharFormat()
+            text_format.setForeground(self._theme.colour(role))
             if role == "accentText":
-                shown.setBackground(self._theme.colour("accentTint"))
-            self.setFormat(found.start(), found.end() - found.start(), shown)
+                text_format.setBackground(self._theme.colour("accentTint"))
+            self.setFormat(match.start(), match.end() - match.start(), text_format)
 
 
 class _LineNumberArea(QWidget):
@@ -112,8 +112,10 @@ class JsonLinesEdit(QPlainTextEdit):
         self._place_numbers()
 
     def _place_numbers(self) -> None:
-        inside = self.contentsRect()
-        self._numbers.setGeometry(QRect(inside.left(), inside.top(), self._margin_width(), inside.height()))
+        contents = self.contentsRect()
+        self._numbers.setGeometry(
+            QRect(contents.left(), contents.top(), self._margin_width(), contents.height())
+        )
 
     def _on_scrolled(self, rect: QRect, dy: int) -> None:
         if dy:
@@ -134,16 +136,18 @@ class JsonLinesEdit(QPlainTextEdit):
         self.focus_changed.emit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier)
+        modifiers = event.modifiers() & (
+            Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier
+        )
         if event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter} or self.isReadOnly():
             super().keyPressEvent(event)
-        elif held:
+        elif modifiers:
             self.submitted.emit()
         else:
             before = self.textCursor().block().text()[: self.textCursor().positionInBlock()]
-            deep = len(before) - len(before.lstrip(" "))
-            deep += INDENT if before.rstrip().endswith(("{", "[")) else 0
-            self.textCursor().insertText("\n" + " " * deep)
+            indent = len(before) - len(before.lstrip(" "))
+            indent += INDENT if before.rstrip().endswith(("{", "[")) else 0
+            self.textCursor().insertText("\n" + " " * indent)
             self.ensureCursorVisible()
 
     def mark_line(self, line: int) -> None:
@@ -159,14 +163,14 @@ class JsonLinesEdit(QPlainTextEdit):
         self.setExtraSelections(marks)
         self._numbers.update()
 
-    def paint_numbers(self, place: QWidget, rect: QRect) -> None:
+    def paint_numbers(self, widget: QWidget, rect: QRect) -> None:
         """Paint the numbers of the visible lines.
 
         Args:
-            place: Widget on which the numbers are painted.
+            widget: Widget on which the numbers are painted.
             rect: Rectangle to repaint.
         """
-        theme, painter = self._theme, QPainter(place)
+        theme, painter = self._theme, QPainter(widget)
         block = self.firstVisibleBlock()
         while block.isValid():
             area = self.blockBoundingGeometry(block).translated(self.contentOffset())
@@ -177,15 +181,15 @@ class JsonLinesEdit(QPlainTextEdit):
             block = block.next()
         painter.end()
 
-    def _paint_number(self, painter: QPainter, block: QTextBlock, area: QRectF, ink: QColor) -> None:
+    def _paint_number(self, painter: QPainter, block: QTextBlock, area: QRectF, colour: QColor) -> None:
         theme, number = self._theme, block.blockNumber() + 1
         if number == self.wrong_line:
-            ink = theme.colour("error")
+            colour = theme.colour("error")
             row = QRectF(0, area.top(), self._numbers.width(), area.height())
             painter.fillRect(row, theme.colour("errorTint"))
-            paint_icon(painter, QRectF(2, area.center().y() - 7, 14, 14), theme.status("error").icon, ink)
+            paint_icon(painter, QRectF(2, area.center().y() - 7, 14, 14), theme.status("error").icon, colour)
         box = QRectF(0, area.top(), self._numbers.width() - 10, area.height())
-        paint.text_line(painter, box, str(number), self.font(), ink, paint.RIGHT)
+        paint.text_line(painter, box, str(number), self.font(), colour, paint.RIGHT)
 
 
 class JsonEdit(QWidget):

@@ -17,29 +17,29 @@ class PatternField(TokenField):
 
     def patterns(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the included and the excluded patterns, including the text being typed."""
-        wanted = [each.entry for each in self._tokens if not each.is_left_out]
+        included = [each.entry for each in self._tokens if not each.is_left_out]
         unwanted = [each.entry for each in self._tokens if each.is_left_out]
         more, less = parse_patterns(self.edit.text())
-        return tuple(dict.fromkeys((*wanted, *more))), tuple(dict.fromkeys((*unwanted, *less)))
+        return tuple(dict.fromkeys((*included, *more))), tuple(dict.fromkeys((*unwanted, *less)))
 
-    def show_patterns(self, wanted: Sequence[str], unwanted: Sequence[str]) -> None:
+    def show_patterns(self, included: Sequence[str], unwanted: Sequence[str]) -> None:
         """Set the tokens to the given patterns.
 
         Args:
-            wanted: Included patterns.
+            included: Included patterns.
             unwanted: Excluded patterns.
         """
-        if (tuple(wanted), tuple(unwanted)) == self.patterns():
+        if (tuple(included), tuple(unwanted)) == self.patterns():
             return
-        for each in list(self._tokens):
-            self._delete_token(each)
+        for token in list(self._tokens):
+            self._delete_token(token)
         self.edit.clear()
-        self._add(wanted, unwanted)
+        self._add(included, unwanted)
 
     def _on_edited(self, text: str) -> None:
         # A space completes a pattern; "not" is combined with the pattern that follows.
-        plain = text.replace(",", " ")
-        finished, blank, rest = plain.rpartition(" ")
+        normalised = text.replace(",", " ")
+        finished, blank, rest = normalised.rpartition(" ")
         words = finished.split()
         if words and words[-1].casefold() in {EXCLUDE_KEYWORD, _(EXCLUDE_KEYWORD).casefold()}:
             rest = f"{words.pop()} {rest}"
@@ -54,16 +54,16 @@ class PatternField(TokenField):
         text = self.edit.text()
         if not text.strip():
             return
-        wanted, unwanted = parse_patterns(text)
+        included, unwanted = parse_patterns(text)
         self.edit.clear()
-        self._add(wanted, unwanted)
+        self._add(included, unwanted)
         self.changed.emit()
         self.editing_finished.emit()
 
-    def _add(self, wanted: Sequence[str], unwanted: Sequence[str]) -> None:
-        there = {(each.entry, each.is_left_out) for each in self._tokens}
-        for is_left_out, patterns in ((False, wanted), (True, unwanted)):
+    def _add(self, included: Sequence[str], unwanted: Sequence[str]) -> None:
+        existing = {(each.entry, each.is_left_out) for each in self._tokens}
+        for is_left_out, patterns in ((False, included), (True, unwanted)):
             for pattern in patterns:
-                if (pattern, is_left_out) not in there:
+                if (pattern, is_left_out) not in existing:
                     self._add_token(Token(self._theme, pattern, is_left_out=is_left_out))
         self._arrange()

@@ -18,22 +18,28 @@ class RenameField(QLineEdit):
 
     Args:
         theme: Theme.
-        place: Widget that contains the item.
+        parent: Widget that contains the item.
         rect: Rectangle of the item.
         name: Current name.
-        take: Called with the new name; returns False to reject it.
-        said: Accessible name of the field.
+        callback: Called with the new name; returns False to reject it.
+        accessible_name: Accessible name of the field.
     """
 
     closed = Signal()
 
     def __init__(
-        self, theme: Theme, place: QWidget, rect: QRect, name: str, take: Callable[[str], bool], said: str
+        self,
+        theme: Theme,
+        parent: QWidget,
+        rect: QRect,
+        name: str,
+        callback: Callable[[str], bool],
+        accessible_name: str,
     ) -> None:
         # `said` is the accessible name.
-        super().__init__(name, place)
-        self._take, self._is_over = take, False
-        self.setAccessibleName(said)
+        super().__init__(name, parent)
+        self._take, self._is_over = callback, False
+        self.setAccessibleName(accessible_name)
         self.setProperty("focusRadius", theme.radius("control"))
         ContextMenuFilter(theme, self)
         self.setGeometry(rect)

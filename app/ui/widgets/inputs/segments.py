@@ -35,18 +35,18 @@ class _Segment(PaintedButton):
         super().__init__(theme, label, checkable=True)
         self.setAutoExclusive(True)
 
-    def set_icon_only(self, bare: bool) -> None:
+    def set_icon_only(self, icon_only: bool) -> None:
         # The text becomes the tooltip.
-        self._bare = bare and self._icon is not None
+        self._bare = icon_only and self._icon is not None
         self.updateGeometry()
         self.update()
 
-    def set_dot(self, shown: bool) -> None:
+    def set_dot(self, visible: bool) -> None:
         """Show or hide the dot after the text, which marks an option that is in use."""
-        if shown != self._dot:
-            self._dot = shown
-            words = _("{choice}, on") if shown else "{choice}"
-            self.setAccessibleName(words.format(choice=self.text()))
+        if visible != self._dot:
+            self._dot = visible
+            template = _("{choice}, on") if visible else "{choice}"
+            self.setAccessibleName(template.format(choice=self.text()))
             self.update()
 
     def displayed_text(self) -> str:
@@ -67,8 +67,8 @@ class _Segment(PaintedButton):
         return round(self._theme.scaled(16))
 
     def _icons_width(self) -> int:
-        shown = int(self._icon is not None) + int(self._check) + int(self.has_dot) / 2
-        return round((self._icon_side() + GAP) * shown) - (GAP if self._bare else 0)
+        icon_count = int(self._icon is not None) + int(self._check) + int(self.has_dot) / 2
+        return round((self._icon_side() + GAP) * icon_count) - (GAP if self._bare else 0)
 
     def sizeHint(self) -> QSize:
         width = paint.width_of(self._font(), self.displayed_text()) + 2 * self._padding + self._icons_width()
@@ -79,25 +79,29 @@ class _Segment(PaintedButton):
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        chosen = self.isChecked()
-        if chosen:
+        is_checked = self.isChecked()
+        if is_checked:
             fill = theme.colour("pressed" if theme.dark else "panel")
             paint.box(painter, rect, theme.radius("small"), fill, theme.colour("border"))
         elif self.is_hovered:
             paint.box(painter, rect, theme.radius("small"), theme.colour("pressed"))
-        ink = theme.colour("text" if chosen else "textSecondary" if self.isEnabled() else "textDisabled")
-        shown = [name for name in ("check" if self._check and chosen else None, self._icon) if name]
+        colour = theme.colour(
+            "text" if is_checked else "textSecondary" if self.isEnabled() else "textDisabled"
+        )
+        icons = [name for name in ("check" if self._check and is_checked else None, self._icon) if name]
         text_width = paint.width_of(self._font(), self.displayed_text()) - (GAP if self._bare else 0)
         side = self._icon_side()
         dot = (side + GAP) / 2 if self._dot else 0.0
-        left = max(6.0, rect.center().x() - (text_width + len(shown) * (side + GAP) + dot) / 2)
-        for name in shown:
-            paint_icon(painter, QRectF(left, rect.center().y() - side / 2, side, side), name, ink)
+        left = max(6.0, rect.center().x() - (text_width + len(icons) * (side + GAP) + dot) / 2)
+        for name in icons:
+            paint_icon(painter, QRectF(left, rect.center().y() - side / 2, side, side), name, colour)
             left += side + GAP
-        paint.text_line(painter, rect.adjusted(left, 0, 2 - dot, 0), self.displayed_text(), self._font(), ink)
+        paint.text_line(
+            painter, rect.adjusted(left, 0, 2 - dot, 0), self.displayed_text(), self._font(), colour
+        )
         if self._dot:
-            square = QRectF(left + text_width + GAP - 2, rect.center().y() - dot / 2, dot, dot)
-            paint_icon(painter, square, "dot", theme.colour("ok"))
+            dot_rect = QRectF(left + text_width + GAP - 2, rect.center().y() - dot / 2, dot, dot)
+            paint_icon(painter, dot_rect, "dot", theme.colour("ok"))
 
 
 class Segments(QWidget):
@@ -132,27 +136,27 @@ class Segments(QWidget):
             row.setSpacing(1)
         row.setContentsMargins(2, 2, 2, 2)
         self._segments: dict[str, _Segment] = {}
-        for key, words, icon in options:
-            segment = _Segment(theme, words, icon, size, check)
+        for key, text, icon in options:
+            segment = _Segment(theme, text, icon, size, check)
             segment.has_dot = dots
             row.addWidget(segment)
             self._segments[key] = segment
             segment.clicked.connect(lambda _on=False, key=key: self.changed.emit(key))
         self.set_value(value if value is not None else next(iter(self._segments), ""))
 
-    def set_icon_only(self, bare: bool) -> None:
-        """Show only icons if `bare`, else icons and texts."""
+    def set_icon_only(self, icon_only: bool) -> None:
+        """Show only icons if `icon_only`, else icons and texts."""
         for segment in self._segments.values():
-            segment.set_icon_only(bare)
+            segment.set_icon_only(icon_only)
 
-    def set_dot(self, value: str, shown: bool) -> None:
+    def set_dot(self, value: str, visible: bool) -> None:
         """Show or hide a dot after the text of an option, which marks the option as in use.
 
         Args:
             value: Value of the option.
-            shown: True to show the dot.
+            visible: True to show the dot.
         """
-        self._segments[value].set_dot(shown)
+        self._segments[value].set_dot(visible)
 
     @property
     def value(self) -> str:

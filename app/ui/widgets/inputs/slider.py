@@ -178,6 +178,6 @@ class SliderWithUnit(QWidget):
             self.set_value(value)
             self.changed.emit(value)
 
-    def _show_problem(self, sentence: str) -> None:
-        self._sentence.setText(sentence)
-        self._sentence.setVisible(bool(sentence))
+    def _show_problem(self, message: str) -> None:
+        self._sentence.setText(message)
+        self._sentence.setVisible(bool(message))

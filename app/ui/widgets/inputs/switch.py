@@ -37,5 +37,5 @@ class Switch(PaintedButton):
         knob = QRectF(0, 0, 14, 14)
         knob.moveCenter(QPointF(track.right() - 10 if on else track.left() + 10, track.center().y()))
         paint.box(painter, knob, 7, theme.colour("onAccent" if on else "controlBorder"))
-        ink = theme.colour("text" if self.isEnabled() else "textDisabled")
-        paint.text_line(painter, rect.adjusted(46, 0, 0, 0), self.text(), theme.font("bodyLarge"), ink)
+        colour = theme.colour("text" if self.isEnabled() else "textDisabled")
+        paint.text_line(painter, rect.adjusted(46, 0, 0, 0), self.text(), theme.font("bodyLarge"), colour)

@@ -33,15 +33,15 @@ class Token(PaintedButton):
     def __init__(self, theme: Theme, entry: str, *, is_left_out: bool = False) -> None:
         super().__init__(theme)
         self.entry, self.is_left_out = entry, is_left_out
-        words = _("Remove “not {pattern}”") if is_left_out else _("Remove “{pattern}”")
-        self.set_text(entry, words.format(pattern=entry))
+        template = _("Remove “not {pattern}”") if is_left_out else _("Remove “{pattern}”")
+        self.set_text(entry, template.format(pattern=entry))
 
     def sizeHint(self) -> QSize:
         theme = self._theme
-        wide = 2 * PAD + paint.width_of(theme.font("code"), self.entry) + GAP + theme.scaled(CROSS)
+        width = 2 * PAD + paint.width_of(theme.font("code"), self.entry) + GAP + theme.scaled(CROSS)
         if self.is_left_out:
-            wide += paint.width_of(theme.font("small"), _(EXCLUDE_KEYWORD)) + GAP
-        return QSize(round(wide) + 1, round(theme.scaled(HIGH)))
+            width += paint.width_of(theme.font("small"), _(EXCLUDE_KEYWORD)) + GAP
+        return QSize(round(width) + 1, round(theme.scaled(HIGH)))
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
@@ -54,21 +54,21 @@ class Token(PaintedButton):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
-        whole = QRectF(self.rect())
+        bounds = QRectF(self.rect())
         fill = "hover" if self.is_highlighted else "sunken" if self.is_left_out else "accentTint"
-        paint.box(painter, whole, theme.radius("small"), theme.colour(fill))
+        paint.box(painter, bounds, theme.radius("small"), theme.colour(fill))
         role = "textDisabled" if not self.isEnabled() else "text" if self.is_left_out else "accentText"
-        ink = theme.colour(role)
-        rest = whole.adjusted(PAD, 0, -PAD, 0)
+        colour = theme.colour(role)
+        rest = bounds.adjusted(PAD, 0, -PAD, 0)
         if self.is_left_out:
             font = theme.font("small")
             paint.text_line(painter, rest, _(EXCLUDE_KEYWORD), font, theme.colour("textSecondary"))
             rest.setLeft(rest.left() + paint.width_of(font, _(EXCLUDE_KEYWORD)) + GAP)
         side = theme.scaled(CROSS)
-        square = QRectF(rest.right() - side, rest.center().y() - side / 2, side, side)
-        paint_icon(painter, square, "x", ink)
-        rest.setRight(square.left() - GAP + 1)
-        paint.text_line(painter, rest, self.entry, theme.font("code"), ink)
+        icon_rect = QRectF(rest.right() - side, rest.center().y() - side / 2, side, side)
+        paint_icon(painter, icon_rect, "x", colour)
+        rest.setRight(icon_rect.left() - GAP + 1)
+        paint.text_line(painter, rest, self.entry, theme.font("code"), colour)
         painter.end()
 
 
@@ -83,18 +83,18 @@ class _TokenEdit(QLineEdit):
     focus_changed = Signal()
 
     def sizeHint(self) -> QSize:
-        words = self.text() or self.placeholderText()
-        wide = self.fontMetrics().horizontalAdvance(words) + 2 * PAD
-        return QSize(max(MIN_VALUE, wide), super().sizeHint().height())
+        text = self.text() or self.placeholderText()
+        width = self.fontMetrics().horizontalAdvance(text) + 2 * PAD
+        return QSize(max(MIN_VALUE, width), super().sizeHint().height())
 
     def minimumSizeHint(self) -> QSize:
         return QSize(MIN_VALUE, super().minimumSizeHint().height())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        plain = has_no_modifiers(event)
-        if plain and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and self.text().strip():
+        is_unmodified = has_no_modifiers(event)
+        if is_unmodified and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and self.text().strip():
             self.completed.emit()
-        elif plain and event.key() == Qt.Key.Key_Backspace and not self.text():
+        elif is_unmodified and event.key() == Qt.Key.Key_Backspace and not self.text():
             self.back.emit()
         else:
             super().keyPressEvent(event)

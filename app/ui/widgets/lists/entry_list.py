@@ -117,45 +117,47 @@ class EntryDelegate(QStyledItemDelegate):
             area = rect.adjusted(INSET + ICON_LEFT, 2, -INSET, 0)
             paint.text_line(painter, area, line.text, font, self._theme.colour("textSecondary"))
         else:
-            chosen = bool(option.state & QStyle.StateFlag.State_Selected)
-            self._paint_row(painter, rect.adjusted(INSET, 0, -INSET, 0), line, chosen=chosen)
+            is_selected = bool(option.state & QStyle.StateFlag.State_Selected)
+            self._paint_row(painter, rect.adjusted(INSET, 0, -INSET, 0), line, is_selected=is_selected)
         painter.restore()
 
-    def _paint_row(self, painter: QPainter, rect: QRectF, found: Match, *, chosen: bool) -> None:
-        theme, entry = self._theme, found.entry
-        if chosen:
+    def _paint_row(self, painter: QPainter, rect: QRectF, match: Match, *, is_selected: bool) -> None:
+        theme, entry = self._theme, match.entry
+        if is_selected:
             edge = theme.colour("controlBorder") if theme.high_contrast else None
             paint.box(painter, rect, theme.radius("panel"), theme.colour("selected"), edge)
-        ink = "textDisabled" if entry.reason and not chosen else "selectedText" if chosen else "text"
-        quiet = "selectedText" if chosen else "textSecondary"
+        text_role = (
+            "textDisabled" if entry.reason and not is_selected else "selectedText" if is_selected else "text"
+        )
+        quiet = "selectedText" if is_selected else "textSecondary"
         side = theme.scaled(16)
-        square = QRectF(rect.left() + ICON_LEFT, rect.center().y() - side / 2, side, side)
+        icon_rect = QRectF(rect.left() + ICON_LEFT, rect.center().y() - side / 2, side, side)
         if entry.icon:
-            dim = ink if chosen or entry.reason else "textSecondary"
-            paint_icon(painter, square, entry.icon, theme.colour(dim))
-        right = self._paint_right(painter, rect, entry, quiet, chosen=chosen)
+            dim = text_role if is_selected or entry.reason else "textSecondary"
+            paint_icon(painter, icon_rect, entry.icon, theme.colour(dim))
+        right = self._paint_right(painter, rect, entry, quiet, is_selected=is_selected)
         left = rect.left() + (TEXT_LEFT if entry.icon else ICON_LEFT) + (side - 16 if entry.icon else 0)
         area = QRectF(left, rect.top(), max(20.0, right - left - 12), rect.height())
-        marked = ink if chosen or entry.reason else "accentText"
-        self._paint_text(painter, area, found, ink, marked)
+        marked = text_role if is_selected or entry.reason else "accentText"
+        self._paint_text(painter, area, match, text_role, marked)
 
     def _paint_right(
-        self, painter: QPainter, rect: QRectF, entry: Entry, quiet: str, *, chosen: bool
+        self, painter: QPainter, rect: QRectF, entry: Entry, quiet: str, *, is_selected: bool
     ) -> float:
         # Paints note, shortcut and Enter sign; returns their left edge.
         theme, right, middle = self._theme, rect.right() - RIGHT, rect.center().y()
         if entry.id == self.waiting:
             font = theme.font("body")
             font.setWeight(QFont.Weight.Medium)
-            words = _("Press the new shortcut")
-            width = paint.width_of(font, words)
+            prompt = _("Press the new shortcut")
+            width = paint.width_of(font, prompt)
             area = QRectF(right - width, rect.top(), width, rect.height())
-            paint.text_line(painter, area, words, font, theme.colour(quiet))
+            paint.text_line(painter, area, prompt, font, theme.colour(quiet))
             return right - width
-        if chosen and not entry.reason:
+        if is_selected and not entry.reason:
             side = theme.scaled(15)
-            square = QRectF(right - side, middle - side / 2, side, side)
-            paint_icon(painter, square, "corner-down-left", theme.colour("selectedText"))
+            icon_rect = QRectF(right - side, middle - side / 2, side, side)
+            paint_icon(painter, icon_rect, "corner-down-left", theme.colour("selectedText"))
             right -= side + 12
         for key in reversed(entry.key.split("\n") if entry.key else ()):
             right = paint.key_cap(painter, theme, right, middle, shortcut_text(key)).left() - 8
@@ -168,25 +170,25 @@ class EntryDelegate(QStyledItemDelegate):
             paint.text_line(painter, area, text, font, theme.colour(quiet), paint.RIGHT)
         return right
 
-    def _paint_text(self, painter: QPainter, area: QRectF, found: Match, ink: str, marked: str) -> None:
+    def _paint_text(self, painter: QPainter, area: QRectF, match: Match, text_role: str, marked: str) -> None:
         # Paints the text with matching letters in bold.
         theme = self._theme
-        plain = theme.font("code" if found.entry.kind == "topic" else "bodyLarge")
-        if found.entry.kind == "topic":
-            plain.setPixelSize(round(theme.scaled(13)))
-        bold = QFont(plain)
+        regular = theme.font("code" if match.entry.kind == "topic" else "bodyLarge")
+        if match.entry.kind == "topic":
+            regular.setPixelSize(round(theme.scaled(13)))
+        bold = QFont(regular)
         bold.setWeight(QFont.Weight.Bold)
-        room = area.width() - 4 * len(found.spans)
-        shown = QFontMetricsF(plain).elidedText(found.entry.text, Qt.TextElideMode.ElideRight, room)
-        end = len(shown) - 1 if shown != found.entry.text else len(shown)
-        cuts = sorted({0, len(shown), *(min(place, end) for span in found.spans for place in span)})
-        inside = [range(*span) for span in found.spans]
+        room = area.width() - 4 * len(match.spans)
+        elided = QFontMetricsF(regular).elidedText(match.entry.text, Qt.TextElideMode.ElideRight, room)
+        end = len(elided) - 1 if elided != match.entry.text else len(elided)
+        cuts = sorted({0, len(elided), *(min(position, end) for span in match.spans for position in span)})
+        ranges = [range(*span) for span in match.spans]
         for begin, stop in itertools.pairwise(cuts):
-            fits = any(begin in span for span in inside)
-            font = bold if fits else plain
-            piece = shown[begin:stop]
+            is_match = any(begin in span for span in ranges)
+            font = bold if is_match else regular
+            piece = elided[begin:stop]
             painter.setFont(font)
-            painter.setPen(theme.colour(marked if fits else ink))
+            painter.setPen(theme.colour(marked if is_match else text_role))
             painter.drawText(area, int(paint.LEFT), piece)
             area.setLeft(area.left() + paint.width_of(font, piece))
 
@@ -216,18 +218,18 @@ class EntryList(QListView):
         self.setMouseTracking(True)
         self.clicked.connect(self._on_clicked)
 
-    def show_lines(self, lines: Sequence[Line], chosen: str = "") -> None:
+    def show_lines(self, lines: Sequence[Line], selected_id: str = "") -> None:
         """Replace all headings and entries, and select an entry.
 
         Args:
             lines: Headings and entries.
-            chosen: Id of the entry to select; "" or an unknown id selects the first entry.
+            selected_id: Id of the entry to select; "" or an unknown id selects the first entry.
         """
         self.lines.show_lines(lines)
         rows = [row for row, line in enumerate(lines) if isinstance(line, Match)]
-        wanted = (row for row in rows if chosen and _id(lines[row]) == chosen)
-        self._select_row(next(wanted, rows[0] if rows else -1))
-        if not chosen:
+        matching_rows = (row for row in rows if selected_id and _id(lines[row]) == selected_id)
+        self._select_row(next(matching_rows, rows[0] if rows else -1))
+        if not selected_id:
             self.scrollToTop()
 
     def update_entry(self, id: str, note: str, reason: str = "") -> None:
@@ -257,20 +259,20 @@ class EntryList(QListView):
         rows = [row for row, line in enumerate(self.lines.lines) if isinstance(line, Match)]
         if rows:
             current = self.currentIndex().row()
-            place = rows.index(current) if current in rows else 0
-            self._select_row(rows[max(0, min(len(rows) - 1, place + steps))])
+            index = rows.index(current) if current in rows else 0
+            self._select_row(rows[max(0, min(len(rows) - 1, index + steps))])
 
     def handle(self, key: int) -> bool:
         """Move the selection on Up, Down, Page Up, Page Down, Home and End; return False for other keys."""
         page = max(1, self.viewport().height() // round(self._theme.scaled(ROW)) - 1)
-        far = len(self.lines.lines)
+        row_count = len(self.lines.lines)
         steps = {
             Qt.Key.Key_Up: -1,
             Qt.Key.Key_Down: 1,
             Qt.Key.Key_PageUp: -page,
             Qt.Key.Key_PageDown: page,
-            Qt.Key.Key_Home: -far,
-            Qt.Key.Key_End: far,
+            Qt.Key.Key_Home: -row_count,
+            Qt.Key.Key_End: row_count,
         }.get(Qt.Key(key))
         if steps is None:
             return False

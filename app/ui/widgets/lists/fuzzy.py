@@ -67,39 +67,39 @@ class Match:
     spans: tuple[Span, ...] = ()
 
 
-def match(query: str, words: str) -> tuple[float, tuple[Span, ...]] | None:
+def match(query: str, text: str) -> tuple[float, tuple[Span, ...]] | None:
     """Match a text with a query.
 
     Args:
         query: Parts separated by spaces, all of which must match, in any order.
-        words: Text to search.
+        text: Text to search.
 
     Returns:
         The score and the ranges of matching letters, or None if the text doesn't match.
     """
-    lower = words.lower()
-    if len(lower) != len(words):  # lower case changes the length of some letters, which would shift positions
-        lower = words
+    lower = text.lower()
+    if len(lower) != len(text):  # lower case changes the length of some letters, which would shift positions
+        lower = text
     score, spans = 0.0, []
     pieces = query.lower().split()
     for piece in pieces:
-        found = _match_piece(piece, lower)
-        if found is None:
+        result = _match_piece(piece, lower)
+        if result is None:
             return None
-        score += found[0]
-        spans.extend(found[1])
-    return score / max(1, len(pieces)) - LETTER_PENALTY * len(words), _merge(spans)
+        score += result[0]
+        spans.extend(result[1])
+    return score / max(1, len(pieces)) - LETTER_PENALTY * len(text), _merge(spans)
 
 
 def _match_piece(piece: str, text: str) -> tuple[float, list[Span]] | None:
-    place = text.find(piece)
-    if place == 0:
+    index = text.find(piece)
+    if index == 0:
         return WHOLE, [(0, len(piece))]
-    first = place
-    while place > 0:
-        if not text[place - 1].isalnum():
-            return WORD - min(10.0, place / 10), [(place, place + len(piece))]
-        place = text.find(piece, place + 1)
+    first = index
+    while index > 0:
+        if not text[index - 1].isalnum():
+            return WORD - min(10.0, index / 10), [(index, index + len(piece))]
+        index = text.find(piece, index + 1)
     if first > 0:
         return INSIDE - min(10.0, first / 10), [(first, first + len(piece))]
     return _match_spread(piece, text)
@@ -107,32 +107,34 @@ def _match_piece(piece: str, text: str) -> tuple[float, list[Span]] | None:
 
 def _match_spread(piece: str, text: str) -> tuple[float, list[Span]] | None:
     # Matches letters in order, preferably contiguous or at the start of a word.
-    places: list[int] = []
-    good, at = 0, 0
+    positions: list[int] = []
+    strong_hits, start = 0, 0
     for letter in piece:
-        if places and at < len(text) and text[at] == letter:
-            place, well = at, True
+        if positions and start < len(text) and text[start] == letter:
+            position, is_strong = start, True
         else:
-            place = _word_start(letter, text, at)
-            well = place >= 0
-            if not well:
-                place = text.find(letter, at)
-        if place < 0:
+            position = _word_start(letter, text, start)
+            is_strong = position >= 0
+            if not is_strong:
+                position = text.find(letter, start)
+        if position < 0:
             return None
-        good += well
-        places.append(place)
-        at = place + 1
-    share = good / len(piece)
+        strong_hits += is_strong
+        positions.append(position)
+        start = position + 1
+    share = strong_hits / len(piece)
     if share < MIN_SPREAD:
         return None
-    return SPREAD * share - min(15.0, (places[-1] - places[0]) / 10), [(place, place + 1) for place in places]
+    return SPREAD * share - min(15.0, (positions[-1] - positions[0]) / 10), [
+        (position, position + 1) for position in positions
+    ]
 
 
 def _word_start(letter: str, text: str, start: int) -> int:
-    place = text.find(letter, start)
-    while place > 0 and text[place - 1].isalnum():
-        place = text.find(letter, place + 1)
-    return place
+    index = text.find(letter, start)
+    while index > 0 and text[index - 1].isalnum():
+        index = text.find(letter, index + 1)
+    return index
 
 
 def _merge(spans: Iterable[Span]) -> tuple[Span, ...]:
@@ -159,12 +161,12 @@ class Finder:
         for entry in entries:
             self._kinds.setdefault(entry.kind, []).append((entry.text.lower(), entry))
 
-    def find(self, query: str, most: int) -> tuple[list[Match], int]:
+    def find(self, query: str, limit: int) -> tuple[list[Match], int]:
         """Search the entries.
 
         Args:
             query: Query, as for `match`.
-            most: Maximum number of matches to return per kind.
+            limit: Maximum number of matches to return per kind.
 
         Returns:
             The matches, grouped by kind with the best ones first, and the number of all matches.
@@ -175,42 +177,44 @@ class Finder:
         for pairs in self._kinds.values():
             few = [entry for _lower, entry in pairs]
             if len(pairs) > MAX_FUZZY_ENTRIES:
-                whole = [pair for pair in pairs if all(piece in pair[0] for piece in pieces)]
-                count += len(whole) - min(len(whole), MAX_FUZZY_ENTRIES)
+                exact_pairs = [pair for pair in pairs if all(piece in pair[0] for piece in pieces)]
+                count += len(exact_pairs) - min(len(exact_pairs), MAX_FUZZY_ENTRIES)
                 few = [
                     entry
-                    for _lower, entry in heapq.nsmallest(MAX_FUZZY_ENTRIES, whole, key=_by_position(pieces))
+                    for _lower, entry in heapq.nsmallest(
+                        MAX_FUZZY_ENTRIES, exact_pairs, key=_by_position(pieces)
+                    )
                 ]
-            found = [each for each in (_match_entry(query, entry) for entry in few) if each is not None]
-            count += len(found)
-            if found:
-                best.append(heapq.nlargest(most, found, key=attrgetter("score")))
+            matches = [each for each in (_match_entry(query, entry) for entry in few) if each is not None]
+            count += len(matches)
+            if matches:
+                best.append(heapq.nlargest(limit, matches, key=attrgetter("score")))
         best.sort(key=lambda found: (not _matches_initials(query, found), -found[0].score))
-        return [each for found in best for each in found], count
+        return [each for matches in best for each in matches], count
 
 
 def _match_entry(query: str, entry: Entry) -> Match | None:
-    fits = match(query, entry.text)
-    if fits is None:
+    result = match(query, entry.text)
+    if result is None:
         return None
-    score, spans = fits
+    score, spans = result
     if is_initials(query, entry.text):
         score = max(score, INITIALS - LETTER_PENALTY * len(entry.text))
     return Match(entry, score - (UNAVAILABLE_PENALTY if entry.reason else 0.0), spans)
 
 
-def _matches_initials(query: str, found: Sequence[Match]) -> bool:
-    return found[0].entry.kind == "command" and is_initials(query, found[0].entry.text)
+def _matches_initials(query: str, matches: Sequence[Match]) -> bool:
+    return matches[0].entry.kind == "command" and is_initials(query, matches[0].entry.text)
 
 
-def is_initials(query: str, words: str) -> bool:
+def is_initials(query: str, text: str) -> bool:
     """Return True if a query consists of initials of a text's words, starting with the first word."""
-    wanted = query.lower().strip()
-    firsts = [word[0] for word in "".join(c if c.isalnum() else " " for c in words.lower()).split()]
-    if len(wanted) < 2 or not firsts or wanted[0] != firsts[0]:
+    initials = query.lower().strip()
+    firsts = [word[0] for word in "".join(c if c.isalnum() else " " for c in text.lower()).split()]
+    if len(initials) < 2 or not firsts or initials[0] != firsts[0]:
         return False
-    left = iter(firsts)
-    return all(letter in left for letter in wanted)
+    remaining = iter(firsts)
+    return all(letter in remaining for letter in initials)
 
 
 def _by_position(pieces: Sequence[str]) -> Callable[[tuple[str, Entry]], tuple[int, int]]:

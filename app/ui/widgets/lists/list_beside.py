@@ -35,7 +35,7 @@ class ListDetailView(QWidget):
     ) -> None:
         # `parts` are filter, list, and details.
         super().__init__()
-        self._theme, (find, listed, chosen) = theme, parts
+        self._theme, (find, list_widget, detail) = theme, parts
         self._list_px, self._list_high_px, self._narrow_px = list_px, list_high_px, narrow_px
         self._side = QWidget()
         side = QVBoxLayout(self._side)
@@ -45,14 +45,14 @@ class ListDetailView(QWidget):
         row.setContentsMargins(8, 0, 8, 0)
         row.addWidget(find)
         side.addLayout(row)
-        side.addWidget(listed, 1)
+        side.addWidget(list_widget, 1)
         self._upright = Separator(theme, upright=True)
         self._sides = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._sides.setContentsMargins(0, 0, 0, 0)
         self._sides.setSpacing(0)
         self._sides.addWidget(self._side)
         self._sides.addWidget(self._upright)
-        self._sides.addWidget(chosen, 1)
+        self._sides.addWidget(detail, 1)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -60,13 +60,13 @@ class ListDetailView(QWidget):
 
     def fit(self) -> None:
         """Update the arrangement, for example after a change of the text size."""
-        beside = self.width() >= self._theme.scaled(self._narrow_px)
-        way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
-        self._sides.setDirection(way)
-        self._upright.setVisible(beside)
-        wide = round(min(self._theme.scaled(self._list_px), self.width() * LIST_SHARE))
-        self._side.setMinimumWidth(wide if beside else 0)
-        self._side.setMaximumWidth(wide if beside else QWIDGETSIZE_MAX)
+        is_horizontal = self.width() >= self._theme.scaled(self._narrow_px)
+        direction = QBoxLayout.Direction.LeftToRight if is_horizontal else QBoxLayout.Direction.TopToBottom
+        self._sides.setDirection(direction)
+        self._upright.setVisible(is_horizontal)
+        list_width = round(min(self._theme.scaled(self._list_px), self.width() * LIST_SHARE))
+        self._side.setMinimumWidth(list_width if is_horizontal else 0)
+        self._side.setMaximumWidth(list_width if is_horizontal else QWIDGETSIZE_MAX)
         self._side.setMaximumHeight(
-            QWIDGETSIZE_MAX if beside else round(self._theme.scaled(self._list_high_px))
+            QWIDGETSIZE_MAX if is_horizontal else round(self._theme.scaled(self._list_high_px))
         )

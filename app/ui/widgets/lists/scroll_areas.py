@@ -19,28 +19,28 @@ from app.ui.widgets.keyboard import tab_stops_of
 class ContentScrollArea(QScrollArea):
     """Scroll area that prefers the height of its contents."""
 
-    def __init__(self, inside: QWidget) -> None:
+    def __init__(self, content: QWidget) -> None:
         super().__init__()
-        self._inside = inside
-        inside.setProperty("bare", "true")
+        self._inside = content
+        content.setProperty("bare", "true")
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.viewport().setAutoFillBackground(False)
-        self.setWidget(inside)
-        inside.setAutoFillBackground(False)
+        self.setWidget(content)
+        content.setAutoFillBackground(False)
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Maximum)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
 
     def heightForWidth(self, width: int) -> int:
-        inside = self._inside
-        return inside.heightForWidth(width) if inside.hasHeightForWidth() else inside.sizeHint().height()
+        content = self._inside
+        return content.heightForWidth(width) if content.hasHeightForWidth() else content.sizeHint().height()
 
     def sizeHint(self) -> QSize:
-        wide = max(1, self.width())
-        return QSize(self._inside.sizeHint().width(), self.heightForWidth(wide))
+        width = max(1, self.width())
+        return QSize(self._inside.sizeHint().width(), self.heightForWidth(width))
 
     def minimumSizeHint(self) -> QSize:
         return QSize(60, round(1.5 * QFontMetricsF(self._inside.font()).height()))
@@ -57,15 +57,15 @@ class RowsLayout(QVBoxLayout):
     Qt appends inserted widgets to the end of the window's tab order.
     """
 
-    def __init__(self, inside: QWidget, before: QWidget) -> None:
+    def __init__(self, parent: QWidget, before: QWidget) -> None:
         # `before` precedes the first row in the tab order.
-        super().__init__(inside)
+        super().__init__(parent)
         self._before = before
 
-    def insertWidget(self, place: int, row: QWidget) -> None:  # type: ignore[override]
-        super().insertWidget(place, row)
+    def insertWidget(self, index: int, row: QWidget) -> None:  # type: ignore[override]
+        super().insertWidget(index, row)
         before = self._before
-        above = (item.widget() for number in reversed(range(place)) if (item := self.itemAt(number)))
+        above = (item.widget() for number in reversed(range(index)) if (item := self.itemAt(number)))
         for other in above:
             stops = tab_stops_of(other) if other is not None else []
             if stops:
@@ -86,9 +86,9 @@ class ScrollColumn(QScrollArea):
     def __init__(self, name: str, *, margins: tuple[int, int, int, int] = (0, 0, 0, 0), gap: int = 0) -> None:
         # `name` is the accessible name; `margins` are left, top, right, bottom.
         super().__init__()
-        inside = QWidget()
-        inside.setProperty("bare", "true")
-        self.column = RowsLayout(inside, self)
+        content = QWidget()
+        content.setProperty("bare", "true")
+        self.column = RowsLayout(content, self)
         self.column.setContentsMargins(*margins)
         self.column.setSpacing(gap)
         self.column.addStretch(1)
@@ -96,7 +96,7 @@ class ScrollColumn(QScrollArea):
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setWidget(inside)
+        self.setWidget(content)
 
 
 class PanelRows(QStackedWidget):
@@ -110,19 +110,19 @@ class PanelRows(QStackedWidget):
         self.addWidget(empty)
         self.addWidget(scroll)
 
-    def insert_row(self, place: int, row: QWidget) -> None:
+    def insert_row(self, index: int, row: QWidget) -> None:
         """Insert a row at a position, or move it there."""
-        if self._column.indexOf(row) != place:
-            self._column.insertWidget(place, row)
+        if self._column.indexOf(row) != index:
+            self._column.insertWidget(index, row)
 
     def remove_row(self, row: QWidget) -> None:
         """Remove and delete a row."""
         self._column.removeWidget(row)
         row.deleteLater()
 
-    def show_rows(self, shown: bool) -> None:
-        """Show the rows if `shown`, else the empty state."""
-        self.setCurrentIndex(1 if shown else 0)
+    def show_rows(self, visible: bool) -> None:
+        """Show the rows if `visible`, else the empty state."""
+        self.setCurrentIndex(1 if visible else 0)
 
     def fill(self, panel: QWidget) -> None:
         """Add this widget to a panel as its only contents."""

@@ -97,8 +97,8 @@ class CellDelegate(QStyledItemDelegate):
         """Return the columns of a row whose contents differ from the last painted ones."""
         if len(self._painted) > MAX_CACHED_CELLS:
             self._painted.clear()
-        at = self._view.cell_at
-        return [column for column in columns if self._painted.get((row, column)) != at(row, column)]
+        cell_at = self._view.cell_at
+        return [column for column in columns if self._painted.get((row, column)) != cell_at(row, column)]
 
     def sizeHint(self, _option: QStyleOptionViewItem, _index: Index) -> QSize:
         return QSize(40, self._view.row_height)
@@ -107,22 +107,22 @@ class CellDelegate(QStyledItemDelegate):
         row, column = index.row(), index.column()
         cell = self._painted[row, column] = self._view.cell_at(row, column)
         theme, rect = self._theme, QRect(option.rect)
-        chosen = QStyle.StateFlag.State_Selected in option.state
+        is_selected = QStyle.StateFlag.State_Selected in option.state
         painter.save()
-        if chosen:
+        if is_selected:
             painter.fillRect(rect, theme.colour("selected"))
         elif self._view.hovered_row == row:
             painter.fillRect(rect, theme.colour("hover"))
-        if chosen and column == 0:
+        if is_selected and column == 0:
             painter.fillRect(QRect(rect.left(), rect.top(), 2, rect.height()), theme.colour("accent"))
-        figures = self._view.all_columns[column].is_numeric
-        inside = padded_rect(rect, column, self._view.last_visible_column)
+        is_numeric = self._view.all_columns[column].is_numeric
+        cell_rect = padded_rect(rect, column, self._view.last_visible_column)
         if cell.overflows_left:
-            inside.setLeft(inside.left() - self._blank_before(row, column))
-        role = "selectedText" if chosen and cell.role == "text" else cell.role
-        if chosen and role == "textTertiary":
+            cell_rect.setLeft(cell_rect.left() - self._blank_before(row, column))
+        role = "selectedText" if is_selected and cell.role == "text" else cell.role
+        if is_selected and role == "textTertiary":
             role = "accentText"
-        self._paint_cell(painter, inside, cell, role, figures=figures)
+        self._paint_cell(painter, cell_rect, cell, role, is_numeric=is_numeric)
         painter.restore()
 
     def _blank_before(self, row: int, column: int) -> int:
@@ -133,16 +133,16 @@ class CellDelegate(QStyledItemDelegate):
             room += self._view.columnWidth(column)
         return room
 
-    def _paint_cell(self, painter: QPainter, box: QRectF, cell: Cell, role: str, *, figures: bool) -> None:
+    def _paint_cell(self, painter: QPainter, box: QRectF, cell: Cell, role: str, *, is_numeric: bool) -> None:
         theme = self._theme
         if cell.curve:
-            place = QRectF(
+            curve_rect = QRectF(
                 box.left(),
                 box.center().y() - SPARKLINE_SIZE.height() / 2,
                 box.width(),
                 SPARKLINE_SIZE.height(),
             )
-            paint_sparkline(painter, place, cell.curve, theme.colour(role))
+            paint_sparkline(painter, curve_rect, cell.curve, theme.colour(role))
             return
         if cell.mark is not None:
             cell.mark.paint(painter, box, theme)
@@ -153,21 +153,23 @@ class CellDelegate(QStyledItemDelegate):
         font = self._view.cell_font(cell)
         metrics = QFontMetricsF(font)
         colour = theme.colour(role)
-        taken = (ICON + 5.0 if cell.icon else 0.0) + (self._chip_width(cell.chip) + 8 if cell.chip else 0.0)
-        text, room = cell.text, max(0.0, box.width() - taken)
+        reserved_width = (ICON + 5.0 if cell.icon else 0.0) + (
+            self._chip_width(cell.chip) + 8 if cell.chip else 0.0
+        )
+        text, room = cell.text, max(0.0, box.width() - reserved_width)
         advance = metrics.horizontalAdvance(text)
         if advance > room:
             shorten = Qt.TextElideMode.ElideMiddle if cell.elide_middle else Qt.TextElideMode.ElideRight
             text = metrics.elidedText(text, shorten, room)
             advance = metrics.horizontalAdvance(text)
-        x = box.right() - advance - taken if figures else box.left()
+        x = box.right() - advance - reserved_width if is_numeric else box.left()
         if cell.icon:
             top = box.center().y() - ICON / 2
             paint_cached_icon(painter, QRectF(x, top, ICON, ICON), cell.icon, colour)
             x += ICON + 5.0
         if cell.tint and text:
-            high = metrics.height() + 2
-            ground = QRectF(x - 4, box.center().y() - high / 2, advance + 8, high)
+            height = metrics.height() + 2
+            ground = QRectF(x - 4, box.center().y() - height / 2, advance + 8, height)
             paint_box(painter, ground, theme.radius("key"), theme.colour(cell.tint))
         painter.setFont(font)
         painter.setPen(colour)
@@ -178,18 +180,18 @@ class CellDelegate(QStyledItemDelegate):
     def _chip_font(self) -> QFont:
         return self._theme.font("caption")
 
-    def _chip_width(self, words: str) -> float:
-        return QFontMetricsF(self._chip_font()).horizontalAdvance(words) + 14
+    def _chip_width(self, text: str) -> float:
+        return QFontMetricsF(self._chip_font()).horizontalAdvance(text) + 14
 
-    def _paint_chip(self, painter: QPainter, middle: QPointF, words: str) -> None:
-        box = QRectF(middle.x(), middle.y() - 9, self._chip_width(words), 18)
+    def _paint_chip(self, painter: QPainter, middle: QPointF, text: str) -> None:
+        box = QRectF(middle.x(), middle.y() - 9, self._chip_width(text), 18)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(self._theme.colour("accentTint"))
         painter.drawRoundedRect(box, 9, 9)
         painter.setFont(self._chip_font())
         painter.setPen(self._theme.colour("accentText"))
-        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, words)
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
 
 
 class TableHeader(QHeaderView):
@@ -231,6 +233,6 @@ class TableHeader(QHeaderView):
         painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)
         if ordered:
             name = "chevron-up" if self._view.sort_order.is_descending else "chevron-down"
-            at = QRectF(x + advance + 3, box.center().y() - 6.5, 13, 13)
-            paint_icon(painter, at, name, theme.colour("textSecondary"))
+            icon_rect = QRectF(x + advance + 3, box.center().y() - 6.5, 13, 13)
+            paint_icon(painter, icon_rect, name, theme.colour("textSecondary"))
         painter.restore()

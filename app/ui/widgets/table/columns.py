@@ -53,15 +53,15 @@ class ColumnChoice:
             widths: Widths of all columns in px.
             room: Available width in px.
         """
-        shown = {place for place, column in enumerate(self._columns) if self.should_show(column)}
+        visible_columns = {index for index, column in enumerate(self._columns) if self.should_show(column)}
         yielding = sorted(
-            (self._columns[place].hide_order, place)
-            for place in shown
-            if self._columns[place].hide_order and not self._chosen.get(self._columns[place].name)
+            (self._columns[index].hide_order, index)
+            for index in visible_columns
+            if self._columns[index].hide_order and not self._chosen.get(self._columns[index].name)
         )
-        while yielding and sum(widths[place] for place in shown) > room:
-            shown.discard(yielding.pop()[1])
-        return shown
+        while yielding and sum(widths[index] for index in visible_columns) > room:
+            visible_columns.discard(yielding.pop()[1])
+        return visible_columns
 
     def menu(self, theme: Theme, parent: QWidget, changed: Callable[[], object]) -> Menu:
         """Return a new menu to show and hide columns, see `fill`."""
@@ -78,8 +78,8 @@ class ColumnChoice:
         """
         menu.clear()
 
-        def set_visible(name: str, shown: bool) -> None:
-            self.show(name, shown)
+        def set_visible(name: str, visible: bool) -> None:
+            self.show(name, visible)
             changed()
 
         def restore_defaults() -> None:
@@ -94,9 +94,9 @@ class ColumnChoice:
             action.setChecked(self.should_show(column))
             action.toggled.connect(lambda on, name=column.name: set_visible(name, on))
         menu.addSeparator()
-        again = menu.addAction(_("Default columns"))
-        again.setEnabled(self.changed)
-        again.triggered.connect(lambda _on=False: restore_defaults())
+        reset_action = menu.addAction(_("Default columns"))
+        reset_action.setEnabled(self.changed)
+        reset_action.triggered.connect(lambda _on=False: restore_defaults())
 
     def saved_state(self) -> dict[str, bool]:
         """Return the visibility of the columns that the user has shown or hidden, for `restore`."""
@@ -106,6 +106,6 @@ class ColumnChoice:
         """Restore the visibility of columns from a saved state; invalid entries are ignored."""
         self._chosen.clear()
         if isinstance(saved, Mapping):
-            for name, shown in saved.items():
-                if isinstance(name, str) and isinstance(shown, bool):
-                    self.show(name, shown)
+            for name, visible in saved.items():
+                if isinstance(name, str) and isinstance(visible, bool):
+                    self.show(name, visible)

@@ -141,10 +141,10 @@ class Order(Generic[Row]):
         key = self.column.key if self.column is not None else None
         if key is None:
             return rows
-        known = [(key(row), row) for row in rows]
-        good = [pair for pair in known if pair[0] is not None]
-        good.sort(key=lambda pair: pair[0], reverse=self.is_descending)  # type: ignore[arg-type, return-value]
-        return [row for _key, row in good] + [row for value, row in known if value is None]
+        keyed_rows = [(key(row), row) for row in rows]
+        sortable = [pair for pair in keyed_rows if pair[0] is not None]
+        sortable.sort(key=lambda pair: pair[0], reverse=self.is_descending)  # type: ignore[arg-type, return-value]
+        return [row for _key, row in sortable] + [row for value, row in keyed_rows if value is None]
 
 
 @dataclass(slots=True)
@@ -182,8 +182,8 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         if role == Qt.ItemDataRole.ToolTipRole:
             return plain.tip(column.tip(row)) if column.tip is not None else None
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            cell, head = column.cell(row), column.translated_title or column.display_name
-            return ", ".join(part for part in (head, cell.text or cell.accessible_text, cell.chip) if part)
+            cell, title = column.cell(row), column.translated_title or column.display_name
+            return ", ".join(part for part in (title, cell.text or cell.accessible_text, cell.chip) if part)
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(column.is_numeric)
         return None
@@ -227,8 +227,8 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         if keys == self._rows.keys:
             self._rows.rows = list(rows)
             return
-        wanted = set(keys)
-        runs = _consecutive_runs([place for place, key in enumerate(self._rows.keys) if key not in wanted])
+        new_keys = set(keys)
+        runs = _consecutive_runs([index for index, key in enumerate(self._rows.keys) if key not in new_keys])
         if len(runs) > MAX_RUNS:
             self.beginResetModel()
             self._rows = _Rows(list(rows), keys)
@@ -251,36 +251,36 @@ class TableModel(QAbstractTableModel, Generic[Row]):
             self.dataChanged.emit(self.index(first, 0), corner, [Qt.ItemDataRole.DisplayRole])
 
     def _append(self, rows: Sequence[Row], keys: Sequence[str]) -> None:
-        known = set(self._rows.keys)
-        fresh = [(row, key) for row, key in zip(rows, keys, strict=True) if key not in known]
-        if fresh:
+        existing = set(self._rows.keys)
+        new_rows = [(row, key) for row, key in zip(rows, keys, strict=True) if key not in existing]
+        if new_rows:
             first = len(self._rows.keys)
-            self.beginInsertRows(_ROOT, first, first + len(fresh) - 1)
-            self._rows.rows.extend(row for row, _key in fresh)
-            self._rows.keys.extend(key for _row, key in fresh)
+            self.beginInsertRows(_ROOT, first, first + len(new_rows) - 1)
+            self._rows.rows.extend(row for row, _key in new_rows)
+            self._rows.keys.extend(key for _row, key in new_rows)
             self.endInsertRows()
 
     def _reorder(self, rows: Sequence[Row], keys: list[str]) -> None:
         self.layoutAboutToBeChanged.emit()
-        place = {key: number for number, key in enumerate(keys)}
+        row_by_key = {key: number for number, key in enumerate(keys)}
         before = self.persistentIndexList()
-        after = [self.index(place[self._rows.keys[old.row()]], old.column()) for old in before]
+        after = [self.index(row_by_key[self._rows.keys[old.row()]], old.column()) for old in before]
         self._rows = _Rows(list(rows), keys)
         self.changePersistentIndexList(before, after)
         self.layoutChanged.emit()
 
 
-def _alignment(figures: bool) -> int:
-    side = Qt.AlignmentFlag.AlignRight if figures else Qt.AlignmentFlag.AlignLeft
+def _alignment(is_numeric: bool) -> int:
+    side = Qt.AlignmentFlag.AlignRight if is_numeric else Qt.AlignmentFlag.AlignLeft
     return int(side | Qt.AlignmentFlag.AlignVCenter)
 
 
-def _consecutive_runs(places: Sequence[int]) -> list[tuple[int, int]]:
+def _consecutive_runs(numbers: Sequence[int]) -> list[tuple[int, int]]:
     # Groups consecutive numbers to (first, last).
     runs: list[tuple[int, int]] = []
-    for place in places:
-        if runs and runs[-1][1] == place - 1:
-            runs[-1] = (runs[-1][0], place)
+    for number in numbers:
+        if runs and runs[-1][1] == number - 1:
+            runs[-1] = (runs[-1][0], number)
         else:
-            runs.append((place, place))
+            runs.append((number, number))
     return runs

@@ -84,10 +84,10 @@ class TableView(QTableView, Generic[Row]):
         self._cells = CellDelegate(theme, self, self)
         self.setItemDelegate(self._cells)
         self.setHorizontalHeader(TableHeader(theme, self, self))
-        head = self.horizontalHeader()
-        head.sectionClicked.connect(self._sort)
-        head.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        head.customContextMenuRequested.connect(lambda at: self._show_column_menu(head.mapToGlobal(at)))
+        header = self.horizontalHeader()
+        header.sectionClicked.connect(self._sort)
+        header.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        header.customContextMenuRequested.connect(lambda at: self._show_column_menu(header.mapToGlobal(at)))
         self.verticalHeader().hide()
         self.setShowGrid(False)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
@@ -164,14 +164,14 @@ class TableView(QTableView, Generic[Row]):
     def dataChanged(self, first: Index, last: Index, _roles: Sequence[int] = ()) -> None:
         """Repaint only cells whose contents have changed, whereas Qt would repaint all rows."""
         top, bottom = self.visible_rows()
-        columns = [place for place in range(len(self.columns)) if not self.isColumnHidden(place)]
+        columns = [column for column in range(len(self.columns)) if not self.isColumnHidden(column)]
         dirty = QRegion()
         for row in range(max(first.row(), top), min(last.row(), bottom) + 1):
             changed = self._cells.changed(row, columns)
             if changed:
                 x = self.columnViewportPosition(changed[0])
-                wide = self.columnViewportPosition(changed[-1]) + self.columnWidth(changed[-1]) - x
-                dirty += QRect(x, self.rowViewportPosition(row), wide, self.row_height)
+                width = self.columnViewportPosition(changed[-1]) + self.columnWidth(changed[-1]) - x
+                dirty += QRect(x, self.rowViewportPosition(row), width, self.row_height)
         if not dirty.isEmpty():
             self.viewport().update(dirty)
             self._notify_screen_reader(first.row(), last.row())
@@ -216,8 +216,8 @@ class TableView(QTableView, Generic[Row]):
             return
         key = self._model.key_of(row)
         self.select_key(key)
-        at = self.visualRect(index).bottomLeft() if by_keys else event.pos()
-        self.menu_requested.emit(key, self.viewport().mapToGlobal(at))
+        position = self.visualRect(index).bottomLeft() if by_keys else event.pos()
+        self.menu_requested.emit(key, self.viewport().mapToGlobal(position))
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         self.keyboard = event.reason() in KEYBOARD_REASONS
@@ -247,20 +247,20 @@ class TableView(QTableView, Generic[Row]):
         """
         scaled = [round(self.theme.scaled(column.width)) for column in self.columns]
         room = self.viewport().width()
-        shown = self.choice.fitting_columns(scaled, room)
-        spare = room - sum(scaled[place] for place in shown)
-        for place in sorted(shown):  # translations may be longer; they get the remaining space
-            more = header_width(self.theme, self.columns[place]) - scaled[place]
-            if not self.columns[place].stretch and more > 0 and spare > 0:
-                scaled[place] += min(more, spare)
+        visible_columns = self.choice.fitting_columns(scaled, room)
+        spare = room - sum(scaled[index] for index in visible_columns)
+        for index in sorted(visible_columns):  # translations may be longer; they get the remaining space
+            more = header_width(self.theme, self.columns[index]) - scaled[index]
+            if not self.columns[index].stretch and more > 0 and spare > 0:
+                scaled[index] += min(more, spare)
                 spare -= min(more, spare)
-        rest = room - sum(scaled[place] for place in shown if not self.columns[place].stretch)
-        for place, column in enumerate(self.columns):
-            self.setColumnHidden(place, place not in shown)
-            self.setColumnWidth(place, max(scaled[place], rest) if column.stretch else scaled[place])
-        self.last_visible_column = max(shown)
-        wide = sum(scaled[place] for place in shown) > room
-        policy = Qt.ScrollBarPolicy.ScrollBarAsNeeded if wide else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        rest = room - sum(scaled[index] for index in visible_columns if not self.columns[index].stretch)
+        for index, column in enumerate(self.columns):
+            self.setColumnHidden(index, index not in visible_columns)
+            self.setColumnWidth(index, max(scaled[index], rest) if column.stretch else scaled[index])
+        self.last_visible_column = max(visible_columns)
+        overflows = sum(scaled[index] for index in visible_columns) > room
+        policy = Qt.ScrollBarPolicy.ScrollBarAsNeeded if overflows else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
         self.setHorizontalScrollBarPolicy(policy)
 
     def column_menu(self) -> Menu:
@@ -271,10 +271,10 @@ class TableView(QTableView, Generic[Row]):
         """Replace the entries of a menu by entries to show and hide columns."""
         self.choice.fill(menu, self.fit_columns)
 
-    def _show_column_menu(self, at: QPoint) -> None:
+    def _show_column_menu(self, position: QPoint) -> None:
         menu = self.column_menu()
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.popup(at)
+        menu.popup(position)
 
     def saved_state(self) -> dict[str, object]:
         """Return the sort order and the visibility of columns, for `restore`."""
@@ -287,8 +287,8 @@ class TableView(QTableView, Generic[Row]):
 
     def restore(self, state: Mapping[str, object]) -> None:
         """Restore a state returned by `saved_state`; invalid values are replaced by defaults."""
-        chosen = (column for column in self.columns if column.name == state.get("sort"))
-        self.order.column = next(chosen, self.columns[0])
+        matches = (column for column in self.columns if column.name == state.get("sort"))
+        self.order.column = next(matches, self.columns[0])
         self.order.is_descending = state.get("falling") is True
         self.choice.restore(state.get("columns"))
         self.fit_columns()

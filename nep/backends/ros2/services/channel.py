@@ -111,9 +111,9 @@ class ServiceChannel:
             "nepnode": node_id,
             "nepid": f"{entry_id:x}",
         }
-        request, answer = request_type_of(kind.name), response_type_of(kind.name)
-        self._topics = ((rr, answer), (rq, request)) if is_server else ((rq, request), (rr, answer))
-        self._hashes = {name: types.type_hash(name) for name in (request, answer)}
+        request, response = request_type_of(kind.name), response_type_of(kind.name)
+        self._topics = ((rr, response), (rq, request)) if is_server else ((rq, request), (rr, response))
+        self._hashes = {name: types.type_hash(name) for name in (request, response)}
         self._readers: list[Any] = []
         self._writers: list[Any] = []
         with participant.changed:
@@ -186,15 +186,15 @@ class ServiceChannel:
         return self._guid is None or call.guid == self._guid
 
     def _writer_of(self, reader: Any, handle: int) -> DdsEndpoint | None:  # noqa: ANN401 - cyclonedds is not typed
-        known = self._known_writers.get(handle)
-        if known is None:
-            found = reader.get_matched_publication_data(handle)
-            if found is None:
+        writer = self._known_writers.get(handle)
+        if writer is None:
+            sample = reader.get_matched_publication_data(handle)
+            if sample is None:
                 return None
             if len(self._known_writers) >= _MAX_WRITERS:
                 self._known_writers.pop(next(iter(self._known_writers)))
-            known = self._known_writers[handle] = self.participant.to_endpoint(found)
-        return known
+            writer = self._known_writers[handle] = self.participant.to_endpoint(sample)
+        return writer
 
     def _read_failures(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         for sample in reader.take(_BATCH_SIZE, ready):
@@ -208,19 +208,19 @@ class ServiceChannel:
             data: bytes = announced["data"]
             if len(data) >= _FAILURE_HEADER.size:
                 guid, number, kind = _FAILURE_HEADER.unpack_from(data)
-                found = next((each for each in _FAILURE_KINDS if each == kind), None)
-                if found is not None and self._is_own_call(CallId(guid, number)):
-                    self._on_failure(CallId(guid, number), Reply(found, data[_FAILURE_HEADER.size :]))
+                failure_kind = next((each for each in _FAILURE_KINDS if each == kind), None)
+                if failure_kind is not None and self._is_own_call(CallId(guid, number)):
+                    self._on_failure(CallId(guid, number), Reply(failure_kind, data[_FAILURE_HEADER.size :]))
 
     # ---- sending, without the participant's lock
 
     def send(self, call: CallId, cdr: bytes) -> None:
         """Write a request or response. Raises `WireError`, or `DDSException` if the channel is closed."""
         order = "<" if cdr[1] else ">"
-        whole = cdr[:_CDR_BYTES] + struct.pack(f"{order}Qq", *call) + cdr[_CDR_BYTES:]
+        framed_cdr = cdr[:_CDR_BYTES] + struct.pack(f"{order}Qq", *call) + cdr[_CDR_BYTES:]
         codes = self.participant.dds.core.DDSException
         try:
-            self._writers[0].write(create_sample(self._sample_class, whole))
+            self._writers[0].write(create_sample(self._sample_class, framed_cdr))
         except codes as error:
             if error.code == codes.DDS_RETCODE_TIMEOUT:
                 raise WireError(_("the other side is too slow"), len(cdr)) from error
@@ -238,10 +238,12 @@ class ServiceChannel:
     def discovered_peers(self) -> list[DdsEndpoint]:
         """Discovered endpoints of the peers: clients for a server, servers for a client."""
         (out_topic, out_type), (in_topic, in_type) = self._topics
-        found = [(each, out_type) for each in self.participant.endpoints("reader", out_topic)] + [
+        candidates = [(each, out_type) for each in self.participant.endpoints("reader", out_topic)] + [
             (each, in_type) for each in self.participant.endpoints("writer", in_topic)
         ]
-        return [each for each, ros_type in found if each.has_type(dds_type(ros_type), self._hashes[ros_type])]
+        return [
+            each for each, ros_type in candidates if each.has_type(dds_type(ros_type), self._hashes[ros_type])
+        ]
 
     @property
     def entities(self) -> Sequence[Any]:
@@ -271,7 +273,11 @@ class ServiceChannel:
     def _match_handles(self) -> tuple[int, ...]:
         # Changes whenever the set of matches changes.
         readers = (each.get_matched_publications() for each in self._readers)
-        return (*self._writers[0].get_matched_subscriptions(), -1, *(one for each in readers for one in each))
+        return (
+            *self._writers[0].get_matched_subscriptions(),
+            -1,
+            *(handle for each in readers for handle in each),
+        )
 
     def _find_ready_servers(self) -> frozenset[bytes]:
         self._is_all_ready = True
@@ -283,15 +289,17 @@ class ServiceChannel:
         failing = [self._matched_endpoints(each) for each in self._readers[1:]]
         ready: set[bytes] = set()
         for reader in readers:
-            found = [each for each in writers if each.participant == reader.participant]
-            since = self._first_seen.setdefault(reader.gid, now) if found else now
+            matching_writers = [each for each in writers if each.participant == reader.participant]
+            since = self._first_seen.setdefault(reader.gid, now) if matching_writers else now
             if "nepid" not in reader.user_data:
-                is_ready = bool(found) and (now - since >= _READY_DELAY_S or self._is_local(reader))
+                is_ready = bool(matching_writers) and (
+                    now - since >= _READY_DELAY_S or self._is_local(reader)
+                )
             else:
-                is_ready = bool(found) and self._is_confirmed(reader, writers, failing)
+                is_ready = bool(matching_writers) and self._is_confirmed(reader, writers, failing)
             self._is_all_ready = self._is_all_ready and is_ready
             if is_ready:
-                ready.update(each.gid for each in found)
+                ready.update(each.gid for each in matching_writers)
         self._first_seen = {each.gid: self._first_seen.get(each.gid, now) for each in readers}
         return frozenset(ready)
 
@@ -306,11 +314,11 @@ class ServiceChannel:
         pairs += zip(self._readers[1:], failing, strict=True)
         return all(
             any(
-                self.participant.matches.is_confirmed(own.guid.bytes, other.gid, other.participant)
+                self.participant.matches.is_confirmed(entity.guid.bytes, other.gid, other.participant)
                 for other in others
                 if other.participant == reader.participant
             )
-            for own, others in pairs
+            for entity, others in pairs
         )
 
     def matched_servers(self) -> frozenset[bytes]:

@@ -84,13 +84,13 @@ class Ros2Client(ClientCalls[_Call]):
     def _open_channel(self) -> ServiceChannel | None:
         # Returns None while the type is unknown: neither given nor announced by a server.
         with self._participant.changed:
-            found = [
+            type_names = [
                 name
                 for each in self._participant.endpoints("reader", self._requests)
                 if (name := service_type_of(each.type)) is not None
             ]
             type_name = (
-                self._given_type.name if self._given_type is not None else next(iter(sorted(found)), "")
+                self._given_type.name if self._given_type is not None else next(iter(sorted(type_names)), "")
             )
             channel = self._channel
             if not type_name or self.is_closed or (channel is not None and channel.kind.name == type_name):
@@ -133,7 +133,7 @@ class Ros2Client(ClientCalls[_Call]):
     # ---- calling
 
     def start_call(
-        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> OpenCall:
         """Send a call. See `ClientTransport.start_call`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
@@ -141,7 +141,7 @@ class Ros2Client(ClientCalls[_Call]):
             if self.is_closed:
                 raise self._closed_error()
             check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
-            call = _Call(next(self._numbers), data, timeout_s, deadline, then)
+            call = _Call(next(self._numbers), data, timeout_s, deadline, callback)
             self._calls[call.number] = call
             self._bytes += len(data)
         self._send_waiting_calls()
@@ -243,8 +243,8 @@ class Ros2Client(ClientCalls[_Call]):
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""
-        found = (ros_service(each.topic) for each in self._participant.endpoints("reader"))
-        return tuple(sorted({each for each in found if each is not None}))
+        names = (ros_service(each.topic) for each in self._participant.endpoints("reader"))
+        return tuple(sorted({each for each in names if each is not None}))
 
     # ---- closing
 
@@ -254,10 +254,10 @@ class Ros2Client(ClientCalls[_Call]):
             if self.is_closed:
                 return
             self.is_closed = True
-            left, self._calls = list(self._calls.values()), {}
+            in_flight, self._calls = list(self._calls.values()), {}
         self._deadlines.remove_client(self)
         if self._channel is not None:
             self._channel.close()
         self._on_close(self)
-        for call in left:
+        for call in in_flight:
             self._run_callback(call, self._closed_error())

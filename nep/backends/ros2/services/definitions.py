@@ -62,10 +62,10 @@ class _BodyCodec:
         return self.types.encode(self.name, payload)
 
     def decode(self, data: bytes) -> dict[str, Any]:
-        found = self.types.decode(self.name, data)
-        if not isinstance(found, dict):
+        decoded = self.types.decode(self.name, data)
+        if not isinstance(decoded, dict):
             raise WireError(_("not a ROS message"), len(data))
-        return found
+        return decoded
 
 
 def find_service_type(types: MessageTypes, name: str) -> TypedService:
@@ -96,8 +96,8 @@ def _find_definition(name: str) -> tuple[str, str] | None:
     package, _srv, last = name.split("/")
     for folder in filter(None, os.environ.get(FOLDERS_VARIABLE, "").split(os.pathsep)):
         for path in sorted(Path(folder).rglob(f"{last}.srv")):
-            own = path.parent.parent.name if path.parent.name == "srv" else path.parent.name
-            if own != package:
+            file_package = path.parent.parent.name if path.parent.name == "srv" else path.parent.name
+            if file_package != package:
                 continue
             if path.stat().st_size > _MAX_FILE_BYTES:
                 raise NepError(

@@ -117,10 +117,10 @@ class Ros2Server:
         deadline = time.monotonic() + _MATCH_TIMEOUT_S
         with self._participant.changed:
             while not self._channel.is_closed and not self._channel.can_reply_to(part.writer):
-                left = deadline - time.monotonic()
-                if left <= 0.0 or self._participant.is_own_thread():
+                remaining_s = deadline - time.monotonic()
+                if remaining_s <= 0.0 or self._participant.is_own_thread():
                     return
-                self._participant.changed.wait(min(left, _POLL_S))
+                self._participant.changed.wait(min(remaining_s, _POLL_S))
 
     # ---- closing
 

@@ -192,11 +192,13 @@ class SocketClient:
         connection = self._connection
         return "" if connection is None else connection.endpoint
 
-    def start_call(self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback) -> _Call:
+    def start_call(
+        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
+    ) -> _Call:
         """Send a call. See `ClientTransport.start_call`."""
         number = next(self._numbers)
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
-        call = _Call(number, data, timeout_s, deadline, then)
+        call = _Call(number, data, timeout_s, deadline, callback)
         with self._lock:
             if self._is_closed:
                 raise ClosedError(_("client of '{service}'").format(service=self.spec.service))
@@ -292,15 +294,15 @@ class SocketClient:
         """Replace the list of servers."""
         with self._lock:
             self._originals = {each for each in self._originals if each == self._current}
-            listed = {
+            servers = {
                 each.publisher.id: each.publisher.endpoints[0]
                 for each in remotes
                 if self._can_call_locked(each)
             }
             current, self._unlisted = self._current, None
-            if not listed and current in self._servers and self.is_connected:
-                listed, self._unlisted = {current: self._servers[current]}, current
-            self._servers = listed
+            if not servers and current in self._servers and self.is_connected:
+                servers, self._unlisted = {current: self._servers[current]}, current
+            self._servers = servers
             self._retry_at = 0.0
         self._serve_soon(self)
 
@@ -389,8 +391,8 @@ class SocketClient:
 
     def _has_endpoint_changed(self) -> bool:
         # True if an endpoint of the connection has changed.
-        known = None if self._current is None else self._servers.get(self._current)
-        return known not in {None, self._connected_endpoint} and (
+        endpoint = None if self._current is None else self._servers.get(self._current)
+        return endpoint not in {None, self._connected_endpoint} and (
             not self._connected_endpoint or is_remote(self._connected_endpoint)
         )
 
@@ -422,12 +424,12 @@ class SocketClient:
     def _connect_next(self, now: float) -> None:
         # Connects to the next server in turn.
         self._disconnect()
-        known = list(self._servers)
-        if not known:
+        servers = list(self._servers)
+        if not servers:
             self._current, self._retry_at = None, math.inf
             return
-        index = known.index(self._current) + 1 if self._current in self._servers and self._attempts else 0
-        self._current = known[index % len(known)]
+        index = servers.index(self._current) + 1 if self._current in self._servers and self._attempts else 0
+        self._current = servers[index % len(servers)]
         endpoint = self._connected_endpoint = self._servers[self._current]
         self._framing = ORIGINAL if self._current in self._originals else self._usual_framing
         self._attempts += 1
@@ -470,9 +472,9 @@ class SocketClient:
         return self.spec.service
 
     def _run_callbacks(self, outcomes: _Outcomes) -> None:
-        for then, outcome in outcomes:
+        for callback, outcome in outcomes:
             try:
-                then(outcome)
+                callback(outcome)
             except Exception:  # a failing callback must not affect other calls
                 _logger.exception("result callback for '%s' raised", self._name)
 
@@ -486,12 +488,12 @@ class SocketClient:
         """Fail the calls in flight and close the connection. Idempotent. Called by the closer."""
         with self._lock:
             self._is_closed = True
-            left, self._calls = list(self._calls.values()), {}
+            in_flight, self._calls = list(self._calls.values()), {}
             connection, self._connection = self._connection, None
         if connection is not None:  # without the lock: the thread that polls it may wait for the lock
             connection.close()
-        what = _("client of '{service}'").format(service=self._name)
-        self._run_callbacks([(each.callback, ClosedError(what)) for each in left])
+        owner = _("client of '{service}'").format(service=self._name)
+        self._run_callbacks([(each.callback, ClosedError(owner)) for each in in_flight])
 
     def forked(self) -> None:
         """Mark the client as closed in a forked child process. See `nep.system.forks`."""

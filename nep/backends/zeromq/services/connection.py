@@ -44,12 +44,12 @@ class ServerConnection:
         self.is_open = self.has_ended = False
         self.reconnect_delay_s = 0.0
         self._io: IoThread = shared.io
-        what = f"a client of '{service}'"
-        self._socket = shared.socket(zmq.DEALER, what)
+        owner = f"a client of '{service}'"
+        self._socket = shared.socket(zmq.DEALER, owner)
         self._sides: tuple[_PolledSocket, ...] = ()
         self._monitor: Socket | None = None
         try:
-            self._monitor = monitor = shared.socket(zmq.PAIR, what)
+            self._monitor = monitor = shared.socket(zmq.PAIR, owner)
             self._connect(monitor)
             sides = (_PolledSocket(self._socket, serve), _PolledSocket(monitor, serve))
         except BaseException:

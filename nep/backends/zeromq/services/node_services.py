@@ -192,7 +192,7 @@ class ZeromqServices:
         spec: ClientSpec,
         framing: Framing,
         unregister: Callable[[], None],
-        known: Callable[[float], tuple[str, ...]] | None,
+        known_services: Callable[[float], tuple[str, ...]] | None,
         endpoint: str = "",
         *,
         is_tcp: bool = False,
@@ -216,7 +216,7 @@ class ZeromqServices:
             framing,
             self._shared.io.serve_soon,
             close,
-            known_services=known,
+            known_services=known_services,
             endpoint=endpoint,
         )
         with _release_on_error(client):

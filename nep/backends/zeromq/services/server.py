@@ -57,14 +57,14 @@ class CallReader:
         self,
         parts: Sequence[bytes | memoryview],
         now: float,
-        answer: Callable[[int, Reply], bool],
+        send_reply: Callable[[int, Reply], bool],
     ) -> IncomingCall | None:
         """Parse a call; return None if the call is malformed.
 
         Args:
             parts: Parts of the message.
             now: Time at which the call was received (`time.monotonic`).
-            answer: Sends a reply; called with the number of the call and the reply.
+            send_reply: Sends a reply; called with the number of the call and the reply.
         """
         try:
             header = self._framing.read_call(parts)
@@ -72,7 +72,7 @@ class CallReader:
             self.reject(error)
             return None
         deadline = None if header.timeout_s is None else now + header.timeout_s
-        return IncomingCall(header.data, header.codec, deadline, partial(answer, header.number))
+        return IncomingCall(header.data, header.codec, deadline, partial(send_reply, header.number))
 
     def reject(self, error: WireError) -> None:
         """Count a malformed call, and log it if due."""

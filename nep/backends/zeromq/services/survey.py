@@ -67,7 +67,7 @@ class SurveyClient:
             return self._late + sum(each.late for each in self._all_clients())
 
     def start_survey(
-        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> list[OpenCall]:
         """Send a request to all listed respondents. See `SurveyTransport.start_survey`."""
         self._close_idle_removed_clients()
@@ -79,7 +79,7 @@ class SurveyClient:
         try:
             for client in clients:
                 try:
-                    sent.append(_SentCall(client, client.start_call(data, timeout_s, then)))
+                    sent.append(_SentCall(client, client.start_call(data, timeout_s, callback)))
                 except ClosedError:  # left in the meantime
                     continue
         except BaseException:
@@ -122,10 +122,10 @@ class SurveyClient:
     def _add_respondent(self, respondent: int, endpoints: Sequence[str]) -> None:
         if self.is_closed or not endpoints:
             return
-        known = self._clients.get(respondent)
-        if known is not None and known.fixed_endpoint == endpoints[0]:
+        existing = self._clients.get(respondent)
+        if existing is not None and existing.fixed_endpoint == endpoints[0]:
             return
-        if known is not None:
+        if existing is not None:
             self._remove_respondent(respondent)
         try:
             self._clients[respondent] = self._new_client(endpoints[0])
@@ -153,13 +153,13 @@ class SurveyClient:
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """Replace the list of respondents."""
-        listed = {each.publisher.id: each.publisher.endpoints for each in remotes}
+        endpoints_by_id = {each.publisher.id: each.publisher.endpoints for each in remotes}
         with self._lock:
-            if not listed and any(each.is_connected for each in self._clients.values()):
+            if not endpoints_by_id and any(each.is_connected for each in self._clients.values()):
                 return  # the master was restarted, and respondents have yet to register
-            for respondent in [each for each in self._clients if each not in listed]:
+            for respondent in [each for each in self._clients if each not in endpoints_by_id]:
                 self._remove_respondent(respondent)
-            for respondent, endpoints in listed.items():
+            for respondent, endpoints in endpoints_by_id.items():
                 self._add_respondent(respondent, endpoints)
 
     def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
@@ -169,10 +169,10 @@ class SurveyClient:
         """Return the statistics that a renewal reports."""
         with self._lock:
             counts = [each.counts() for each in self._all_clients()]
-            answered = self._replied + sum(each.received or 0 for each in counts)
+            replied = self._replied + sum(each.received or 0 for each in counts)
             failed = self._failed + sum(each.lost or 0 for each in counts)
         problem = next((each.problem for each in counts if each.problem), "")
-        return SubscriberCount(self.spec.id, clamp_count(answered), clamp_count(failed), problem)
+        return SubscriberCount(self.spec.id, clamp_count(replied), clamp_count(failed), problem)
 
     # ---- closing
 

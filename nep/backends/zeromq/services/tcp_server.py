@@ -134,11 +134,11 @@ class TcpServer:
 
     def _read(self, peer: _Peer, calls: list[IncomingCall], now: float) -> bool:
         # Returns True if there may be more.
-        for turn in range(_MAX_READS_PER_TURN):
+        for attempt in range(_MAX_READS_PER_TURN):
             try:
                 parts = peer.stream.next()
                 if (
-                    parts is None and not turn
+                    parts is None and not attempt
                 ):  # read once per turn: the level-triggered descriptor signals further input
                     peer.stream.read()
                     parts = peer.stream.next()
@@ -213,9 +213,9 @@ class TcpServer:
             self._io.serve_soon(peer)
         with self._changed:
             wait_until(self._changed, lambda: not self._peers, max(0.0, deadline - time.monotonic()))
-            left = tuple(self._peers)
+            remaining_peers = tuple(self._peers)
             self._peers.clear()
-        for peer in left:
+        for peer in remaining_peers:
             self._io.remove(peer)
             peer.stream.close()
 

@@ -113,10 +113,10 @@ class TcpStream:
         if self.is_broken:
             return
         header, payload = parts
-        head = _SIZE.pack(len(header) + len(payload)) + header
-        pieces = [head + payload] if len(payload) < _SMALL_BYTES else [head, payload]
+        prefix = _SIZE.pack(len(header) + len(payload)) + header
+        pieces = [prefix + payload] if len(payload) < _SMALL_BYTES else [prefix, payload]
         self._output.extend(memoryview(each) for each in pieces)
-        self.backlog += len(head) + len(payload)
+        self.backlog += len(prefix) + len(payload)
         self.flush()
 
     def flush(self) -> None:

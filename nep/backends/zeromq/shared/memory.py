@@ -139,16 +139,18 @@ def _create_private_folder() -> Path:
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     folder = Path(runtime) / "nep-shared" if runtime else Path(tempfile.gettempdir()) / f"nep-shared{user}"
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    found = folder.lstat()
-    if not stat.S_ISDIR(found.st_mode) or (sys.platform != "win32" and found.st_uid != os.getuid()):
+    folder_stat = folder.lstat()
+    if not stat.S_ISDIR(folder_stat.st_mode) or (
+        sys.platform != "win32" and folder_stat.st_uid != os.getuid()
+    ):
         raise PermissionError(f"'{folder}' belongs to another user")
     return folder
 
 
 def _prevent_finalization(*inherited: object) -> None:
     # Prevents finalizers from releasing the parent's resources in a forked child process.
-    for each in inherited:
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(each))
+    for resource in inherited:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(resource))
 
 
 def _forked() -> None:
@@ -186,10 +188,10 @@ def free_bytes() -> int:
     if sys.platform == "win32":  # Python on Windows has no statvfs
         return 0
     try:
-        found = os.statvfs(_SHARED_MEMORY_FOLDER)
+        stats = os.statvfs(_SHARED_MEMORY_FOLDER)
     except OSError:
         return 0
-    return found.f_bavail * found.f_frsize
+    return stats.f_bavail * stats.f_frsize
 
 
 class _SlotViews:
@@ -199,11 +201,11 @@ class _SlotViews:
         self._views: dict[int, memoryview] = {}
 
     def view(self, address: int, size: int) -> memoryview:
-        found = self._views.get(address)
-        if found is None or len(found) < size:
-            found = memoryview((ctypes.c_uint8 * size).from_address(address)).cast("B")
-            self._views[address] = found
-        return found
+        slot_view = self._views.get(address)
+        if slot_view is None or len(slot_view) < size:
+            slot_view = memoryview((ctypes.c_uint8 * size).from_address(address)).cast("B")
+            self._views[address] = slot_view
+        return slot_view
 
 
 class Loan:
@@ -228,8 +230,8 @@ class Loan:
 
     def send(self, number: int) -> None:
         """Publish the payload to all readers as payload `number`. It must not be changed afterwards."""
-        head = (ctypes.c_uint8 * _HEADER.size).from_address(self.address - _HEADER_BYTES)
-        _HEADER.pack_into(head, 0, number, self.size)
+        header = (ctypes.c_uint8 * _HEADER.size).from_address(self.address - _HEADER_BYTES)
+        _HEADER.pack_into(header, 0, number, self.size)
         sample, self._sample = self._sample, None
         sample.assume_init().send()
 
@@ -327,8 +329,8 @@ class SharedWriter:
         if not self._loans or data.readonly or not data.c_contiguous:
             return None
         address = ctypes.addressof(ctypes.c_uint8.from_buffer(data))
-        found = self._loans.get(address)
-        return found if found is not None and found.size == data.nbytes else None
+        loan = self._loans.get(address)
+        return loan if loan is not None and loan.size == data.nbytes else None
 
     def send(self, loan: Loan) -> int:
         """Publish the payload of a loan to the readers; return the number of the payload."""
@@ -399,13 +401,13 @@ class SharedReader:
             may_copy: True to copy small payloads, which frees their slots.
         """
         while True:
-            found, self._ahead = self._ahead or self._receive_next(), None
-            if found is None:
+            sample, self._ahead = self._ahead or self._receive_next(), None
+            if sample is None:
                 return None
-            if found[0] == number:
-                return self._extract_payload(*found[1:], may_copy=may_copy)
-            if found[0] > number:
-                self._ahead = found
+            if sample[0] == number:
+                return self._extract_payload(*sample[1:], may_copy=may_copy)
+            if sample[0] > number:
+                self._ahead = sample
                 return None
 
     def _receive_next(self) -> tuple[int, int, Any] | None:

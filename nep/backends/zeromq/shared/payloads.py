@@ -72,20 +72,20 @@ class SharedPayloads:
     def _prepare_slots(self, size: int) -> bool:
         # No reader has opened a new segment yet.
         generation = self._writer.generation
-        is_there = self._writer.prepare(size)
+        is_prepared = self._writer.prepare(size)
         if generation != self._writer.generation:
             self.readers.clear()
             self._offered.clear()
-        return is_there
+        return is_prepared
 
     def _prepare_readers(self, size: int, subscribers: Mapping[int, int], now: float) -> bool:
         if not self._prepare_slots(size):
             return False
-        for each in subscribers if len(self.readers) < len(subscribers) else ():
-            times, at = self._offered.get(each, (0, float("-inf")))
-            if each not in self.readers and times < _MAX_OFFERS and now >= at + _OFFER_RETRY_S:
-                self._offered[each] = (times + 1, now)
-                self._offer(each, self._writer.generation)
+        for subscriber in subscribers if len(self.readers) < len(subscribers) else ():
+            times, offered_at = self._offered.get(subscriber, (0, float("-inf")))
+            if subscriber not in self.readers and times < _MAX_OFFERS and now >= offered_at + _OFFER_RETRY_S:
+                self._offered[subscriber] = (times + 1, now)
+                self._offer(subscriber, self._writer.generation)
         return bool(self.readers)
 
     def borrow_memory(self, size: int) -> memoryview | None:
@@ -121,8 +121,8 @@ class SharedSources:
             publisher: Id of the publisher.
             generation: Number of the memory segment.
         """
-        known = self._readers.get(publisher)
-        if known is None or known.generation != generation:
+        reader = self._readers.get(publisher)
+        if reader is None or reader.generation != generation:
             try:
                 self._readers[publisher] = SharedReader(publisher, generation)
             except LookupError:

@@ -19,10 +19,10 @@ _MAX_CLOSE_S = 3.0
 def _expect_next(bench: Bench, publisher: ScriptedPublisher, sub: int) -> None:
     """Send a message and check that the adapter delivers it exactly once."""
     publisher.send(b'{"a":1}')
-    wanted = str(publisher.seq)
-    bench.require(lambda: any(each.get("seq") == wanted for each in bench.events(sub)), "message")
+    expected_seq = str(publisher.seq)
+    bench.require(lambda: any(each.get("seq") == expected_seq for each in bench.events(sub)), "message")
     bench.wait(0.1)
-    expect("deliveries", sum(each.get("seq") == wanted for each in bench.events(sub)), 1)
+    expect("deliveries", sum(each.get("seq") == expected_seq for each in bench.events(sub)), 1)
 
 
 @rule(
@@ -118,9 +118,9 @@ def _endpoint_change(bench: Bench) -> None:
 def _unusable_endpoint(bench: Bench) -> None:
     publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     for endpoints in (("nanomsg://127.0.0.1:4000/4001",), ("tcp://there is none:1",), ("",), ()):
-        made = bench.create_publisher(publisher.topic, is_listed=False)
-        made.record = replace(made.record, endpoints=endpoints)
-        bench.master.submit(AddPublisher(made.node, made.record))
+        unusable = bench.create_publisher(publisher.topic, is_listed=False)
+        unusable.record = replace(unusable.record, endpoints=endpoints)
+        bench.master.submit(AddPublisher(unusable.node, unusable.record))
     bench.wait(0.2)
     _expect_next(bench, publisher, sub)
 

@@ -56,14 +56,14 @@ def _hello_form(bench: Bench) -> None:
     topic = bench.new_topic()
     publisher, _sub = bench.create_subscribed_publisher(topic)
     level = level_of(bench)
-    wanted = hello_part(
+    expected = hello_part(
         int(bench.latest_record("subscriber", topic)["id"]),
         topic,
         one_part=level == 1,
         tells=level == 2,
         batches=level == 3,
     )
-    expect("hello", next(iter(publisher.hellos)), wanted)
+    expect("hello", next(iter(publisher.hellos)), expected)
 
 
 @rule(
@@ -141,10 +141,10 @@ def _missing_hello_is_reported(bench: Bench) -> None:
     bench.connect_delay_s = None
     reply = bench.call("publisher", topic=topic, type="json")
     expect("publisher.missing", reply.get("missing"), [subscriber.node.name])
-    what = bench.wait_for_request(
+    fields = bench.wait_for_request(
         "missing", "publisher_id", bench.latest_record("publisher", topic)["id"]
     ).fields
-    expect("missing.subscriber_ids", list(what.get("subscriber_ids", ())), [subscriber.record.id])
+    expect("missing.subscriber_ids", list(fields.get("subscriber_ids", ())), [subscriber.record.id])
     bench.call("close_publisher", pub=reply.get("pub"))
 
 
@@ -228,6 +228,6 @@ def _history(bench: Bench) -> None:
     expect("publisher.history", bench.latest_record("publisher", topic).get("history"), 3)
     bench.call("publish", pub=pub, value={"a": 1}, count=5)
     subscriber = connect_subscriber(bench, topic, 3)
-    count = next(place for place, each in enumerate(subscriber.notices) if each.payload is None)
+    count = next(index for index, each in enumerate(subscriber.notices) if each.payload is None)
     seqs = [each.header.seq for each in subscriber.notices[:count] if each.payload is not None]
     expect("history", seqs, [3, 4, 5])

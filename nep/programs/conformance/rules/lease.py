@@ -64,16 +64,16 @@ def _statistics(bench: Bench) -> None:
     publisher.send(b'{"a":1}')
     bench.require(lambda: bool(bench.events(sub)), "message")
     bench.wait_for_renewal(len(bench.master.received))
-    found = bench.wait_for_renewal(len(bench.master.received)).fields
+    renewal = bench.wait_for_renewal(len(bench.master.received)).fields
     id, subscriber_id = (
         bench.latest_record("publisher", topic)["id"],
         bench.latest_record("subscriber", publisher.topic)["id"],
     )
-    (sent,) = (each for each in found["publishers"] if each.get("id") == id)
+    (sent,) = (each for each in renewal["publishers"] if each.get("id") == id)
     expect("count", sent.get("count"), 6)
     expect("last_seq", sent.get("last_seq"), 6)
     expect("bytes", sent.get("bytes"), sum(len(each.payload) for each in messages_of(subscriber)))
-    (received,) = (each for each in found["subscribers"] if each.get("id") == subscriber_id)
+    (received,) = (each for each in renewal["subscribers"] if each.get("id") == subscriber_id)
     expect("received", received.get("received"), 1)
 
 
@@ -202,11 +202,11 @@ def _unknown_replies(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
     epoch = bench.master.graph.epoch
-    what = {"epoch": epoch, "revision": 1, "from a later version": [1, {}]}
+    fields = {"epoch": epoch, "revision": 1, "from a later version": [1, {}]}
     for body in (
-        msgpack.packb({"is": "probe", "re": 0, "what": what}),
-        msgpack.packb({"is": "later", "re": 0, "what": what}),
-        msgpack.packb({"is": "done", "re": 10**6, "what": what}),
+        msgpack.packb({"is": "probe", "re": 0, "what": fields}),
+        msgpack.packb({"is": "later", "re": 0, "what": fields}),
+        msgpack.packb({"is": "done", "re": 10**6, "what": fields}),
         msgpack.packb([1, 2]),
         b"\xc1",
         b"",

@@ -60,13 +60,13 @@ def _malformed_messages(bench: Bench) -> None:
 def _malformed_messages_are_reported(bench: Bench) -> None:
     topic = bench.new_topic()
     publisher, sub = bench.create_subscribed_publisher(topic)
-    head = Header(1, 0, 1, 1, 1).pack()
-    publisher.socket.send_multipart([topic_part(topic), head[:31], b"{}"])
+    header = Header(1, 0, 1, 1, 1).pack()
+    publisher.socket.send_multipart([topic_part(topic), header[:31], b"{}"])
     _expect_delivery(bench, publisher, sub)
     id = bench.latest_record("subscriber", topic)["id"]
     bench.wait_for_renewal(len(bench.master.received))
-    found = bench.wait_for_renewal(len(bench.master.received)).fields
-    (entry,) = (each for each in found.get("subscribers", ()) if each.get("id") == id)
+    renewal = bench.wait_for_renewal(len(bench.master.received)).fields
+    (entry,) = (each for each in renewal.get("subscribers", ()) if each.get("id") == id)
     problem = entry.get("problem", "")
     if not isinstance(problem, str) or not problem:
         expect("subscribers.problem", problem, "a sentence")
@@ -74,14 +74,14 @@ def _malformed_messages_are_reported(bench: Bench) -> None:
 
 @rule("deep", lazy("Deeply nested JSON and msgpack don't stop a subscriber."), "messages")
 def _deep_nesting(bench: Bench) -> None:
-    for msg_type, payload, good in (
+    for msg_type, payload, valid_payload in (
         ("json", b"[" * _NESTING_DEPTH + b"]" * _NESTING_DEPTH, b"[1]"),
         ("msgpack", b"\x91" * _NESTING_DEPTH + b"\xc0", msgpack.packb([1])),
     ):
         publisher, sub = bench.create_subscribed_publisher(bench.new_topic(), msg_type)
         publisher.send(payload)
         publisher.send(payload[:1000])
-        publisher.send(good)
+        publisher.send(valid_payload)
         bench.require(lambda: any(_seq(each) == 3 for each in bench.events(sub)), "message")  # noqa: B023
 
 
@@ -109,9 +109,9 @@ def _large_messages(bench: Bench) -> None:
     "bounds",
 )
 def _unknown_filters(bench: Bench) -> None:
-    topic, pub, good = connect_publisher(bench)
-    bad = connect_subscriber(bench, topic, None)
-    for what in (
+    topic, pub, subscriber = connect_publisher(bench)
+    faulty_subscriber = connect_subscriber(bench, topic, None)
+    for prefix in (
         b"\xff",
         b"\xffhello/",
         b"\xffhello9/" + b"0" * 16 + b"/x",
@@ -119,11 +119,11 @@ def _unknown_filters(bench: Bench) -> None:
         b"\xffshares/",
         b"x",
     ):
-        bad.socket.subscribe(what)
-    bad.socket.subscribe(b"\xff" * 5000)
+        faulty_subscriber.socket.subscribe(prefix)
+    faulty_subscriber.socket.subscribe(b"\xff" * 5000)
     bench.wait(0.2)
     bench.call("publish", pub=pub, value={"a": 1}, count=3)
-    bench.require(lambda: len(messages_of(good)) == 3, "message")
+    bench.require(lambda: len(messages_of(subscriber)) == 3, "message")
     other = connect_subscriber(bench, topic, 3)
     bench.call("publish", pub=pub, value={"a": 1})
     bench.require(lambda: len(messages_of(other)) == 1, "message")

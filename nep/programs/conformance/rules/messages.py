@@ -145,11 +145,11 @@ def _header(bench: Bench) -> None:
         topic, pub, subscriber = connect_publisher(bench, 0, msg_type)
         bench.call("publish", pub=pub, **members)
         bench.require(lambda: bool(subscriber.raw_messages), "message")  # noqa: B023 - called immediately
-        found = messages_of(subscriber)[0].header
-        expect("header.codec", found.codec, codec_for(msg_type).number)
-        expect("header.flags", found.flags, 0)
-        expect("header.seq", found.seq, 1)
-        expect("header.publisher", found.publisher, bench.latest_record("publisher", topic)["id"])
+        header = messages_of(subscriber)[0].header
+        expect("header.codec", header.codec, codec_for(msg_type).number)
+        expect("header.flags", header.flags, 0)
+        expect("header.seq", header.seq, 1)
+        expect("header.publisher", header.publisher, bench.latest_record("publisher", topic)["id"])
 
 
 @rule(
@@ -158,7 +158,7 @@ def _header(bench: Bench) -> None:
     "messages",
 )
 def _payload(bench: Bench) -> None:
-    for msg_type, (members, wanted) in _SAMPLES.items():
+    for msg_type, (members, expected) in _SAMPLES.items():
         _topic, pub, subscriber = connect_publisher(bench, 0, msg_type)
         bench.call("publish", pub=pub, **members)
         bench.require(lambda: bool(subscriber.raw_messages), "message")  # noqa: B023 - called immediately
@@ -169,7 +169,7 @@ def _payload(bench: Bench) -> None:
             elif msg_type == "msgpack":
                 expect("payload", msgpack.unpackb(data), members["value"])
             else:
-                expect("payload", data, wanted)
+                expect("payload", data, expected)
         except ValueError as error:
             raise broken_rule_error(
                 _("the payload {seen} isn't valid {msg_type}").format(seen=printable(data), msg_type=msg_type)

@@ -119,11 +119,15 @@ def _read_acknowledgement(bench: Bench) -> None:
     publisher.send_echo(next(iter(publisher.hellos)))
     bench.require(lambda: any(parse_acknowledgement(each.prefix) for each in publisher.filters), "read")
     _expect_seqs(bench, sub, 2)
-    answers = [each for each in publisher.filters if parse_acknowledgement(each.prefix) is not None]
-    found = parse_acknowledgement(answers[0].prefix)
-    expect("read.subscriber", found and found.subscriber, bench.latest_record("subscriber", topic)["id"])
-    expect("read.publisher", found and found.publisher, publisher.id)
-    expect("read.seq", found and found.seq, 2)
+    acknowledgements = [each for each in publisher.filters if parse_acknowledgement(each.prefix) is not None]
+    acknowledgement = parse_acknowledgement(acknowledgements[0].prefix)
+    expect(
+        "read.subscriber",
+        acknowledgement and acknowledgement.subscriber,
+        bench.latest_record("subscriber", topic)["id"],
+    )
+    expect("read.publisher", acknowledgement and acknowledgement.publisher, publisher.id)
+    expect("read.seq", acknowledgement and acknowledgement.seq, 2)
     bench.require(
         lambda: any(not each.is_added and parse_acknowledgement(each.prefix) for each in publisher.filters),
         "read taken back",

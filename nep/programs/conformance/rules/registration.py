@@ -18,22 +18,22 @@ _ENDPOINT = re.compile(r"tcp://(.+):(\d+)")
 _ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
 
 
-def _text(what: str, record: Mapping[str, Any], name: str) -> str:
+def _text(label: str, record: Mapping[str, Any], name: str) -> str:
     value = record.get(name)
     if not isinstance(value, str):
         raise broken_rule_error(
             _("{what} is {seen}, expected {wanted}").format(
-                what=f"{what}.{name}", seen=printable(value), wanted="text"
+                what=f"{label}.{name}", seen=printable(value), wanted="text"
             )
         )
     return value
 
 
-def _integer(what: str, value: object, least: int, most: int) -> int:
-    if type(value) is not int or not least <= value <= most:
+def _integer(label: str, value: object, min_value: int, max_value: int) -> int:
+    if type(value) is not int or not min_value <= value <= max_value:
         raise broken_rule_error(
             _("{what} is {seen}, expected an integer from {least} to {most}").format(
-                what=what, seen=printable(value), least=least, most=most
+                what=label, seen=printable(value), least=min_value, most=max_value
             )
         )
     return value
@@ -119,8 +119,8 @@ def _publisher_port(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
     for endpoint in bench.latest_record("publisher", topic).get("endpoints", ()):
-        found = _ENDPOINT.fullmatch(str(endpoint))
-        if found is not None and int(found.group(2)) in _ORIGINAL_PORTS:
+        match = _ENDPOINT.fullmatch(str(endpoint))
+        if match is not None and int(match.group(2)) in _ORIGINAL_PORTS:
             raise broken_rule_error(
                 _("the publisher's endpoint is {endpoint}").format(endpoint=printable(endpoint))
             )
@@ -150,8 +150,11 @@ def _request_form(bench: Bench) -> None:
     bench.new_sub(bench.new_topic())
     bench.close_sub(bench.new_sub(bench.new_topic()))
     calls: dict[tuple[str, int], object] = {}
-    for each in bench.master.received:
-        if each.problem:
-            raise broken_rule_error(_("a request is malformed: {problem}").format(problem=each.problem))
-        if calls.setdefault((each.sender, each.call), (each.do, each.fields)) != (each.do, each.fields):
-            raise broken_rule_error(_("two requests have the call number {call}").format(call=each.call))
+    for request in bench.master.received:
+        if request.problem:
+            raise broken_rule_error(_("a request is malformed: {problem}").format(problem=request.problem))
+        if calls.setdefault((request.sender, request.call), (request.do, request.fields)) != (
+            request.do,
+            request.fields,
+        ):
+            raise broken_rule_error(_("two requests have the call number {call}").format(call=request.call))

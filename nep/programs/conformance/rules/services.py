@@ -34,18 +34,18 @@ def _socket(bench: Bench, kind: int) -> Iterator[zmq.Socket[bytes]]:
         socket.close(0)
 
 
-def _replies(bench: Bench, socket: zmq.Socket[bytes], wanted: set[int]) -> dict[int | None, Reply]:
+def _replies(bench: Bench, socket: zmq.Socket[bytes], call_numbers: set[int]) -> dict[int | None, Reply]:
     """Wait for the replies to the calls with these numbers, and return all replies received, by number."""
-    found: dict[int | None, Reply] = {}
+    replies: dict[int | None, Reply] = {}
 
     def has_all() -> bool:
         while socket.poll(0):
             read = NATIVE.read_reply(socket.recv_multipart())
-            found[read.number] = read.reply
-        return wanted <= found.keys()
+            replies[read.number] = read.reply
+        return call_numbers <= replies.keys()
 
     bench.require(has_all, "answer")
-    return found
+    return replies
 
 
 @rule(
@@ -90,16 +90,21 @@ def _service_reply(bench: Bench) -> None:
 def _service_malformed(bench: Bench) -> None:
     name = bench.new_topic()
     bench.call("serve", service=name)
-    (head, payload) = NATIVE.call(1, _JSON, _CALL_S, b"{}")
+    (header, payload) = NATIVE.call(1, _JSON, _CALL_S, b"{}")
     with _socket(bench, zmq.DEALER) as socket:
         socket.connect(bench.latest_record("publisher", topic_of(name))["endpoints"][0])
-        for parts in ([head], [head[:15], payload], [b"\2" + head[1:], payload], [head, payload, b""]):
+        for parts in (
+            [header],
+            [header[:15], payload],
+            [b"\2" + header[1:], payload],
+            [header, payload, b""],
+        ):
             socket.send_multipart(parts)
         socket.send_multipart(NATIVE.call(2, _JSON, _CALL_S, b'{"a":'))
         socket.send_multipart(NATIVE.call(3, _JSON, _CALL_S, b"[]"))
-        found = _replies(bench, socket, {2, 3})
-        expect("answers", sorted(each or 0 for each in found), [2, 3])
-        expect("kind", int(found[2].kind), int(CallKind.REJECTED))
+        replies = _replies(bench, socket, {2, 3})
+        expect("answers", sorted(each or 0 for each in replies), [2, 3])
+        expect("kind", int(replies[2].kind), int(CallKind.REJECTED))
 
 
 @contextmanager
@@ -131,8 +136,8 @@ def _reply_to_call(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: 
     if call.timeout_s is None or not 0 < call.timeout_s <= 2 * _CALL_S:
         raise broken_rule_error(_("the call's timeout is {seen}").format(seen=printable(call.timeout_s)))
     data = reply.data if reply.kind != CallKind.REPLY else call.data
-    answer = Reply(reply.kind, data, call.codec if reply.kind == CallKind.REPLY else _JSON)
-    socket.send_multipart([sender, *NATIVE.reply(call.number, answer)])
+    sent_reply = Reply(reply.kind, data, call.codec if reply.kind == CallKind.REPLY else _JSON)
+    socket.send_multipart([sender, *NATIVE.reply(call.number, sent_reply)])
     return bench.finish(number, "call").get("value")
 
 
@@ -201,10 +206,10 @@ def _service_error(bench: Bench) -> None:
     "patterns",
 )
 def _pattern(bench: Bench) -> None:
-    place = bench.new_topic()
-    sub = bench.new_sub(f"{place}/*", pattern=True)
-    expect("subscriber.pattern", bench.latest_record("subscriber", f"{place}/*").get("pattern"), True)
-    publishers = [bench.create_publisher(f"{place}/{name}") for name in ("one", "two")]
+    prefix = bench.new_topic()
+    sub = bench.new_sub(f"{prefix}/*", pattern=True)
+    expect("subscriber.pattern", bench.latest_record("subscriber", f"{prefix}/*").get("pattern"), True)
+    publishers = [bench.create_publisher(f"{prefix}/{name}") for name in ("one", "two")]
     for publisher in publishers:
         bench.require(lambda: bool(publisher.hellos), "hello")  # noqa: B023 - called immediately
         if topic_part(publisher.topic) not in [each.prefix for each in publisher.filters]:

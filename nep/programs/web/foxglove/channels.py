@@ -84,15 +84,15 @@ class Channels:
     Args:
         context: Shared objects of the connection.
         channels: Encoder of messages.
-        tell: Sends a JSON message with the given fields to the client.
+        send: Sends a JSON message with the given fields to the client.
     """
 
     def __init__(
-        self, context: PageContext, channels: ChannelFormat, tell: Callable[[Mapping[str, object]], None]
+        self, context: PageContext, channels: ChannelFormat, send: Callable[[Mapping[str, object]], None]
     ) -> None:
         self._context = context
         self._format = channels
-        self._tell = tell
+        self._tell = send
         self._channels: dict[str, _Channel] = {}
         self._subscriptions: dict[int, _Subscription] = {}
         self._last_id = 0
@@ -109,23 +109,23 @@ class Channels:
             topic: Name of the topic.
             schema_name: Name of the schema that the client uses.
         """
-        known = self._channels.get(topic)
-        is_known = known is not None and known.definition.schema_name == schema_name
-        return ros_type_of(known.msg_type) if known is not None and is_known else ""
+        channel = self._channels.get(topic)
+        is_known = channel is not None and channel.definition.schema_name == schema_name
+        return ros_type_of(channel.msg_type) if channel is not None and is_known else ""
 
     # ---- topics
 
-    async def update(self, found: Mapping[str, str]) -> None:
+    async def update(self, types_by_topic: Mapping[str, str]) -> None:
         """Advertise new topics and unadvertise removed ones.
 
         Args:
-            found: Message types of all current topics, by topic.
+            types_by_topic: Message types of all current topics, by topic.
         """
         for topic, channel in list(self._channels.items()):
-            if found.get(topic) != channel.msg_type:
+            if types_by_topic.get(topic) != channel.msg_type:
                 del self._channels[topic]
                 await self._unadvertise(channel)
-        new = [(topic, msg_type) for topic, msg_type in found.items() if topic not in self._channels]
+        new = [(topic, msg_type) for topic, msg_type in types_by_topic.items() if topic not in self._channels]
         for begin in range(0, len(new), _MAX_CHANNELS_PER_MESSAGE):
             self._advertise(
                 (topic, msg_type, self._format.expected_channel(topic, _readable_type(msg_type)))
@@ -154,8 +154,10 @@ class Channels:
 
     async def _unadvertise(self, channel: _Channel) -> None:
         self._tell({"op": "unadvertise", "channelIds": [channel.id]})
-        for each in [each for each in self._subscriptions.values() if each.channel is channel]:
-            await self.unsubscribe(each.id)
+        for subscription in [
+            subscription for subscription in self._subscriptions.values() if subscription.channel is channel
+        ]:
+            await self.unsubscribe(subscription.id)
 
     # ---- subscriptions
 
@@ -189,12 +191,12 @@ class Channels:
 
         Unknown ids are ignored, because the channel may have been unadvertised in the meantime.
         """
-        known = self._subscriptions.pop(id_, None)
-        if known is None:
+        subscription = self._subscriptions.pop(id_, None)
+        if subscription is None:
             return
-        known.reader.cancel()
-        self._context.queue.remove(known.feed)
-        await self._context.run_in_thread(known.subscriber.close)
+        subscription.reader.cancel()
+        self._context.queue.remove(subscription.feed)
+        await self._context.run_in_thread(subscription.subscriber.close)
 
     async def encode_frames(self, queued: QueuedMessage) -> list[Frame]:
         """Encode a message for the client. Raises `NepError` if the message can't be decoded.
@@ -202,25 +204,25 @@ class Channels:
         Returns no frames if the client must subscribe again because the channel has changed.
         """
         message = queued.message
-        known = next((each for each in self._subscriptions.values() if each.feed is queued.feed), None)
-        if known is None:
+        subscription = next((each for each in self._subscriptions.values() if each.feed is queued.feed), None)
+        if subscription is None:
             return []
         log_ns = time.time_ns()
         definition, data = self._format.encode(_readable_message(message), log_ns)
-        if _schema_key(definition) != _schema_key(known.channel.definition):  # raw pixels, for example
-            await self._unadvertise(known.channel)
-            self._advertise([(message.topic, known.channel.msg_type, definition)])
+        if _schema_key(definition) != _schema_key(subscription.channel.definition):  # raw pixels, for example
+            await self._unadvertise(subscription.channel)
+            self._advertise([(message.topic, subscription.channel.msg_type, definition)])
             return []
-        return [message_frame(known.id, log_ns, data)]
+        return [message_frame(subscription.id, log_ns, data)]
 
     def cancel(self) -> None:
         """Stop reading messages after the client has disconnected.
 
         The client's node closes the subscribers.
         """
-        for each in self._subscriptions.values():
-            each.reader.cancel()
-            each.feed.clear()
+        for subscription in self._subscriptions.values():
+            subscription.reader.cancel()
+            subscription.feed.clear()
 
 
 def _readable_type(msg_type: str) -> str:

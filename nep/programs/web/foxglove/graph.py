@@ -46,25 +46,27 @@ class GraphUpdates:
 
     def service_name(self, id_: int) -> str:
         """Return the name of the service with this id; "" if there is none."""
-        return next((name for (name, _type), known in self._service_ids.items() if known == id_), "")
+        return next(
+            (name for (name, _type), service_id in self._service_ids.items() if service_id == id_), ""
+        )
 
     def update(self, view: GraphView) -> list[dict[str, object]]:
         """Return the messages that update the client's view of the graph."""
         messages = self._update_services(view)
         if not self._are_connections_wanted:
             return messages
-        known, self._connections = self._connections, _connections(view)
-        return [*messages, *_changes(known, self._connections)]
+        previous, self._connections = self._connections, _connections(view)
+        return [*messages, *_changes(previous, self._connections)]
 
     def _update_services(self, view: GraphView) -> list[dict[str, object]]:
         served = (each for each in view.services.values() if each.servers and is_visible(each.name))
-        found = [(each.name, ros_type_of(each.msg_type)) for each in served][:_MAX_SERVICES]
+        offered = [(each.name, ros_type_of(each.msg_type)) for each in served][:_MAX_SERVICES]
         messages: list[dict[str, object]] = []
-        gone = self._service_ids.keys() - set(found)
-        if gone:
-            ids = [self._service_ids.pop(each) for each in gone]
+        removed = self._service_ids.keys() - set(offered)
+        if removed:
+            ids = [self._service_ids.pop(each) for each in removed]
             messages.append({"op": "unadvertiseServices", "serviceIds": ids})
-        new = [each for each in found if each not in self._service_ids]
+        new = [each for each in offered if each not in self._service_ids]
         if new:
             services = [self._new_service(*each) for each in new]
             messages.append({"op": "advertiseServices", "services": services})
@@ -84,32 +86,32 @@ class GraphUpdates:
 
 def _connections(view: GraphView) -> _Connections:
     def names(ids: Iterable[str]) -> tuple[str, ...]:
-        known = (view.nodes.get(each) for each in ids)
-        return tuple(sorted({each.name for each in known if each is not None}))
+        nodes = (view.nodes.get(each) for each in ids)
+        return tuple(sorted({each.name for each in nodes if each is not None}))
 
     topics = [each for each in view.topics.values() if is_visible(each.name)]
     services = [each for each in view.services.values() if is_visible(each.name) and each.servers]
     return _Connections(
-        {each.name: names(one.node_id for one in each.publishers) for each in topics},
-        {each.name: names(one.node_id for one in each.subscribers) for each in topics},
-        {each.name: names(one.node_id for one in each.servers) for each in services},
+        {each.name: names(endpoint.node_id for endpoint in each.publishers) for each in topics},
+        {each.name: names(endpoint.node_id for endpoint in each.subscribers) for each in topics},
+        {each.name: names(endpoint.node_id for endpoint in each.servers) for each in services},
     )
 
 
-def _changes(known: _Connections, now: _Connections) -> list[dict[str, object]]:
-    if known == now:
+def _changes(previous: _Connections, now: _Connections) -> list[dict[str, object]]:
+    if previous == now:
         return []
     return [
         {
             "op": "connectionGraphUpdate",
-            "publishedTopics": _changed_names(known.published, now.published, "publisherIds"),
-            "subscribedTopics": _changed_names(known.subscribed, now.subscribed, "subscriberIds"),
-            "advertisedServices": _changed_names(known.services, now.services, "providerIds"),
-            "removedTopics": sorted(known.published.keys() - now.published.keys()),
-            "removedServices": sorted(known.services.keys() - now.services.keys()),
+            "publishedTopics": _changed_names(previous.published, now.published, "publisherIds"),
+            "subscribedTopics": _changed_names(previous.subscribed, now.subscribed, "subscriberIds"),
+            "advertisedServices": _changed_names(previous.services, now.services, "providerIds"),
+            "removedTopics": sorted(previous.published.keys() - now.published.keys()),
+            "removedServices": sorted(previous.services.keys() - now.services.keys()),
         }
     ]
 
 
-def _changed_names(known: _Names, now: _Names, field: str) -> list[dict[str, object]]:
-    return [{"name": name, field: list(ids)} for name, ids in now.items() if known.get(name) != ids]
+def _changed_names(previous: _Names, now: _Names, field: str) -> list[dict[str, object]]:
+    return [{"name": name, field: list(ids)} for name, ids in now.items() if previous.get(name) != ids]

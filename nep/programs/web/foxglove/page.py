@@ -142,11 +142,11 @@ class FoxglovePage(PageConnection):
     def _send_fields(self, fields: Mapping[str, object]) -> None:
         self._queue.put([wire.control_frame(fields)])
 
-    def _send_status(self, level: op.Level, sentence: str) -> None:
-        self._send_fields({"op": "status", "level": _STATUS_LEVELS[level], "message": sentence})
+    def _send_status(self, level: op.Level, message: str) -> None:
+        self._send_fields({"op": "status", "level": _STATUS_LEVELS[level], "message": message})
 
-    def _warn(self, sentence: str) -> None:
-        self._send_status("warning", sentence)
+    def _warn(self, message: str) -> None:
+        self._send_status("warning", message)
 
     def _reject(self, error: NepError) -> None:
         self._counts.rejected += 1
@@ -212,15 +212,15 @@ class FoxglovePage(PageConnection):
             ("unadvertise", "channelIds", self._unadvertise),
         ):
             if name == operation:
-                for each in wire.items(fields.get(member)):
-                    await carry_out(each)
+                for item in wire.items(fields.get(member)):
+                    await carry_out(item)
                 return
         raise NepError(_("the operation '{op}' isn't supported here").format(op=quotable(name)))
 
-    async def _subscribe(self, wish: object) -> None:
-        if not isinstance(wish, dict):
+    async def _subscribe(self, request: object) -> None:
+        if not isinstance(request, dict):
             raise NepError(_("a subscription needs 'id' and 'channelId'"))
-        await self._channels.subscribe(wish.get("id"), wish.get("channelId"))
+        await self._channels.subscribe(request.get("id"), request.get("channelId"))
 
     async def _unsubscribe(self, id_: object) -> None:
         if isinstance(id_, int):
@@ -244,28 +244,28 @@ class FoxglovePage(PageConnection):
                 _("this page already publishes {count} topics, the maximum").format(count=MAX_TOPICS)
             )
         topic, schema = fields.get("topic"), schema_name if isinstance(schema_name, str) else ""
-        known = self._channels.ros_type(topic, schema) if isinstance(topic, str) else ""
-        ros_type = known or _ROS_TYPES.get(schema, schema)
+        advertised_type = self._channels.ros_type(topic, schema) if isinstance(topic, str) else ""
+        ros_type = advertised_type or _ROS_TYPES.get(schema, schema)
         operation = op.parse_operation({"op": "advertise", "topic": topic, "type": ros_type, "id": id_})
         if isinstance(operation, op.Advertise):
             self._advertised[id_] = operation  # even if it is rejected: the robot may be allowed later
             await self._topics.advertise(operation)
 
     async def _unadvertise(self, id_: object) -> None:
-        known = self._advertised.pop(id_, None) if isinstance(id_, int) else None
-        if known is None:
+        advertised = self._advertised.pop(id_, None) if isinstance(id_, int) else None
+        if advertised is None:
             raise NepError(_("unknown channel id {id}").format(id=quotable(id_)))
-        if self._topics.is_advertised(known.topic):
-            await self._topics.unadvertise(op.Unadvertise(known.id, known.topic))
+        if self._topics.is_advertised(advertised.topic):
+            await self._topics.unadvertise(op.Unadvertise(advertised.id, advertised.topic))
 
     async def _publish(self, message: wire.ClientMessage) -> None:
-        known = self._advertised.get(message.channel_id)
-        if known is None:
+        advertised = self._advertised.get(message.channel_id)
+        if advertised is None:
             raise NepError(_("unknown channel id {id}").format(id=message.channel_id))
         msg = op.parse_json(message.data)
-        if not self._topics.is_advertised(known.topic):
-            await self._topics.advertise(known)
-        await self._topics.publish(op.Publish(known.id, known.topic, msg, len(message.data)))
+        if not self._topics.is_advertised(advertised.topic):
+            await self._topics.advertise(advertised)
+        await self._topics.publish(op.Publish(advertised.id, advertised.topic, msg, len(message.data)))
 
     # ---- services
 

@@ -115,5 +115,5 @@ def response_frame(service_id: int, call_id: int, data: bytes) -> Frame:
         call_id: Id of the call.
         data: Response in the encoding `ENCODING`.
     """
-    head = _RESPONSE.pack(3, service_id, call_id, len(ENCODING)) + ENCODING.encode()
-    return Frame(head + data, is_text=False)
+    header = _RESPONSE.pack(3, service_id, call_id, len(ENCODING)) + ENCODING.encode()
+    return Frame(header + data, is_text=False)

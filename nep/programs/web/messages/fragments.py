@@ -51,9 +51,9 @@ class FragmentBuffer:
             )
         if len(parts) < part.total:
             return None
-        whole = "".join(parts[number] for number in range(part.total))
+        joined = "".join(parts[number] for number in range(part.total))
         self._discard(part.id)
-        return whole
+        return joined
 
     def _discard(self, id_: OperationId) -> None:
         self._totals.pop(id_, None)
@@ -62,4 +62,4 @@ class FragmentBuffer:
 
 def cut(text: str, size: int) -> list[str]:
     """Split text into pieces of at most `size` characters."""
-    return [text[at : at + size] for at in range(0, len(text), size)] or [""]
+    return [text[offset : offset + size] for offset in range(0, len(text), size)] or [""]

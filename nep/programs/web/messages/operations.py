@@ -43,15 +43,15 @@ class OperationError(NepError):
     """Error for an operation that failed.
 
     Args:
-        sentence: Message for the page.
+        message: Message for the page.
         id: Id of the operation, if any.
         level: Level of the status that the page receives.
     """
 
-    def __init__(self, sentence: str, id: OperationId = None, level: Level = "error") -> None:
+    def __init__(self, message: str, id: OperationId = None, level: Level = "error") -> None:
         self.id = id
         self.level = level
-        super().__init__(sentence)
+        super().__init__(message)
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,26 +298,26 @@ class _Fields:
     def __init__(self, fields: Mapping[str, object], size_bytes: int) -> None:
         self._fields = fields
         self.size_bytes = size_bytes
-        given = fields.get("id")
-        is_id = isinstance(given, str | int) and not isinstance(given, bool)
-        self.id = cast("str | int", given) if is_id and len(str(given)) <= MAX_NAME_LENGTH else None
+        raw_id = fields.get("id")
+        is_id = isinstance(raw_id, str | int) and not isinstance(raw_id, bool)
+        self.id = cast("str | int", raw_id) if is_id and len(str(raw_id)) <= MAX_NAME_LENGTH else None
         self.op = self.text("op")
 
     def get(self, name: str, default: object = None) -> object:
         """Return the value of a field without validation."""
         return self._fields.get(name, default)
 
-    def text(self, name: str, default: str | None = None, *, most: int = MAX_NAME_LENGTH) -> str:
-        """Return a text field of at most `most` characters. The field is required if there is no default."""
+    def text(self, name: str, default: str | None = None, *, max_length: int = MAX_NAME_LENGTH) -> str:
+        """Return a text field of at most `max_length` characters; without a default, it is required."""
         value = self._fields.get(name)
         if value is None and default is not None:
             return default
         if not isinstance(value, str):
             raise self.invalid_field(name, _("a text"))
-        if len(value) > most:
+        if len(value) > max_length:
             raise self.error(
                 _("'{name}' has {count} characters; at most {most} are allowed").format(
-                    name=name, count=len(value), most=most
+                    name=name, count=len(value), most=max_length
                 )
             )
         return value
@@ -331,21 +331,21 @@ class _Fields:
 
     def type_name(self, default: str | None = None) -> str:
         """Return the field "type", or the default if the field is missing."""
-        given = self.text("type", default)
+        name = self.text("type", default)
         try:
-            return check_topic(given) if given else given
+            return check_topic(name) if name else name
         except BadTopicError as error:
             raise self.error(_("'type' is invalid: {reason}").format(reason=error.reason)) from None
 
     def unreserved_name(self, name: str) -> str:
         """Return the name of a topic or service that the page creates, which must not be reserved."""
-        given = self.topic(name)
-        if given.startswith(_RESERVED_PREFIX):
-            said = _("names that start with '{prefix}' are reserved; choose another name")
-            raise self.error(said.format(prefix=_RESERVED_PREFIX))
-        return given
+        topic = self.topic(name)
+        if topic.startswith(_RESERVED_PREFIX):
+            template = _("names that start with '{prefix}' are reserved; choose another name")
+            raise self.error(template.format(prefix=_RESERVED_PREFIX))
+        return topic
 
-    def number(self, name: str, default: int | None, least: int, most: int) -> int:
+    def number(self, name: str, default: int | None, minimum: int, maximum: int) -> int:
         """Return a number field as an integer. The field is required if there is no default.
 
         Floats are accepted, because some programs send whole numbers as floats.
@@ -353,8 +353,8 @@ class _Fields:
         Args:
             name: Name of the field.
             default: Value for a missing field.
-            least: Minimum.
-            most: Maximum.
+            minimum: Minimum.
+            maximum: Maximum.
         """
         value = self._fields.get(name)
         if value is None and default is not None:
@@ -363,10 +363,10 @@ class _Fields:
         if not is_number or not math.isfinite(cast("float", value)):
             raise self.invalid_field(name, _("a number"))
         number = int(cast("float", value))
-        if not least <= number <= most:
+        if not minimum <= number <= maximum:
             raise self.error(
                 _("'{name}' is {number}; it must be from {least} to {most}").format(
-                    name=name, number=bounded_str(number, 40), least=least, most=most
+                    name=name, number=bounded_str(number, 40), least=minimum, most=maximum
                 )
             )
         return number
@@ -393,37 +393,39 @@ class _Fields:
         total = self.number("total", 1, 1, MAX_FRAGMENTS)
         return self.number("num", 0, 0, total - 1), total
 
-    def error(self, sentence: str) -> OperationError:
+    def error(self, message: str) -> OperationError:
         """Return an error with the id of this operation."""
-        return OperationError(sentence, self.id)
+        return OperationError(message, self.id)
 
-    def invalid_field(self, name: str, wanted: str) -> OperationError:
+    def invalid_field(self, name: str, expected: str) -> OperationError:
         """Return the error for a missing or invalid field.
 
         Args:
             name: Name of the field.
-            wanted: Description of a valid value.
+            expected: Description of a valid value.
         """
         op = quotable(self._fields.get("op"))
         if name not in self._fields:
             return self.error(
-                _("'{op}' requires '{name}' ({wanted})").format(op=op, name=name, wanted=wanted)
+                _("'{op}' requires '{name}' ({wanted})").format(op=op, name=name, wanted=expected)
             )
         return self.error(
             _("'{name}' of '{op}' is {given}; expected {wanted}").format(
-                name=name, op=op, given=escaped(bounded_str(self._fields[name], 60)), wanted=wanted
+                name=name, op=op, given=escaped(bounded_str(self._fields[name], 60)), wanted=expected
             )
         )
 
 
 def _parse_fields(fields: _Fields) -> Operation:
-    known = _PARSERS.get(fields.op)
-    if known is None:
-        said = did_you_mean(fields.op, tuple(_PARSERS))
+    parser = _PARSERS.get(fields.op)
+    if parser is None:
+        suggestion = did_you_mean(fields.op, tuple(_PARSERS))
         raise fields.error(
-            _("unknown operation '{op}'; {did_you_mean}").format(op=quotable(fields.op), did_you_mean=said)
+            _("unknown operation '{op}'; {did_you_mean}").format(
+                op=quotable(fields.op), did_you_mean=suggestion
+            )
         )
-    return known(fields)
+    return parser(fields)
 
 
 def _parse_advertise(fields: _Fields) -> Operation:
@@ -472,17 +474,17 @@ def _parse_service_response(fields: _Fields) -> Operation:
 
 def _parse_fragment(fields: _Fields) -> Operation:
     number, total = fields.fragment_position()
-    return Fragment(fields.id, fields.text("data", most=MAX_MESSAGE_BYTES), number, total)
+    return Fragment(fields.id, fields.text("data", max_length=MAX_MESSAGE_BYTES), number, total)
 
 
 def _parse_png(fields: _Fields) -> Operation:
     number, total = fields.fragment_position()
-    return Png(fields.id, fields.text("data", most=MAX_MESSAGE_BYTES), number, total)
+    return Png(fields.id, fields.text("data", max_length=MAX_MESSAGE_BYTES), number, total)
 
 
 def _parse_status(fields: _Fields) -> Operation:
     level = cast("Level", fields.choice("level", "info", LEVELS))
-    return PageStatus(fields.id, level, fields.text("msg", "", most=MAX_MESSAGE_BYTES))
+    return PageStatus(fields.id, level, fields.text("msg", "", max_length=MAX_MESSAGE_BYTES))
 
 
 def _parse_auth(fields: _Fields) -> Operation:

@@ -64,8 +64,8 @@ def nep_type_of(ros_type: str) -> str:
 
     Names without a counterpart are returned unchanged.
     """
-    bare = bare_type(ros_type)
-    return _CODECS.get(bare, bare)
+    bare_name = bare_type(ros_type)
+    return _CODECS.get(bare_name, bare_name)
 
 
 def ros_type_of(msg_type: str) -> str:
@@ -87,8 +87,8 @@ def is_compatible(ros_type: str, msg_type: str) -> bool:
     """
     if msg_type in _UNKNOWN_TYPES or not ros_type or ros_type_of(msg_type) == JSON_TYPE:
         return True
-    wanted = bare_type(ros_type)
-    return wanted == JSON_TYPE or nep_type_of(ros_type) == codec_or_type(msg_type)
+    requested = bare_type(ros_type)
+    return requested == JSON_TYPE or nep_type_of(ros_type) == codec_or_type(msg_type)
 
 
 def codec_or_type(msg_type: str) -> str:
@@ -229,22 +229,22 @@ def _image(fields: Mapping[str, object], ros_type: str) -> object:
         "image", _RAW_IMAGE_TYPE, full_definition_text(_RAW_IMAGE_TYPE) or ""
     ).unpack
     try:
-        known = (
+        members = (
             {each.name: fields[each.name] for each in definition.fields if each.name in fields}
             if (definition is not None)
             else {}
         )
-        known.pop("header", None)
-        body = b"" if definition is None else definition.encode({**known, "data": data})
+        members.pop("header", None)
+        body = b"" if definition is None else definition.encode({**members, "data": data})
         pixels, extension = unpack(memoryview(body))
     except (EncodeError, DecodeError) as error:
         raise PayloadError(str(error)) from None
     return Encoded(bytes(pixels), extension)
 
 
-def _field_error(field: str, value: object, wanted: str) -> PayloadError:
+def _field_error(field: str, value: object, expected: str) -> PayloadError:
     return PayloadError(
         _("'{field}' is {given}; expected {wanted}").format(
-            field=field, given=escaped(bounded_str(value, 60)), wanted=wanted
+            field=field, given=escaped(bounded_str(value, 60)), wanted=expected
         )
     )

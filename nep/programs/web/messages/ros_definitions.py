@@ -95,9 +95,9 @@ def full_definition_text(ros_type: str) -> str | None:
     """Return a definition in the format of `gendeps --cat`, or None if the type is unknown."""
     if ros_type not in _DEFINITION_TEXTS:
         return None
-    inside = sorted(set(_nested_types(ros_type)))
+    nested_types = sorted(set(_nested_types(ros_type)))
     return _DEFINITION_TEXTS[ros_type] + "".join(
-        f"{_SEPARATOR}\nMSG: {each}\n{_DEFINITION_TEXTS[each]}" for each in inside
+        f"{_SEPARATOR}\nMSG: {each}\n{_DEFINITION_TEXTS[each]}" for each in nested_types
     )
 
 
@@ -114,13 +114,13 @@ def type_definitions(ros_type: str) -> list[dict[str, object]] | None:
     definition = definition_of(ros_type)
     if definition is None:
         return None
-    known: dict[str, dict[str, object]] = {}
+    definitions: dict[str, dict[str, object]] = {}
 
     def add(name: str, kinds: list[tuple[str, FieldKind]]) -> None:
-        if name in known:
+        if name in definitions:
             return
         items = [(field, kind, kind.element or kind) for field, kind in kinds]
-        known[name] = {
+        definitions[name] = {
             "type": name,
             "fieldnames": [field for field, _kind, _item in items],
             "fieldtypes": [item.name for _field, _kind, item in items],
@@ -136,7 +136,7 @@ def type_definitions(ros_type: str) -> list[dict[str, object]] | None:
                 add(item.name, [(each.name, each.kind) for each in item.fields])
 
     add(ros_type, [(each.name, each.kind) for each in definition.fields])
-    return list(known.values())
+    return list(definitions.values())
 
 
 def _example(kind: FieldKind) -> str:

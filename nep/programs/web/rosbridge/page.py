@@ -111,8 +111,8 @@ class Page(PageConnection):
         except NepError as error:
             raise op.OperationError(f"'{topic}': {error}", level="warning") from error
 
-    def _warn(self, sentence: str) -> None:
-        self._context.send_status("warning", sentence)
+    def _warn(self, message: str) -> None:
+        self._context.send_status("warning", message)
 
     # ---- operations
 
@@ -141,9 +141,9 @@ class Page(PageConnection):
         if carry_out is None:
             raise op.OperationError(_("an operation has too many levels of nested fragments"), operation.id)
         try:
-            done = carry_out(operation)
-            if done is not None:
-                await done
+            awaitable = carry_out(operation)
+            if awaitable is not None:
+                await awaitable
         except op.OperationError:
             raise
         except NepError as error:
@@ -152,10 +152,10 @@ class Page(PageConnection):
     def _unwrap(self, part: op.Fragment | op.Png) -> op.Operation | None:
         """Return the operation in fragments or in a PNG once all parts have arrived, else None."""
         try:
-            whole = self._fragments.add(part)
-            if whole is None:
+            joined = self._fragments.add(part)
+            if joined is None:
                 return None
-            text = decode_png(whole) if isinstance(part, op.Png) else whole.encode("utf-8", "replace")
+            text = decode_png(joined) if isinstance(part, op.Png) else joined.encode("utf-8", "replace")
             return op.parse(text)
         except op.OperationError as error:
             error.id = part.id if error.id is None else error.id
@@ -174,8 +174,8 @@ class Page(PageConnection):
         self._rejected += 1
         if is_logged(self._rejected):
             _logger.warning("page '%s': %s (%d so far)", self.name, error, self._rejected)
-        shown = error if isinstance(error, op.OperationError) else op.OperationError(str(error))
-        self._context.send_status(shown.level, str(shown), shown.id)
+        operation_error = error if isinstance(error, op.OperationError) else op.OperationError(str(error))
+        self._context.send_status(operation_error.level, str(operation_error), operation_error.id)
 
 
 async def authenticate(connection: ServerConnection, check: AuthVerifier) -> bool:

@@ -120,59 +120,59 @@ class PageServices:
         self._servers[operation.service] = await self._context.run_in_thread(
             self._context.node.new_server, operation.service, callback, threads=1
         )
-        said = _("serving '{service}'").format(service=operation.service)
-        self._context.send_status("info", said, operation.id)
+        message = _("serving '{service}'").format(service=operation.service)
+        self._context.send_status("info", message, operation.id)
 
     def _forward_call(self, service: str, request: object) -> Future[object]:
         """Forward a request to the page and return a future of its reply.
 
         Called in a thread of the service's server.
         """
-        answer: Future[object] = Future()
-        self._loop.call_soon_threadsafe(self._send_call, service, request, answer)
-        return answer
+        future: Future[object] = Future()
+        self._loop.call_soon_threadsafe(self._send_call, service, request, future)
+        return future
 
-    def _send_call(self, service: str, request: object, answer: Future[object]) -> None:
+    def _send_call(self, service: str, request: object, future: Future[object]) -> None:
         if len(self._pending) >= MAX_CALLS:
-            answer.set_exception(ServiceFailedError(_("the page has too many pending calls")))
+            future.set_exception(ServiceFailedError(_("the page has too many pending calls")))
             return
         id_ = f"call:{next(self._numbers)}"
         call = {"op": "call_service", "id": id_, "service": service, "args": request}
         try:
             frames = operation_frames(call, EncodingOptions())
         except NepError as error:
-            answer.set_exception(error)
+            future.set_exception(error)
             return
-        self._pending[id_] = service, answer
+        self._pending[id_] = service, future
         self._context.queue.put(frames)
 
     def respond(self, operation: ServiceResponse) -> None:
         """Forward a reply of the page to the caller."""
-        service, answer = self._pending.get(operation.id, ("", None))
-        if answer is None or service != operation.service:
+        service, future = self._pending.get(operation.id, ("", None))
+        if future is None or service != operation.service:
             raise OperationError(
                 _("no pending call of '{service}' has this id").format(service=quotable(operation.service)),
                 operation.id,
             )
         del self._pending[operation.id]
         if operation.is_success:
-            answer.set_result(operation.values)
+            future.set_result(operation.values)
         else:
             reason = operation.values
-            said = bounded_str(reason) if reason else _("the page reported an error without a reason")
-            answer.set_exception(ServiceFailedError(said))
+            message = bounded_str(reason) if reason else _("the page reported an error without a reason")
+            future.set_exception(ServiceFailedError(message))
 
     async def unadvertise(self, operation: UnadvertiseService) -> None:
         """Stop serving a service; pending calls fail."""
-        known = self._servers.pop(operation.service, None)
-        if known is None:
+        server = self._servers.pop(operation.service, None)
+        if server is None:
             raise OperationError(
                 _("this page doesn't serve '{service}'").format(service=quotable(operation.service)),
                 operation.id,
                 "warning",
             )
         self._fail_pending(operation.service)
-        await self._context.run_in_thread(known.close)
+        await self._context.run_in_thread(server.close)
 
     def cancel(self) -> None:
         """Cancel all calls after the page has disconnected.
@@ -184,9 +184,9 @@ class PageServices:
         self._fail_pending()
 
     def _fail_pending(self, service: str = "") -> None:
-        for id_, (name, answer) in list(self._pending.items()):
+        for id_, (name, future) in list(self._pending.items()):
             if service in {"", name}:
                 del self._pending[id_]
-                answer.set_exception(
+                future.set_exception(
                     ServiceFailedError(_("the page that provides the service has disconnected"))
                 )

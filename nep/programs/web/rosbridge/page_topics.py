@@ -74,13 +74,15 @@ class PageTopics:
 
         Raises `OperationError` if the type differs.
         """
-        known = self._publications.get(operation.topic)
-        if known is None:
-            known = await self._open_publication(operation)
-        elif bare_type(known.ros_type) != bare_type(operation.ros_type):
-            raise _type_conflict(operation.topic, operation.ros_type, known.publisher.msg_type, operation.id)
-        if len(known.ids) < MAX_SUBSCRIPTION_IDS:
-            known.ids.add(operation.id)
+        publication = self._publications.get(operation.topic)
+        if publication is None:
+            publication = await self._open_publication(operation)
+        elif bare_type(publication.ros_type) != bare_type(operation.ros_type):
+            raise _type_conflict(
+                operation.topic, operation.ros_type, publication.publisher.msg_type, operation.id
+            )
+        if len(publication.ids) < MAX_SUBSCRIPTION_IDS:
+            publication.ids.add(operation.id)
         self._context.send_status(
             "info", _("advertised '{topic}'").format(topic=operation.topic), operation.id
         )
@@ -97,39 +99,39 @@ class PageTopics:
 
     def _open_publisher(self, operation: Advertise) -> Publisher:
         """Open the publisher of a topic. Called in the page's thread."""
-        known = self._type_of(operation.topic)
-        if not is_compatible(operation.ros_type, known):
-            raise _type_conflict(operation.topic, operation.ros_type, known, operation.id)
-        msg_type = known or nep_type_of(operation.ros_type)
+        current_type = self._type_of(operation.topic)
+        if not is_compatible(operation.ros_type, current_type):
+            raise _type_conflict(operation.topic, operation.ros_type, current_type, operation.id)
+        msg_type = current_type or nep_type_of(operation.ros_type)
         self._context.guard.wait_for_descriptions(_DESCRIPTIONS_TIMEOUT_S)
         self._check_motion(operation.topic, msg_type, operation.id)
         return self._context.node.new_pub(operation.topic, msg_type, latched=operation.is_latched)
 
     def _type_of(self, topic: str) -> str:
         """Return the NEP type that other nodes use on a topic; "" if there are none."""
-        own = self._context.node
-        known = own.graph(_GRAPH_TIMEOUT_S).topics.get(topic)
-        if known is None or known.msg_type == "*":
+        node = self._context.node
+        info = node.graph(_GRAPH_TIMEOUT_S).topics.get(topic)
+        if info is None or info.msg_type == "*":
             return ""
-        members = {each.node_id for each in known.publishers} | {each.node_id for each in known.subscribers}
-        return "" if members <= {own.id} else known.msg_type
+        members = {each.node_id for each in info.publishers} | {each.node_id for each in info.subscribers}
+        return "" if members <= {node.id} else info.msg_type
 
     def _check_motion(self, topic: str, msg_type: str, id_: OperationId) -> None:
-        refusal = self._context.motion_denial_reason(topic, msg_type)
-        if refusal:
+        reason = self._context.motion_denial_reason(topic, msg_type)
+        if reason:
             self._context.counts.motions_rejected += 1
-            raise OperationError(refusal, id_)
+            raise OperationError(reason, id_)
 
     async def publish(self, operation: Publish) -> None:
         """Publish a message. The topic need not be advertised if its type is known from other nodes."""
-        known = self._publications.get(operation.topic)
-        if known is None:
-            known = await self._open_by_type(operation)
-        publisher = known.publisher
+        publication = self._publications.get(operation.topic)
+        if publication is None:
+            publication = await self._open_by_type(operation)
+        publisher = publication.publisher
         self._check_motion(operation.topic, publisher.msg_type, operation.id)
-        msg = _with_header(operation.msg, known.ros_type)
-        publisher.publish(from_ros(msg, known.ros_type, publisher.msg_type), strict=True)
-        known.receive_rate.count(operation.size_bytes)
+        msg = _with_header(operation.msg, publication.ros_type)
+        publisher.publish(from_ros(msg, publication.ros_type, publisher.msg_type), strict=True)
+        publication.receive_rate.count(operation.size_bytes)
 
     async def _open_by_type(self, operation: Publish) -> _Publication:
         msg_type = await self._context.run_in_thread(self._type_of, operation.topic)
@@ -148,17 +150,17 @@ class PageTopics:
 
         The publisher is closed with the last advertisement.
         """
-        known = self._publications.get(operation.topic)
-        if known is None:
+        publication = self._publications.get(operation.topic)
+        if publication is None:
             raise OperationError(
                 _("this page doesn't publish '{topic}'").format(topic=quotable(operation.topic)),
                 operation.id,
                 "warning",
             )
-        known.ids.discard(operation.id)
-        if operation.id is None or not known.ids:
+        publication.ids.discard(operation.id)
+        if operation.id is None or not publication.ids:
             del self._publications[operation.topic]
-            await self._context.run_in_thread(known.publisher.close)
+            await self._context.run_in_thread(publication.publisher.close)
         self._context.send_status(
             "info", _("unadvertised '{topic}'").format(topic=operation.topic), operation.id
         )
@@ -168,23 +170,23 @@ class PageTopics:
     async def subscribe(self, operation: Subscribe) -> None:
         """Start sending the messages of a topic to the page."""
         as_pixels = bare_type(operation.ros_type) == _RAW_IMAGE_TYPE
-        known = self._subscriptions.get(operation.topic)
-        if known is None:
+        subscription = self._subscriptions.get(operation.topic)
+        if subscription is None:
             await self._open_subscription(operation, as_pixels=as_pixels)
         else:
-            if not is_compatible(operation.ros_type, known.subscriber.msg_type):
+            if not is_compatible(operation.ros_type, subscription.subscriber.msg_type):
                 raise _type_conflict(
-                    operation.topic, operation.ros_type, known.subscriber.msg_type, operation.id
+                    operation.topic, operation.ros_type, subscription.subscriber.msg_type, operation.id
                 )
-            if known.feed.subscription_count >= MAX_SUBSCRIPTION_IDS:
+            if subscription.feed.subscription_count >= MAX_SUBSCRIPTION_IDS:
                 raise OperationError(
                     _("this page already has {count} subscriptions to '{topic}', the maximum").format(
                         count=MAX_SUBSCRIPTION_IDS, topic=quotable(operation.topic)
                     ),
                     operation.id,
                 )
-            known.feed.subscribe(operation, as_pixels=as_pixels)
-            self._context.queue.activate(known.feed)
+            subscription.feed.subscribe(operation, as_pixels=as_pixels)
+            self._context.queue.activate(subscription.feed)
         self._context.send_status(
             "info", _("subscribed to '{topic}'").format(topic=operation.topic), operation.id
         )
@@ -203,37 +205,37 @@ class PageTopics:
 
     def _open_subscriber(self, operation: Subscribe) -> Subscriber:
         """Open the subscriber of a topic. Called in the page's thread."""
-        known = self._type_of(operation.topic)
-        if not is_compatible(operation.ros_type, known):
-            raise _type_conflict(operation.topic, operation.ros_type, known, operation.id)
-        msg_type = known or (nep_type_of(operation.ros_type) if operation.ros_type else "json")
+        current_type = self._type_of(operation.topic)
+        if not is_compatible(operation.ros_type, current_type):
+            raise _type_conflict(operation.topic, operation.ros_type, current_type, operation.id)
+        msg_type = current_type or (nep_type_of(operation.ros_type) if operation.ros_type else "json")
         return self._context.node.new_sub(operation.topic, msg_type, wildcards=False)
 
     async def unsubscribe(self, operation: Unsubscribe) -> None:
         """End one subscription to a topic, or all of them if there is no id."""
-        known = self._subscriptions.get(operation.topic)
-        if known is None or not known.feed.unsubscribe(operation.id):
+        subscription = self._subscriptions.get(operation.topic)
+        if subscription is None or not subscription.feed.unsubscribe(operation.id):
             return  # no error, as in rosbridge: roslib unsubscribes again when it reconnects
-        if not known.feed.subscription_count:
+        if not subscription.feed.subscription_count:
             del self._subscriptions[operation.topic]
-            await self._close_subscription(known)
+            await self._close_subscription(subscription)
         self._context.send_status(
             "info", _("unsubscribed from '{topic}'").format(topic=operation.topic), operation.id
         )
 
-    async def _close_subscription(self, known: _Subscription) -> None:
-        known.reader.cancel()
-        self._context.queue.remove(known.feed)
-        await self._context.run_in_thread(known.subscriber.close)
+    async def _close_subscription(self, subscription: _Subscription) -> None:
+        subscription.reader.cancel()
+        self._context.queue.remove(subscription.feed)
+        await self._context.run_in_thread(subscription.subscriber.close)
 
     def cancel(self) -> None:
         """Stop reading messages after the page has disconnected.
 
         The page's node closes publishers and subscribers.
         """
-        for each in self._subscriptions.values():
-            each.reader.cancel()
-            each.feed.clear()
+        for subscription in self._subscriptions.values():
+            subscription.reader.cancel()
+            subscription.feed.clear()
 
 
 async def read_messages(subscriber: Subscriber, feed: Feed, queue: SendQueue) -> None:
@@ -269,10 +271,10 @@ def _published_topic(item: tuple[str, _Publication]) -> PageTopic:
     return PageTopic(topic, True, None, rate, bytes_per_s, publication.receive_rate.total)
 
 
-def _type_conflict(topic: str, ros_type: str, known: str, id_: OperationId) -> OperationError:
+def _type_conflict(topic: str, ros_type: str, current_type: str, id_: OperationId) -> OperationError:
     return OperationError(
         _("'{topic}' has the type '{known}', not '{given}'").format(
-            topic=quotable(topic), known=quotable(ros_type_of(known)), given=quotable(ros_type)
+            topic=quotable(topic), known=quotable(ros_type_of(current_type)), given=quotable(ros_type)
         ),
         id_,
     )

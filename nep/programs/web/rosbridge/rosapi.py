@@ -63,12 +63,12 @@ class RosApi:
     def reply(self, service: str, args: object) -> Mapping[str, object]:
         """Execute a service of rosapi and return the fields of its reply. Raises `NepError`."""
         name = f"/{service.removeprefix('/')}".removeprefix(PREFIX)
-        known = _SERVICES.get(name)
-        if known is None:
+        entry = _SERVICES.get(name)
+        if entry is None:
             raise NepError(
                 _("the rosapi service '{service}' isn't supported here").format(service=quotable(service))
             )
-        return known[1](self, args if isinstance(args, Mapping) else {})
+        return entry[1](self, args if isinstance(args, Mapping) else {})
 
     @cached_property
     def _view(self) -> GraphView:
@@ -81,8 +81,8 @@ class RosApi:
         return {each.name: ros_type_of(each.msg_type) for each in topics if is_visible(each.name)}
 
     def _name(self, node_id: str) -> str:
-        known = self._view.nodes.get(node_id)
-        return node_id if known is None else known.name
+        node = self._view.nodes.get(node_id)
+        return node_id if node is None else node.name
 
     # ---- topics
 
@@ -95,17 +95,17 @@ class RosApi:
 
         This service is an extension of rosapi. A rate is None if it is not known yet.
         """
-        known = [self._view.topics[each] for each in self._types]
+        topic_infos = [self._view.topics[each] for each in self._types]
         return {
             **self.topics({}),
-            "rates": [each.rate_hz for each in known],
-            "bandwidths": [each.bandwidth_Bps for each in known],
+            "rates": [each.rate_hz for each in topic_infos],
+            "bandwidths": [each.bandwidth_Bps for each in topic_infos],
         }
 
     def topics_for_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the topics of a type."""
-        wanted = bare_type(_text(args, "type"))
-        return {"topics": [topic for topic, ros_type in self._types.items() if ros_type == wanted]}
+        requested_type = bare_type(_text(args, "type"))
+        return {"topics": [topic for topic, ros_type in self._types.items() if ros_type == requested_type]}
 
     def topic_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the type of a topic; "" if the topic doesn't exist."""
@@ -132,11 +132,11 @@ class RosApi:
 
     def message_details(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the fields of a message type."""
-        asked = _text(args, "type")
-        found = type_definitions(bare_type(asked))
-        if found is None:
-            raise NepError(_("the fields of '{type}' are unknown").format(type=quotable(asked)))
-        return {"typedefs": found}
+        type_name = _text(args, "type")
+        definitions = type_definitions(bare_type(type_name))
+        if definitions is None:
+            raise NepError(_("the fields of '{type}' are unknown").format(type=quotable(type_name)))
+        return {"typedefs": definitions}
 
     # ---- services
 
@@ -146,8 +146,8 @@ class RosApi:
 
     @property
     def _served_services(self) -> list[str]:
-        found = self._view.services.values()
-        return [each.name for each in found if each.servers and is_visible(each.name)]
+        services = self._view.services.values()
+        return [each.name for each in services if each.servers and is_visible(each.name)]
 
     def service_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the type of a service; "" if the service has no server."""
@@ -155,16 +155,16 @@ class RosApi:
 
     def _service_type(self, service: str) -> str:
         if is_rosapi(service):
-            known = _SERVICES.get(f"/{service.removeprefix('/')}".removeprefix(PREFIX))
-            return "" if known is None else f"rosapi/{known[0]}"
+            entry = _SERVICES.get(f"/{service.removeprefix('/')}".removeprefix(PREFIX))
+            return "" if entry is None else f"rosapi/{entry[0]}"
         known_service = self._view.services.get(service)
         return "" if known_service is None else ros_type_of(known_service.msg_type)
 
     def services_for_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the services of a type."""
-        wanted = _text(args, "type")
+        requested_type = _text(args, "type")
         names = [*self._served_services, *(f"{PREFIX}{each}" for each in _SERVICES)]
-        return {"services": [each for each in names if self._service_type(each) == wanted]}
+        return {"services": [each for each in names if self._service_type(each) == requested_type]}
 
     def service_providers(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the names of the nodes that serve a service."""
@@ -175,16 +175,16 @@ class RosApi:
         return {"node": next(iter(self._nodes_serving(_text(args, "service"))), "")}
 
     def _nodes_serving(self, service: str) -> list[str]:
-        known = self._view.services.get(service)
-        servers = () if known is None else known.servers
+        info = self._view.services.get(service)
+        servers = () if info is None else info.servers
         return list(dict.fromkeys(self._name(each.node_id) for each in servers))
 
     def service_details(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return a type definition without fields, because services of NEP have no schema."""
-        asked = _text(args, "type")
+        type_name = _text(args, "type")
         empty: list[str] = []
         kinds = ("fieldnames", "fieldtypes", "fieldarraylen", "examples", "constnames", "constvalues")
-        return {"typedefs": [{"type": asked, **dict.fromkeys(kinds, empty)}]}
+        return {"typedefs": [{"type": type_name, **dict.fromkeys(kinds, empty)}]}
 
     # ---- nodes
 
@@ -203,26 +203,28 @@ class RosApi:
         }
 
     def _nodes_named(self, name: str) -> list[NodeInfo]:
-        found = [each for each in self._view.nodes.values() if name in {each.name, each.id}]
-        if not found:
+        nodes = [each for each in self._view.nodes.values() if name in {each.name, each.id}]
+        if not nodes:
             raise NepError(_("unknown node '{name}'").format(name=quotable(name)))
-        return found
+        return nodes
 
     # ---- parameters
 
     def get_param_names(self, _args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the names of all parameters. Nodes that don't reply within the time limit are omitted."""
         able = [
-            each for each in self._view.nodes.values() if parameters_topic(each.id) in self._view.services
+            node for node in self._view.nodes.values() if parameters_topic(node.id) in self._view.services
         ]
         names: list[str] = []
         deadline = time.monotonic() + _NAMES_TIMEOUT_S
-        for each in able[:_MAX_NODES_QUERIED]:
+        for node in able[:_MAX_NODES_QUERIED]:
             if time.monotonic() > deadline:
                 break
             try:
-                with self._node.parameters_of(each.id, _PARAMETER_TIMEOUT_S) as remote:
-                    names += [f"{each.name}:{bounded_str(known.get('name'))}" for known in remote.list()]
+                with self._node.parameters_of(node.id, _PARAMETER_TIMEOUT_S) as remote:
+                    names += [
+                        f"{node.name}:{bounded_str(parameter.get('name'))}" for parameter in remote.list()
+                    ]
             except NepError:
                 continue  # the node left meanwhile, or hangs
         return {"names": names}
@@ -258,8 +260,8 @@ class RosApi:
         for topic in self._view.topics.values():
             if not _has_member(topic.subscribers, ids):
                 continue
-            if refusal := self._motion_refusal(topic.name, topic.msg_type):
-                raise NepError(refusal)
+            if reason := self._motion_refusal(topic.name, topic.msg_type):
+                raise NepError(reason)
         with self._node.parameters_of(node, _PARAMETER_TIMEOUT_S) as remote:
             remote.set(name, value)
         return {}
@@ -288,12 +290,12 @@ def _text(args: Mapping[str, object], name: str) -> str:
 
 
 def _parse_parameter_name(args: Mapping[str, object]) -> tuple[str, str]:
-    given = _text(args, "name")
-    node, colon, name = given.rpartition(":")
+    full_name = _text(args, "name")
+    node, colon, name = full_name.rpartition(":")
     if not colon or not node:
         raise NepError(
             _("'{name}' isn't a valid parameter name; use the form 'NODE:PARAMETER'").format(
-                name=quotable(given)
+                name=quotable(full_name)
             )
         )
     return node.removeprefix("/"), name

@@ -87,8 +87,8 @@ def respond(request: PageRequest, access: Access) -> PageResponse:
         return _text_response(HTTPStatus.NOT_FOUND, _("page not found; open {url}").format(url="/"))
     origin = _origin(request, access)
     if origin is None:
-        said = _("this server replies only at its own address; open {url}")
-        return _text_response(HTTPStatus.FORBIDDEN, said.format(url=f"{request.own_origin}/"))
+        template = _("this server replies only at its own address; open {url}")
+        return _text_response(HTTPStatus.FORBIDDEN, template.format(url=f"{request.own_origin}/"))
     if access.token and not access.check_token(request.path, request.authorization):
         return _page_response(
             HTTPStatus.UNAUTHORIZED,
@@ -131,10 +131,10 @@ def _origin(request: PageRequest, access: Access) -> str | None:
 
 
 def _text_response(
-    status: HTTPStatus, sentence: str, headers: Mapping[str, str] | None = None
+    status: HTTPStatus, message: str, headers: Mapping[str, str] | None = None
 ) -> PageResponse:
     kind = {"Content-Type": _TEXT_TYPE, "Content-Security-Policy": "default-src 'none'"}
-    return PageResponse(status, {**_HEADERS, **kind, **(headers or {})}, f"{sentence}\n".encode())
+    return PageResponse(status, {**_HEADERS, **kind, **(headers or {})}, f"{message}\n".encode())
 
 
 def _page_response(status: HTTPStatus, text: str, policy: str) -> PageResponse:
@@ -154,7 +154,7 @@ def _read_template(name: str) -> str:
     return Path(__file__).with_name(name).read_text("utf-8")
 
 
-def _fill_template(name: str, words: Mapping[str, str]) -> str:
+def _fill_template(name: str, texts: Mapping[str, str]) -> str:
     """Return a page with its placeholders replaced by texts.
 
     The placeholder "data" is replaced by JSON for the page's script; other texts are escaped.
@@ -162,8 +162,8 @@ def _fill_template(name: str, words: Mapping[str, str]) -> str:
 
     def value(hole: re.Match[str]) -> str:
         if hole[1] == "data":
-            return _script_json(words)
-        return html.escape(words[hole[1]])
+            return _script_json(texts)
+        return html.escape(texts[hole[1]])
 
     return _PLACEHOLDER.sub(value, _read_template(name))
 

@@ -83,18 +83,18 @@ class AngleDial(QWidget):
         return QPointF(-math.sin(turned), -math.cos(turned))
 
     def _angle_at(self, point: QPointF) -> float:
-        away = point - QPointF(self.rect().center())
+        offset = point - QPointF(self.rect().center())
         if self._upright:
-            return math.degrees(math.atan2(away.y(), -away.x()))
-        return math.degrees(math.atan2(-away.x(), -away.y()))
+            return math.degrees(math.atan2(offset.y(), -offset.x()))
+        return math.degrees(math.atan2(-offset.x(), -offset.y()))
 
     def _change_value(self, value: float) -> None:
         steps = round((value - self._minimum) / self._step)
         stepped = round(self._minimum + steps * self._step, 6)
-        wanted = min(max(stepped, self._minimum), self._maximum)
-        if wanted != self._value:
-            self.set_value(wanted)
-            self.changed.emit(wanted)
+        clamped = min(max(stepped, self._minimum), self._maximum)
+        if clamped != self._value:
+            self.set_value(clamped)
+            self.changed.emit(clamped)
 
     # -- input --------------------------------------------------------------------------------------------
 
@@ -159,15 +159,15 @@ class AngleDial(QWidget):
         self._paint_sector(painter, disc)
         painter.setPen(QPen(theme.colour("borderStrong"), 1, Qt.PenStyle.DashLine))
         painter.drawLine(middle, middle + self.direction(0.0) * (half - 3))
-        ink = theme.colour("accent" if self.isEnabled() else "textDisabled")
+        colour = theme.colour("accent" if self.isEnabled() else "textDisabled")
         hand = self.direction(self._value)
         tip = middle + hand * (half - 4)
-        painter.setPen(QPen(ink, 2.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.setPen(QPen(colour, 2.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawLine(middle, tip)
         side = QPointF(-hand.y(), hand.x())
         back = tip - hand * 6.5
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(ink)
+        painter.setBrush(colour)
         painter.drawPolygon(QPolygonF([tip + hand * 1.5, back + side * 4, back - side * 4]))
         painter.drawEllipse(middle, 3.2, 3.2)
         painter.end()
@@ -178,11 +178,11 @@ class AngleDial(QWidget):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(tint)
         inner = disc.adjusted(2, 2, -2, -2)
-        turn = min(360.0, abs(self._value))
-        if turn >= 360.0:
+        angle = min(360.0, abs(self._value))
+        if angle >= 360.0:
             painter.drawEllipse(inner)
             return
         # Qt: 1/16 degree, counterclockwise from three o'clock
         start, sense = (180.0, 1.0) if self._upright else (90.0, 1.0)
-        sweep = math.copysign(turn, self._value) * sense
+        sweep = math.copysign(angle, self._value) * sense
         painter.drawPie(inner, round(start * 16), round(sweep * 16))

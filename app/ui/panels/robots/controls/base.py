@@ -25,7 +25,7 @@ class Control:
         show: Shows a value in the widget.
         changed: Connects a callback to every change of the value.
         finished: Connects a callback to the end of editing.
-        sentence: Returns the error message that the control shows itself, or "".
+        error_text: Returns the error message that the control shows itself, or "".
         close: Releases resources, such as an image stream.
     """
 
@@ -37,13 +37,13 @@ class Control:
         changed: Callable[[Callback], None],
         *,
         finished: Callable[[Callback], None] | None = None,
-        sentence: Callable[[], str] | None = None,
+        error_text: Callable[[], str] | None = None,
         close: Callback | None = None,
     ) -> None:
         self.widget = widget
         self.changed = changed
         self._value, self._show = value, show
-        self._finished, self._sentence, self._close = finished, sentence, close
+        self._finished, self._sentence, self._close = finished, error_text, close
 
     def value(self) -> object:
         """Return the value for the action.
@@ -57,14 +57,14 @@ class Control:
         """Show a value; invalid values are ignored."""
         self._show(value)
 
-    def finished(self, tell: Callback) -> None:
+    def finished(self, callback: Callback) -> None:
         """Connect a callback to the end of editing.
 
         Args:
-            tell: Called whenever the user finishes editing.
+            callback: Called whenever the user finishes editing.
         """
         if self._finished is not None:
-            self._finished(tell)
+            self._finished(callback)
 
     @property
     def error_text(self) -> str:
@@ -77,9 +77,9 @@ class Control:
             self._close()
 
 
-def connect(signal: object, tell: Callback) -> None:
+def connect(signal: object, callback: Callback) -> None:
     """Connect a callback without arguments to a signal with any arguments."""
-    signal.connect(lambda *_values: tell())  # type: ignore[attr-defined]  # any Qt signal
+    signal.connect(lambda *_values: callback())  # type: ignore[attr-defined]  # any Qt signal
 
 
 def line_field(theme: Theme, parameter: Parameter) -> QLineEdit:
@@ -96,6 +96,6 @@ def line_field(theme: Theme, parameter: Parameter) -> QLineEdit:
     return field
 
 
-def sentence_case(words: str) -> str:
+def sentence_case(text: str) -> str:
     """Return the text with its first letter in upper case."""
-    return words[:1].upper() + words[1:]
+    return text[:1].upper() + text[1:]

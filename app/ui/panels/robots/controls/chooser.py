@@ -51,8 +51,11 @@ def control_for(
 def _choice_control(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Control:
     pairs = [(str(choice.value), choice.title) for choice in parameter.choices] or [(o, o) for o in options]
     values: dict[str, object] = {str(choice.value): choice.value for choice in parameter.choices}
-    made: Control
-    if len(pairs) <= MAX_SEGMENTS and sum(len(words) for _value, words in pairs) <= MAX_SEGMENT_CHARS:
+    control: Control
+    if (
+        len(pairs) <= MAX_SEGMENTS
+        and sum(len(option_title) for _value, option_title in pairs) <= MAX_SEGMENT_CHARS
+    ):
         segments = Segments(
             theme,
             [(value, sentence_case(title), None) for value, title in pairs],
@@ -61,7 +64,7 @@ def _choice_control(theme: Theme, parameter: Parameter, options: Sequence[str]) 
             name=parameter.title,
             wraps=True,
         )
-        made = Control(
+        control = Control(
             segments,
             lambda: _value_for_key(values, segments.value),
             lambda value: segments.set_value(str(value)),
@@ -69,15 +72,15 @@ def _choice_control(theme: Theme, parameter: Parameter, options: Sequence[str]) 
         )
     else:
         combo = ComboBox(theme, pairs, name=parameter.title)
-        made = Control(
+        control = Control(
             combo,
             lambda: _value_for_key(values, combo.value),
             lambda value: combo.set_value(str(value)),
             lambda tell: connect(combo.currentIndexChanged, tell),
         )
     if parameter.default is not None:
-        made.show_value(parameter.default)
-    return made
+        control.show_value(parameter.default)
+    return control
 
 
 def _value_for_key(values: dict[str, object], key: str) -> object:

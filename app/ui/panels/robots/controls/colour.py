@@ -68,15 +68,15 @@ class ColourSwatches(QWidget):
         name: str = "",
     ) -> None:
         super().__init__()
-        self._names = {colour.lower(): _(words) for colour, words in colours}
+        self._names = {colour.lower(): _(colour_name) for colour, colour_name in colours}
         self._value = ""
         name = name or _("Colour")
         self.setAccessibleName(name)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
         row = Flow(self, gap=2)
         self._swatches: dict[str, _Swatch] = {}
-        for colour, words in self._names.items():
-            swatch = _Swatch(theme, colour, words)
+        for colour, colour_name in self._names.items():
+            swatch = _Swatch(theme, colour, colour_name)
             swatch.clicked.connect(lambda _on=False, colour=colour: self._change_value(colour))
             self._swatches[colour] = swatch
             row.addWidget(swatch)
@@ -139,9 +139,9 @@ class HueStrip(QWidget):
         self.update()
         self.changed.emit(QColor.fromHslF(self._hue, 0.9, self._light).name())
 
-    def _press(self, at: QPointF) -> None:
-        light = MAX_LIGHTNESS - at.y() / self.height() * (MAX_LIGHTNESS - MIN_LIGHTNESS)
-        self._change_colour(at.x() / self.width(), light)
+    def _press(self, position: QPointF) -> None:
+        light = MAX_LIGHTNESS - position.y() / self.height() * (MAX_LIGHTNESS - MIN_LIGHTNESS)
+        self._change_colour(position.x() / self.width(), light)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -272,21 +272,21 @@ class ColourChoice(QWidget):
         self.changed.emit()
 
     def _hex_edited(self, *, final: bool) -> None:
-        found = _HEX_PATTERN.fullmatch(self.field.text().strip())
-        if found is not None:
-            self.swatches.set_value(f"#{found[1].lower()}")
+        match = _HEX_PATTERN.fullmatch(self.field.text().strip())
+        if match is not None:
+            self.swatches.set_value(f"#{match[1].lower()}")
             self.strip.show_colour(QColor(self.swatches.value))
-        self._show_error("" if found is not None else _("Enter a colour such as #33aaff."), quiet=not final)
+        self._show_error("" if match is not None else _("Enter a colour such as #33aaff."), quiet=not final)
         self.changed.emit()
         if final:
             self.finished.emit()
 
-    def _show_error(self, sentence: str, *, quiet: bool = False) -> None:
-        self.sentence = sentence
-        shown = bool(sentence) and not quiet
-        self._wrong.setText(sentence if shown else "")
-        self._wrong.setVisible(shown)
-        self.field.setProperty("wrong", "true" if shown else "false")
+    def _show_error(self, message: str, *, quiet: bool = False) -> None:
+        self.sentence = message
+        is_visible = bool(message) and not quiet
+        self._wrong.setText(message if is_visible else "")
+        self._wrong.setVisible(is_visible)
+        self.field.setProperty("wrong", "true" if is_visible else "false")
         self.field.style().unpolish(self.field)
         self.field.style().polish(self.field)
 
@@ -300,5 +300,5 @@ def colour_control(theme: Theme, parameter: Parameter) -> Control:
         choice.set_value,
         lambda tell: connect(choice.changed, tell),
         finished=lambda tell: connect(choice.finished, tell),
-        sentence=lambda: choice.sentence,
+        error_text=lambda: choice.sentence,
     )

@@ -46,9 +46,9 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
             if dial is not None:
                 dial.set_value(number)
 
-    def changed(tell: Callback) -> None:
-        connect(slider.changed, tell)
-        connect(slider.field.textEdited, tell)
+    def changed(callback: Callback) -> None:
+        connect(slider.changed, callback)
+        connect(slider.field.textEdited, callback)
 
     return Control(
         slider if dial is None else _make_dial_row(dial, slider, parameter.title),
@@ -56,17 +56,17 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
         show,
         changed,
         finished=lambda tell: connect(slider.field.editingFinished, tell),
-        sentence=lambda: slider.field.sentence,
+        error_text=lambda: slider.field.sentence,
     )
 
 
 def _slider_value(slider: SliderWithUnit, parameter: Parameter) -> object:
     # Returns the typed text if it differs from the slider's value, even if it is invalid.
-    whole = parameter.kind == "integer"
+    is_integer = parameter.kind == "integer"
     typed = slider.field.text()
     if typed != slider.field.format_number(slider.value):
-        return parse_typed(typed, whole=whole)
-    return round(slider.value) if whole else float(slider.value)
+        return parse_typed(typed, as_int=is_integer)
+    return round(slider.value) if is_integer else float(slider.value)
 
 
 def step_of(parameter: Parameter) -> float:
@@ -79,12 +79,12 @@ def step_of(parameter: Parameter) -> float:
     return 0.01 if span <= 2 else 0.1
 
 
-def parse_typed(typed: str, *, whole: bool) -> object:
+def parse_typed(typed: str, *, as_int: bool) -> object:
     """Parse a typed number.
 
     Args:
         typed: Text of the field.
-        whole: True to return whole numbers as int.
+        as_int: True to return whole numbers as int.
 
     Returns:
         The number; None for empty text, and the text itself if it is not a number.
@@ -95,11 +95,11 @@ def parse_typed(typed: str, *, whole: bool) -> object:
         number = parse_number(typed)
     except ValueError:
         return typed  # the action's validation explains the error
-    return int(number) if whole and number.is_integer() else number
+    return int(number) if as_int and number.is_integer() else number
 
 
 def _make_dial(theme: Theme, parameter: Parameter, slider: SliderWithUnit) -> AngleDial:
-    words = f"{parameter.name} {parameter.title}".casefold().split()
+    tokens = f"{parameter.name} {parameter.title}".casefold().split()
     dial = AngleDial(
         theme,
         parameter.minimum or 0.0,
@@ -108,7 +108,7 @@ def _make_dial(theme: Theme, parameter: Parameter, slider: SliderWithUnit) -> An
         value=slider.value,
         default=_float_or_none(parameter.default),
         name=parameter.title,
-        upright=any(word in words for word in VERTICAL_KEYWORDS),
+        upright=any(keyword in tokens for keyword in VERTICAL_KEYWORDS),
     )
 
     def on_dial_changed(value: float) -> None:
@@ -150,14 +150,14 @@ class OpenNumberEdit(NumberEdit):
             Qt.Key.Key_PageUp: PAGE_STEPS,
             Qt.Key.Key_PageDown: -PAGE_STEPS,
         }.get(Qt.Key(event.key()))
-        now = parse_typed(self.text() or "0", whole=False)
+        now = parse_typed(self.text() or "0", as_int=False)
         if steps is None or not has_no_modifiers(event) or not isinstance(now, (int, float)):
             super().keyPressEvent(event)
             return
         low, high = self._parameter.minimum, self._parameter.maximum
-        wanted = now + steps * self._by
-        wanted = max(wanted, low) if low is not None else wanted
-        self.show_number(min(wanted, high) if high is not None else wanted)
+        target = now + steps * self._by
+        target = max(target, low) if low is not None else target
+        self.show_number(min(target, high) if high is not None else target)
         self.textEdited.emit(self.text())
 
     def _parse_text(self) -> None:
@@ -171,17 +171,17 @@ def _open_number_control(theme: Theme, parameter: Parameter) -> Control:
     field = OpenNumberEdit(theme, parameter)
     field.setMinimumWidth(VALUE_WIDTH)
     field.setMaximumWidth(2 * VALUE_WIDTH)
-    wrong = label("", "small", role="error", wrap=True)
-    wrong.hide()
-    field.problem_changed.connect(wrong.setText)
-    field.problem_changed.connect(lambda said: wrong.setVisible(bool(said)))
+    error_label = label("", "small", role="error", wrap=True)
+    error_label.hide()
+    field.problem_changed.connect(error_label.setText)
+    field.problem_changed.connect(lambda said: error_label.setVisible(bool(said)))
     column = QWidget()
     column.setAccessibleName(parameter.title)
     inner = QVBoxLayout(column)
     inner.setContentsMargins(0, 0, 0, 0)
     inner.setSpacing(4)
     inner.addWidget(field, 0, Qt.AlignmentFlag.AlignLeft)
-    inner.addWidget(wrong)
+    inner.addWidget(error_label)
 
     def show(given: object) -> None:
         number = _float_or_none(given)
@@ -193,14 +193,14 @@ def _open_number_control(theme: Theme, parameter: Parameter) -> Control:
     show(parameter.default)
     return Control(
         column,
-        lambda: parse_typed(field.text(), whole=parameter.kind == "integer"),
+        lambda: parse_typed(field.text(), as_int=parameter.kind == "integer"),
         show,
         lambda tell: connect(field.textChanged, tell),
         finished=lambda tell: connect(field.editingFinished, tell),
-        sentence=lambda: field.sentence,
+        error_text=lambda: field.sentence,
     )
 
 
 def _float_or_none(value: object) -> float | None:
-    good = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return float(value) if good else None  # type: ignore[arg-type]
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return float(value) if is_number else None  # type: ignore[arg-type]

@@ -43,12 +43,12 @@ class ImageSource(Protocol):
     def open_stream(self, topic: str) -> ImageStream:
         """Subscribe to the images of a topic; the caller closes the stream."""
 
-    def prompt_file(self, folder: str, take: Callable[[Path], None]) -> None:
+    def prompt_file(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Show the dialog for choosing an image file.
 
         Args:
             folder: Initial folder; "" for the user's pictures.
-            take: Receives the path of the file.
+            callback: Receives the path of the file.
         """
 
 
@@ -63,7 +63,7 @@ class EmptyImageSource:
         """Raise `KeyError`, because there are no topics."""
         raise KeyError(topic)
 
-    def prompt_file(self, folder: str, take: Callable[[Path], None]) -> None:
+    def prompt_file(self, folder: str, callback: Callable[[Path], None]) -> None:
         """Do nothing."""
 
 
@@ -95,8 +95,8 @@ class Thumbnail(QWidget):
         rect, radius = QRectF(self.rect()), self._theme.radius("small")
         paint.box(painter, rect, radius, theme.colour("sunken"), theme.colour("border"))
         if self._image is None:
-            square = QRectF(rect.center().x() - 10, rect.center().y() - 10, 20, 20)
-            paint_icon(painter, square, "image", theme.colour("textTertiary"))
+            icon_rect = QRectF(rect.center().x() - 10, rect.center().y() - 10, 20, 20)
+            paint_icon(painter, icon_rect, "image", theme.colour("textTertiary"))
         else:
             inner = rect.adjusted(1, 1, -1, -1)
             shape = QPainterPath()
@@ -106,9 +106,9 @@ class Thumbnail(QWidget):
             size = self._image.size().scaled(
                 inner.size().toSize(), Qt.AspectRatioMode.KeepAspectRatioByExpanding
             )
-            place = QRectF(0, 0, size.width(), size.height())
-            place.moveCenter(inner.center())
-            painter.drawImage(place, self._image)
+            image_rect = QRectF(0, 0, size.width(), size.height())
+            image_rect.moveCenter(inner.center())
+            painter.drawImage(image_rect, self._image)
         painter.end()
 
 
@@ -168,7 +168,7 @@ class PictureChoice(QWidget):
             if self._stream.is_awaiting_image:
                 return None  # the last image may have been received before the stream was suspended
         if self._image is not None:
-            return encode_image(self._image, bare=self._parameter.is_bare_base64)
+            return encode_image(self._image, omit_prefix=self._parameter.is_bare_base64)
         return None if self._stream is not None else self.field.text().strip() or None
 
     def set_value(self, value: object) -> None:
@@ -199,11 +199,11 @@ class PictureChoice(QWidget):
         """Load an image file, or show the reason if that fails."""
         self.close_stream()
         self._file = path
-        self._image, said = read_picture(path)
+        self._image, message = read_picture(path)
         self.thumbnail.show_image(self._image)
         self.field.setText(path.name if self._image is not None else str(path))
         self.field.setToolTip(plain.tip(str(path)))
-        self._show_error(said)
+        self._show_error(message)
         self.changed.emit()
 
     def _text_edited(self, text: str) -> None:
@@ -212,9 +212,9 @@ class PictureChoice(QWidget):
         url = QUrl(text.strip())
         path = Path(url.toLocalFile() if url.isLocalFile() else text.strip())
         if text.strip() and path.suffix and path.is_file():
-            self._image, said = read_picture(path)
+            self._image, message = read_picture(path)
             self.thumbnail.show_image(self._image)
-            self._show_error(said)
+            self._show_error(message)
         self.changed.emit()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
@@ -259,8 +259,8 @@ class PictureChoice(QWidget):
             self._seen = picture
             data = picture.bgra.data
             rows, columns = picture.bgra.shape[:2]
-            held = QImage(data, columns, rows, QImage.Format.Format_RGB32)
-            self._image = held.copy()
+            frame = QImage(data, columns, rows, QImage.Format.Format_RGB32)
+            self._image = frame.copy()
             self.thumbnail.show_image(self._image)
         self._show_error(f"{stream.error}." if stream.error else "")
 
@@ -277,10 +277,10 @@ class PictureChoice(QWidget):
         self.field.setToolTip("")
         self._show_error("")
 
-    def _show_error(self, sentence: str) -> None:
-        self.sentence = sentence
-        self._wrong.setText(sentence)
-        self._wrong.setVisible(bool(sentence))
+    def _show_error(self, message: str) -> None:
+        self.sentence = message
+        self._wrong.setText(message)
+        self._wrong.setVisible(bool(message))
 
 
 def _image_from_url(address: str) -> QImage | None:
@@ -301,6 +301,6 @@ def picture_control(theme: Theme, parameter: Parameter, pictures: ImageSource) -
         choice.value,
         show,
         lambda tell: connect(choice.changed, tell),
-        sentence=lambda: choice.sentence,
+        error_text=lambda: choice.sentence,
         close=choice.close_stream,
     )

@@ -38,8 +38,8 @@ def read_picture(path: Path) -> tuple[QImage | None, str]:
         reason = (error.strerror or _("unknown")).lower()
         return None, _("“{file}” can't be read: {reason}.").format(file=path.name, reason=reason)
     if len(data) > MAX_FILE_BYTES:
-        said = _("“{file}” is too large. Choose a file smaller than {size} MB.")
-        return None, said.format(file=path.name, size=MAX_FILE_BYTES // 1_000_000)
+        message = _("“{file}” is too large. Choose a file smaller than {size} MB.")
+        return None, message.format(file=path.name, size=MAX_FILE_BYTES // 1_000_000)
     try:
         return decode_image(data), ""
     except DecodeError as error:
@@ -75,19 +75,19 @@ def apply_orientation(image: QImage, file: ImageFile) -> QImage:
     return image.flipped(Qt.Orientation.Vertical) if file.orientation in (3, 4, 7, 8) else image
 
 
-def encode_image(image: QImage, *, bare: bool = False) -> str:
+def encode_image(image: QImage, *, omit_prefix: bool = False) -> str:
     """Encode an image as JPEG in base64, scaled to at most 1280 px on its longer side.
 
     Args:
         image: Image to encode.
-        bare: True to omit the ``data:`` prefix.
+        omit_prefix: True to omit the ``data:`` prefix.
     """
     if max(image.width(), image.height()) > MAX_SIDE_PX:
-        keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
-        image = image.scaled(MAX_SIDE_PX, MAX_SIDE_PX, keep, smooth)
-    held = QByteArray()
-    buffer = QBuffer(held)
+        aspect, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
+        image = image.scaled(MAX_SIDE_PX, MAX_SIDE_PX, aspect, smooth)
+    encoded = QByteArray()
+    buffer = QBuffer(encoded)
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
     image.convertToFormat(QImage.Format.Format_RGB32).save(buffer, "JPG", QUALITY)  # type: ignore[call-overload]
-    text = base64.b64encode(held.data()).decode("ascii")
-    return text if bare else f"data:image/jpeg;base64,{text}"
+    text = base64.b64encode(encoded.data()).decode("ascii")
+    return text if omit_prefix else f"data:image/jpeg;base64,{text}"

@@ -25,28 +25,28 @@ def text_control(theme: Theme, parameter: Parameter) -> Control:
     if (parameter.max_length or 0) >= MIN_MULTILINE_LENGTH or parameter.widget == "multiline":
         return _multiline_control(theme, parameter)
     field = line_field(theme, parameter)
-    made = Control(
+    control = Control(
         field,
         lambda: _text_or_none(parameter, field.text()),
         lambda given: field.setText(_field_text(given)),
         lambda tell: connect(field.textChanged, tell),
         finished=lambda tell: connect(field.editingFinished, tell),
     )
-    made.show_value(parameter.default)
-    return made
+    control.show_value(parameter.default)
+    return control
 
 
 def _multiline_control(theme: Theme, parameter: Parameter) -> Control:
     field = LongTextField(theme, parameter.title)
-    made = Control(
+    control = Control(
         field,
         lambda: _text_or_none(parameter, field.text()),
         lambda given: field.set_text(_field_text(given)),
         lambda tell: connect(field.changed, tell),
         finished=lambda tell: connect(field.finished, tell),
     )
-    made.show_value(parameter.default)
-    return made
+    control.show_value(parameter.default)
+    return control
 
 
 def _list_control(theme: Theme, parameter: Parameter) -> Control:
@@ -54,20 +54,20 @@ def _list_control(theme: Theme, parameter: Parameter) -> Control:
     field.setPlaceholderText(_placeholder(parameter))
 
     def value() -> object:
-        words = field.text().strip()
-        if not words and not parameter.required and (parameter.nullable or parameter.kind == "object"):
+        text = field.text().strip()
+        if not text and not parameter.required and (parameter.nullable or parameter.kind == "object"):
             return None
-        return parse_value(parameter, words)
+        return parse_value(parameter, text)
 
-    made = Control(
+    control = Control(
         field,
         value,
         lambda given: field.setText(_field_text(given)),
         lambda tell: connect(field.textChanged, tell),
         finished=lambda tell: connect(field.editingFinished, tell),
     )
-    made.show_value(parameter.default)
-    return made
+    control.show_value(parameter.default)
+    return control
 
 
 def _text_or_none(parameter: Parameter, text: str) -> str | None:
@@ -79,8 +79,8 @@ def _placeholder(parameter: Parameter) -> str:
     if parameter.kind == "object":
         names = ", ".join(f'"{field.name}": …' for field in parameter.fields) or '"name": …'
         return f"{{{names}}}"
-    held = [parameter.item] if parameter.item is not None else list(parameter.prefix_items)
-    if any(each.kind in ("list", "object") for each in held):
+    items = [parameter.item] if parameter.item is not None else list(parameter.prefix_items)
+    if any(each.kind in ("list", "object") for each in items):
         return "[…, …]"
     if parameter.prefix_items:
         return ", ".join(each.kind for each in parameter.prefix_items)
@@ -88,7 +88,7 @@ def _placeholder(parameter: Parameter) -> str:
     return _("Numbers separated by commas") if is_number else _("Words separated by commas")
 
 
-def _field_text(given: object) -> str:
-    if isinstance(given, (list, tuple, Mapping)):
-        return format_for_editing(given)
-    return "" if given is None else str(given)
+def _field_text(value: object) -> str:
+    if isinstance(value, (list, tuple, Mapping)):
+        return format_for_editing(value)
+    return "" if value is None else str(value)

@@ -45,10 +45,12 @@ class AddressChoice(QWidget):
             addresses: Addresses of this computer.
             value: Address to select, or "" for this computer only.
         """
-        if value and value not in {own.host for own in addresses}:  # the computer no longer has this address
+        if value and value not in {
+            address.host for address in addresses
+        }:  # the computer no longer has this address
             addresses = (*addresses, OwnAddress(value, ""))
         options: list[tuple[str, str, str | None]] = [("", _("This computer"), None)]
-        options += [(own.host, address_text(own), None) for own in addresses]
+        options += [(address.host, address_text(address), None) for address in addresses]
         if self._choice is not None:
             self._row.removeWidget(self._choice)
             self._choice.deleteLater()
@@ -58,7 +60,7 @@ class AddressChoice(QWidget):
             self._choice = segments
         else:
             combo = ComboBox(
-                self._theme, [(host, words) for host, words, _icon in options], name=_("Available on")
+                self._theme, [(host, text) for host, text, _icon in options], name=_("Available on")
             )
             combo.set_value(value)
             combo.activated.connect(lambda _index: self.selected.emit(combo.value))
@@ -115,26 +117,26 @@ class AccessForm(QWidget):
         token.setSpacing(8)
         token.addWidget(self.token, 1)
         token.addWidget(self.new_token)
-        reach = QHBoxLayout()
-        reach.setSpacing(6)
-        reach.addWidget(self.reach_icon, 0, Qt.AlignmentFlag.AlignTop)
-        reach.addWidget(self.reach, 1)
-        said = QVBoxLayout()
-        said.setSpacing(2)
-        said.addLayout(reach)
-        said.addWidget(self.works_with)
-        said.addStretch(1)
+        reach_row = QHBoxLayout()
+        reach_row.setSpacing(6)
+        reach_row.addWidget(self.reach_icon, 0, Qt.AlignmentFlag.AlignTop)
+        reach_row.addWidget(self.reach, 1)
+        reach_column = QVBoxLayout()
+        reach_column.setSpacing(2)
+        reach_column.addLayout(reach_row)
+        reach_column.addWidget(self.works_with)
+        reach_column.addStretch(1)
         self._grid = grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(10)
         grid.setVerticalSpacing(8)
         grid.setColumnStretch(1, 1)
-        for place, words in enumerate((_("Address"), _("Token"), _("Available on"))):
-            grid.addWidget(label(words, "body", role="textSecondary", wrap=True), place, 0)
+        for row, text in enumerate((_("Address"), _("Token"), _("Available on"))):
+            grid.addWidget(label(text, "body", role="textSecondary", wrap=True), row, 0)
         grid.addWidget(self.address, 0, 1)
         grid.addLayout(token, 1, 1)
         grid.addWidget(self.open_to, 2, 1)
-        grid.addLayout(said, 3, 1)
+        grid.addLayout(reach_column, 3, 1)
         code = QVBoxLayout()
         code.setSpacing(6)
         code.addWidget(self.qr, 0, Qt.AlignmentFlag.AlignHCenter)
@@ -166,8 +168,8 @@ class AccessForm(QWidget):
 
     def _show_token(self) -> None:
         token = self._web.token
-        shown = token if self.reveal.isChecked() else _MASK.format(end=token[-_VISIBLE_CHARS:])
-        self.token.show_text(shown if token else _("not needed on this computer"), can_copy=bool(token))
+        text = token if self.reveal.isChecked() else _MASK.format(end=token[-_VISIBLE_CHARS:])
+        self.token.show_text(text if token else _("not needed on this computer"), can_copy=bool(token))
         self.reveal.set_icon("eye-off" if self.reveal.isChecked() else "eye")
         self.reveal.set_name(_("Hide the token") if self.reveal.isChecked() else _("Show the token"))
 
@@ -176,12 +178,10 @@ class AccessForm(QWidget):
         role = "warn" if host else "textSecondary"
         self.reach_icon.set("wifi" if host else "lock", role)
         set_role(self.reach, role)
-        words = _("Other devices can't reach this address.")
+        text = _("Other devices can't reach this address.")
         if host:
-            words = _(
-                "Devices on the network of {address} can reach this address. Messages aren't encrypted."
-            )
-        self.reach.setText(words.format(address=host))
+            text = _("Devices on the network of {address} can reach this address. Messages aren't encrypted.")
+        self.reach.setText(text.format(address=host))
         self.works_with.setText(
             _("Port, token, origins and robots are the same as for rosbridge.")
             if is_foxglove

@@ -89,8 +89,8 @@ class CopyField(QWidget):
         self.updateGeometry()
 
     def sizeHint(self) -> QSize:
-        high = max(self._theme.size("control", "normal"), super().sizeHint().height())
-        return QSize(super().sizeHint().width(), high)
+        height = max(self._theme.size("control", "normal"), super().sizeHint().height())
+        return QSize(super().sizeHint().width(), height)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(round(self._theme.scaled(140)), self.sizeHint().height())
@@ -131,6 +131,6 @@ class RoleIcon(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         side, painter = self.sizeHint().width(), QPainter(self)
         top = self._theme.scaled(2) if self._is_at_top else (self.height() - side) / 2
-        square = QRectF(0, top, side, side)
-        paint_icon(painter, square, self._icon, self._theme.colour(self._role))
+        icon_area = QRectF(0, top, side, side)
+        paint_icon(painter, icon_area, self._icon, self._theme.colour(self._role))
         painter.end()

@@ -57,9 +57,9 @@ class NoticeStrip(AlertBox):
             self.set_status(notice.status)
             self.words.setText(notice.message)
             self.setAccessibleName(notice.message)
-            word = _BUTTON_LABELS.get(notice.next_step, "")
-            self.button.set_label(_(word) if word else "")
-            paint.show_when(self.button, bool(word))
+            button_text = _BUTTON_LABELS.get(notice.next_step, "")
+            self.button.set_label(_(button_text) if button_text else "")
+            paint.show_when(self.button, bool(button_text))
         more = ngettext("and {count} more", "and {count} more", others).format(count=others) if others else ""
         if more != self.more.text():
             self.more.setText(more)

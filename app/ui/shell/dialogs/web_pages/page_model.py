@@ -108,58 +108,58 @@ class PageTreeModel(QAbstractItemModel):
         row = self._by_id.get(index.internalId() - 1) if index.isValid() else None
         return row.topics[index.row()] if row is not None and index.row() < len(row.topics) else None
 
-    def show_pages(self, listed: Sequence[ListedPage]) -> None:
+    def show_pages(self, pages: Sequence[ListedPage]) -> None:
         """Update the rows to a list of pages that is sorted by id."""
-        wanted = {each.page.id: each for each in listed}
-        for place in reversed(range(len(self._rows))):
-            if self._rows[place].id not in wanted:
-                self._remove_page(place)
-        new = [each for each in listed if each.page.id not in self._by_id]
-        for each in listed:
-            row = self._by_id.get(each.page.id)
-            if row is not None and row.listed_page != each:
-                row.listed_page = each
+        pages_by_id = {listed_page.page.id: listed_page for listed_page in pages}
+        for index in reversed(range(len(self._rows))):
+            if self._rows[index].id not in pages_by_id:
+                self._remove_page(index)
+        new = [listed_page for listed_page in pages if listed_page.page.id not in self._by_id]
+        for listed_page in pages:
+            row = self._by_id.get(listed_page.page.id)
+            if row is not None and row.listed_page != listed_page:
+                row.listed_page = listed_page
                 self._emit_changed(self.createIndex(row.number, 0, 0), self.createIndex(row.number, 0, 0))
-                self._show_topics(row, each.page.topics)
+                self._show_topics(row, listed_page.page.topics)
         if new:
             self._append_pages(new)
 
-    def _append_pages(self, listed: Sequence[ListedPage]) -> None:
+    def _append_pages(self, pages: Sequence[ListedPage]) -> None:
         first = len(self._rows)
-        self.beginInsertRows(_ROOT, first, first + len(listed) - 1)
-        for each in listed:
-            row = PageRow(each, [*each.page.topics], len(self._rows))
+        self.beginInsertRows(_ROOT, first, first + len(pages) - 1)
+        for listed_page in pages:
+            row = PageRow(listed_page, [*listed_page.page.topics], len(self._rows))
             self._rows.append(row)
             self._by_id[row.id] = row
         self.endInsertRows()
 
-    def _remove_page(self, place: int) -> None:
-        self.beginRemoveRows(_ROOT, place, place)
-        row = self._rows.pop(place)
+    def _remove_page(self, index: int) -> None:
+        self.beginRemoveRows(_ROOT, index, index)
+        row = self._rows.pop(index)
         del self._by_id[row.id]
-        for number, each in enumerate(self._rows):
-            each.number = number
+        for number, other_row in enumerate(self._rows):
+            other_row.number = number
         self.endRemoveRows()
 
     def _show_topics(self, row: PageRow, topics: Sequence[PageTopic]) -> None:
         before = row.topics
-        if [_key(each) for each in before] == [_key(each) for each in topics]:
-            changed = [place for place, each in enumerate(topics) if each != before[place]]
+        if [_key(topic) for topic in before] == [_key(topic) for topic in topics]:
+            changed = [index for index, topic in enumerate(topics) if topic != before[index]]
             row.topics = [*topics]
             if changed:
                 self._emit_topics_changed(row, changed[0], changed[-1])
             return
         parent = self.createIndex(row.number, 0, 0)
-        wanted = {_key(each) for each in topics}
-        for place in reversed(range(len(before))):
-            if _key(before[place]) not in wanted:
-                self.beginRemoveRows(parent, place, place)
-                del before[place]
+        keys = {_key(topic) for topic in topics}
+        for index in reversed(range(len(before))):
+            if _key(before[index]) not in keys:
+                self.beginRemoveRows(parent, index, index)
+                del before[index]
                 self.endRemoveRows()
-        for place, each in enumerate(topics):
-            if place >= len(before) or _key(before[place]) != _key(each):
-                self.beginInsertRows(parent, place, place)
-                before.insert(place, each)
+        for index, topic in enumerate(topics):
+            if index >= len(before) or _key(before[index]) != _key(topic):
+                self.beginInsertRows(parent, index, index)
+                before.insert(index, topic)
                 self.endInsertRows()
         if len(before) > len(topics):  # the remaining topics are in another order
             self.beginRemoveRows(parent, len(topics), len(before) - 1)
@@ -181,7 +181,7 @@ def _key(topic: PageTopic) -> _TopicKey:
     return topic.topic, topic.is_published
 
 
-def sorted_topics(listed: ListedPage) -> ListedPage:
+def sorted_topics(listed_page: ListedPage) -> ListedPage:
     """Return a copy of a page with sorted topics: first subscribed, then published ones, each by name."""
-    topics = tuple(sorted(listed.page.topics, key=lambda each: (each.is_published, each.topic)))
-    return dataclasses.replace(listed, page=dataclasses.replace(listed.page, topics=topics))
+    topics = tuple(sorted(listed_page.page.topics, key=lambda each: (each.is_published, each.topic)))
+    return dataclasses.replace(listed_page, page=dataclasses.replace(listed_page.page, topics=topics))

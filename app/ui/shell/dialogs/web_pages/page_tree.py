@@ -78,16 +78,16 @@ class _PageHeader(QHeaderView):
 
     def paintSection(self, painter: QPainter, rect: QRect, _section: int) -> None:
         theme, font = self._theme, header_font(self._theme)
-        ink = theme.colour("textTertiary")
+        colour = theme.colour("textTertiary")
         painter.save()
         painter.fillRect(rect, theme.colour("raised"))
         painter.setPen(theme.colour("border"))
         painter.drawLine(rect.bottomLeft(), rect.bottomRight())
         box = QRectF(rect)
         for column, title in column_titles().items():
-            paint.text_line(painter, self._tree.cell_rect(column, box), title, font, ink, paint.RIGHT)
+            paint.text_line(painter, self._tree.cell_rect(column, box), title, font, colour, paint.RIGHT)
         box.setRight(self._tree.cell_rect("rate", box).left())
-        paint.text_line(painter, box.adjusted(_EDGE, 0, 0, 0), _("Page and topics"), font, ink)
+        paint.text_line(painter, box.adjusted(_EDGE, 0, 0, 0), _("Page and topics"), font, colour)
         painter.restore()
 
 
@@ -103,7 +103,7 @@ class _RowHeightDelegate(QStyledItemDelegate):
 
     def measure(self, theme: Theme) -> None:
         self._page, self._topic = (
-            QSize(40, round(theme.scaled(high))) for high in (PAGE_ROW_HEIGHT, TOPIC_ROW_HEIGHT)
+            QSize(40, round(theme.scaled(height))) for height in (PAGE_ROW_HEIGHT, TOPIC_ROW_HEIGHT)
         )
 
     def sizeHint(self, _option: QStyleOptionViewItem, index: Index) -> QSize:
@@ -153,17 +153,17 @@ class PageTree(QTreeView):
 
     def disconnect_current(self) -> None:
         """Emit `disconnect_requested` for the current page if it is connected."""
-        listed = self.current_page()
-        if listed is not None and listed.gone_s is None:
-            self.disconnect_requested.emit(listed.page.id)
+        listed_page = self.current_page()
+        if listed_page is not None and listed_page.gone_s is None:
+            self.disconnect_requested.emit(listed_page.page.id)
 
     def copy_current(self) -> None:
         """Emit `copy_requested` with the name of the current topic or the origin of the current page."""
-        topic, listed = self._pages.topic(self.currentIndex()), self.current_page()
+        topic, listed_page = self._pages.topic(self.currentIndex()), self.current_page()
         if topic is not None:
             self.copy_requested.emit(topic.topic)
-        elif listed is not None:
-            self.copy_requested.emit(listed.page.origin or listed.page.address)
+        elif listed_page is not None:
+            self.copy_requested.emit(listed_page.page.origin or listed_page.page.address)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         self._keyboard = True
@@ -197,9 +197,9 @@ class PageTree(QTreeView):
                 self._toggle(index)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        at = event.position().toPoint()
-        row = self._pages.page_row(self.indexAt(at))
-        if event.button() == Qt.MouseButton.LeftButton and row is not None and self._is_on_button(at):
+        position = event.position().toPoint()
+        row = self._pages.page_row(self.indexAt(position))
+        if event.button() == Qt.MouseButton.LeftButton and row is not None and self._is_on_button(position):
             self.disconnect_requested.emit(row.id)
             return
         super().mouseReleaseEvent(event)
@@ -238,38 +238,38 @@ class PageTree(QTreeView):
         if index.isValid() and not index.parent().isValid():
             self.setExpanded(index, not self.isExpanded(index))
 
-    def _is_on_button(self, at: QPoint) -> bool:
-        index = self.indexAt(at)
+    def _is_on_button(self, position: QPoint) -> bool:
+        index = self.indexAt(position)
         row = self._pages.page_row(index)
         is_page = row is not None and self._pages.topic(index) is None and row.listed_page.gone_s is None
-        return is_page and at.x() >= self.cell_rect("disconnect", QRectF()).left() - _PADDING
+        return is_page and position.x() >= self.cell_rect("disconnect", QRectF()).left() - _PADDING
 
-    def _hover(self, at: QPoint) -> None:
-        index, over = QPersistentModelIndex(self.indexAt(at)), self._is_on_button(at)
-        if (index, over) != (self._hovered, self._over_button):
-            self._hovered, self._over_button = index, over
-            self.viewport().setToolTip(plain.tip(_("Disconnect (Delete)")) if over else "")
+    def _hover(self, position: QPoint) -> None:
+        index, is_over_button = QPersistentModelIndex(self.indexAt(position)), self._is_on_button(position)
+        if (index, is_over_button) != (self._hovered, self._over_button):
+            self._hovered, self._over_button = index, is_over_button
+            self.viewport().setToolTip(plain.tip(_("Disconnect (Delete)")) if is_over_button else "")
             self.viewport().update()
 
-    def _show_menu(self, at: QPoint) -> None:
-        index = self.indexAt(at)
+    def _show_menu(self, position: QPoint) -> None:
+        index = self.indexAt(position)
         if not index.isValid():
             return
         self.setCurrentIndex(index)
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        words = _("Copy the topic's name") if self._pages.topic(index) is not None else _("Copy the address")
-        menu.addAction(words, self.copy_current)
+        text = _("Copy the topic's name") if self._pages.topic(index) is not None else _("Copy the address")
+        menu.addAction(text, self.copy_current)
         leave = menu.addAction(_("Disconnect"), self.disconnect_current)
-        listed = self.current_page()
-        leave.setEnabled(listed is not None and listed.gone_s is None)
-        menu.popup(self.viewport().mapToGlobal(at))
+        listed_page = self.current_page()
+        leave.setEnabled(listed_page is not None and listed_page.gone_s is None)
+        menu.popup(self.viewport().mapToGlobal(position))
 
     def _measure(self) -> None:
         titles, font = column_titles(), header_font(self.theme)
-        for column, wide in _WIDTHS.items():
-            words = paint.width_of(font, titles.get(column, "")) + 2 * _PADDING + 1
-            self._widths[column] = max(round(self.theme.scaled(wide)), round(words))
+        for column, width in _WIDTHS.items():
+            title_width = paint.width_of(font, titles.get(column, "")) + 2 * _PADDING + 1
+            self._widths[column] = max(round(self.theme.scaled(width)), round(title_width))
         self._heights.measure(self.theme)
 
     def drawBranches(self, _painter: QPainter, _rect: QRect, _index: Index) -> None:
@@ -282,9 +282,9 @@ class PageTree(QTreeView):
         rect = QRectF(option.rect)
         rect.setLeft(0)
         rect.setWidth(self.viewport().width())
-        chosen, theme = index == self.currentIndex(), self.theme
+        is_current, theme = index == self.currentIndex(), self.theme
         painter.save()
-        if chosen:
+        if is_current:
             painter.fillRect(rect, theme.colour("selected"))
             painter.fillRect(QRectF(0, rect.top(), 2, rect.height()), theme.colour("accent"))
         elif self._hovered == index and self._hovered.isValid():
@@ -297,7 +297,7 @@ class PageTree(QTreeView):
             self._paint_topic(
                 painter, rect, row.topics[index.row()], is_gone=row.listed_page.gone_s is not None
             )
-        if chosen and self._keyboard and self.hasFocus():
+        if is_current and self._keyboard and self.hasFocus():
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setPen(QPen(theme.colour("focus"), 2))
             painter.setBrush(Qt.BrushStyle.NoBrush)
@@ -306,8 +306,8 @@ class PageTree(QTreeView):
 
     def _paint_icon(self, painter: QPainter, left: float, rect: QRectF, name: str, role: str) -> float:
         side = self.theme.scaled(_ICON)
-        square = QRectF(left, rect.center().y() - side / 2, side, side)
-        paint_icon(painter, square, name, self.theme.colour(role))
+        icon_area = QRectF(left, rect.center().y() - side / 2, side, side)
+        paint_icon(painter, icon_area, name, self.theme.colour(role))
         return left + side + _GAP
 
     def cell_rect(self, column: PageColumn, rect: QRectF) -> QRectF:
@@ -327,41 +327,47 @@ class PageTree(QTreeView):
         font.setStrikeOut(struck)
         return font
 
-    def _paint_page(self, painter: QPainter, rect: QRectF, listed: ListedPage, index: Index) -> None:
-        theme, is_gone = self.theme, listed.gone_s is not None
+    def _paint_page(self, painter: QPainter, rect: QRectF, listed_page: ListedPage, index: Index) -> None:
+        theme, is_gone = self.theme, listed_page.gone_s is not None
         left = float(_EDGE)
         if self._pages.rowCount(index):
             chevron = "chevron-down" if self.isExpanded(index) else "chevron-right"
             self._paint_icon(painter, left, rect, chevron, "textSecondary")
         left += theme.scaled(_ICON) + _GAP
         left = self._paint_icon(
-            painter, left, rect, page_icon(listed.page), _DISCONNECTED_ROLE if is_gone else "textSecondary"
+            painter,
+            left,
+            rect,
+            page_icon(listed_page.page),
+            _DISCONNECTED_ROLE if is_gone else "textSecondary",
         )
         small = self._font("small")
-        since = since_text(listed)
+        since = since_text(listed_page)
         button = self.cell_rect("disconnect", rect)
         end = button.left() - _PADDING
         room = QRectF(end - paint.width_of(small, since) - 2, rect.top(), 0, rect.height())
         room.setRight(end)
         paint.text_line(painter, room, since, small, theme.colour("textSecondary"), paint.RIGHT)
-        name, font = page_name(listed.page), self._font("body", bold=True, struck=is_gone)
-        words = QRectF(left, rect.top(), max(20.0, room.left() - left - _GAP), rect.height())
-        paint.text_line(painter, words, name, font, theme.colour(_DISCONNECTED_ROLE if is_gone else "text"))
-        words.setLeft(words.left() + paint.width_of(font, name) + 8)
-        if words.width() > theme.scaled(40):
+        name, font = page_name(listed_page.page), self._font("body", bold=True, struck=is_gone)
+        text_area = QRectF(left, rect.top(), max(20.0, room.left() - left - _GAP), rect.height())
+        paint.text_line(
+            painter, text_area, name, font, theme.colour(_DISCONNECTED_ROLE if is_gone else "text")
+        )
+        text_area.setLeft(text_area.left() + paint.width_of(font, name) + 8)
+        if text_area.width() > theme.scaled(40):
             role = _DISCONNECTED_ROLE if is_gone else "textSecondary"
             paint.text_line(
-                painter, words, location_text(listed.page), self._font("body"), theme.colour(role)
+                painter, text_area, location_text(listed_page.page), self._font("body"), theme.colour(role)
             )
         if not is_gone:
             is_over = self._over_button and self._hovered == index
             side = theme.scaled(_ICON)
-            square = QRectF(button.right() - side, rect.center().y() - side / 2, side, side)
+            icon_area = QRectF(button.right() - side, rect.center().y() - side / 2, side, side)
             if is_over:
                 paint.box(
-                    painter, square.adjusted(-4, -4, 4, 4), theme.radius("key"), theme.colour("pressed")
+                    painter, icon_area.adjusted(-4, -4, 4, 4), theme.radius("key"), theme.colour("pressed")
                 )
-            paint_icon(painter, square, "x", theme.colour("text" if is_over else "textSecondary"))
+            paint_icon(painter, icon_area, "x", theme.colour("text" if is_over else "textSecondary"))
 
     def _paint_topic(self, painter: QPainter, rect: QRectF, topic: PageTopic, *, is_gone: bool) -> None:
         theme = self.theme
@@ -377,32 +383,32 @@ class PageTree(QTreeView):
         )
         left += verbs + 10
         limit = limit_text(topic)
-        wide = paint.width_of(small, limit) + 2 if limit else 0.0
+        limit_width = paint.width_of(small, limit) + 2 if limit else 0.0
         end = self.cell_rect("rate", rect).left() - 2 * _PADDING
         paint.text_line(
-            painter, QRectF(end - wide, rect.top(), wide, rect.height()), limit, small,
+            painter, QRectF(end - limit_width, rect.top(), limit_width, rect.height()), limit, small,
             theme.colour(_DISCONNECTED_ROLE if is_gone else "textTertiary"), paint.RIGHT,
         )  # fmt: skip
-        name = QRectF(left, rect.top(), max(20.0, end - wide - left - _GAP), rect.height())
+        name = QRectF(left, rect.top(), max(20.0, end - limit_width - left - _GAP), rect.height())
         paint.text_line(painter, name, topic.topic, self._font("code", struck=is_gone), theme.colour(role))
         if is_gone:
             return
-        figures: dict[PageColumn, str] = {
+        texts: dict[PageColumn, str] = {
             "rate": rate_text(topic.rate_hz),
             "bandwidth": bandwidth_text(topic.bytes_per_s),
         }
-        for column, text in figures.items():
+        for column, text in texts.items():
             paint.text_line(
                 painter, self.cell_rect(column, rect), text, body, theme.colour(role), paint.RIGHT
             )
         self._paint_dropped(painter, self.cell_rect("dropped", rect), topic, body)
 
     def _paint_dropped(self, painter: QPainter, cell: QRectF, topic: PageTopic, font: QFont) -> None:
-        theme, words = self.theme, dropped_text(topic)
+        theme, text = self.theme, dropped_text(topic)
         is_bad = topic.dropped_count > 0
-        paint.text_line(painter, cell, words, font, theme.colour("warn" if is_bad else "text"), paint.RIGHT)
+        paint.text_line(painter, cell, text, font, theme.colour("warn" if is_bad else "text"), paint.RIGHT)
         if is_bad:
             side = theme.scaled(13)
-            left = cell.right() - paint.width_of(font, words) - side - 5
-            square = QRectF(left, cell.center().y() - side / 2, side, side)
-            paint_icon(painter, square, "triangle-alert", theme.colour("warn"))
+            left = cell.right() - paint.width_of(font, text) - side - 5
+            icon_area = QRectF(left, cell.center().y() - side / 2, side, side)
+            paint_icon(painter, icon_area, "triangle-alert", theme.colour("warn"))

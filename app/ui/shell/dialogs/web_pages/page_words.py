@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from nep.programs.web.context import PageTopic
 
 
-def since_text(listed: ListedPage) -> str:
+def since_text(listed_page: ListedPage) -> str:
     """Format since when a page is connected or disconnected, such as "since 8:32" or "gone 4 s"."""
-    if listed.gone_s is not None:
-        return _("gone for {seconds} s").format(seconds=int(listed.gone_s))
-    then = dt.datetime.fromtimestamp(listed.page.since_s).astimezone()
-    return _("since {time}").format(time=clock_text(then))
+    if listed_page.gone_s is not None:
+        return _("gone for {seconds} s").format(seconds=int(listed_page.gone_s))
+    connected = dt.datetime.fromtimestamp(listed_page.page.since_s).astimezone()
+    return _("since {time}").format(time=clock_text(connected))
 
 
 def direction_text(topic: PageTopic) -> str:
@@ -41,19 +41,19 @@ def dropped_text(topic: PageTopic) -> str:
     return share_text(dropped_share(topic.sent_count, topic.dropped_count))
 
 
-def page_description(listed: ListedPage) -> str:
+def page_description(listed_page: ListedPage) -> str:
     """Return the description of a page for screen readers."""
-    return ", ".join((page_name(listed.page), location_text(listed.page), since_text(listed)))
+    return ", ".join((page_name(listed_page.page), location_text(listed_page.page), since_text(listed_page)))
 
 
 def topic_description(topic: PageTopic) -> str:
     """Return the description of a page's topic for screen readers."""
     rate = rate_text(topic.rate_hz)
-    words = (
+    parts = (
         f"{direction_text(topic)} {topic.topic}",
         limit_text(topic),
         f"{rate}/s" if rate else "",
         bandwidth_text(topic.bytes_per_s),
         _("{share} dropped").format(share=dropped_text(topic)) if topic.dropped_count else "",
     )
-    return ", ".join(filter(None, words))
+    return ", ".join(filter(None, parts))

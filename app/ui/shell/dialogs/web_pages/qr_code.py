@@ -69,11 +69,11 @@ class QrCode(QWidget):
         )
         self.update()
 
-    def show_message(self, words: str) -> None:
+    def show_message(self, message: str) -> None:
         """Show a message that explains why there is no code."""
-        if words != self._words:
-            self._text, self._modules, self._words = "", (), words
-            self.setAccessibleName(words)
+        if message != self._words:
+            self._text, self._modules, self._words = "", (), message
+            self.setAccessibleName(message)
             self.update()
 
     def sizeHint(self) -> QSize:
@@ -92,14 +92,14 @@ class QrCode(QWidget):
         painter.end()
 
     def _paint_code(self, painter: QPainter) -> None:
-        theme, whole = self._theme, QRectF(self.rect())
-        paint.box(painter, whole, theme.radius("panel"), Qt.GlobalColor.white, theme.colour("borderStrong"))  # type: ignore[arg-type]
+        theme, rect = self._theme, QRectF(self.rect())
+        paint.box(painter, rect, theme.radius("panel"), Qt.GlobalColor.white, theme.colour("borderStrong"))  # type: ignore[arg-type]
         ratio = painter.device().devicePixelRatioF()
         count = len(self._modules) + 2 * QUIET_ZONE
         side = (
-            max(1, math.floor(whole.width() * ratio / count)) / ratio
+            max(1, math.floor(rect.width() * ratio / count)) / ratio
         )  # whole pixels, since cameras need sharp edges
-        left = round((whole.width() - side * len(self._modules)) / 2 * ratio) / ratio
+        left = round((rect.width() - side * len(self._modules)) / 2 * ratio) / ratio
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         for row, modules in enumerate(self._modules):
             for column, is_dark in enumerate(modules):
@@ -108,16 +108,16 @@ class QrCode(QWidget):
                     painter.fillRect(square, Qt.GlobalColor.black)
 
     def _paint_message(self, painter: QPainter) -> None:
-        theme, whole = self._theme, QRectF(self.rect())
+        theme, rect = self._theme, QRectF(self.rect())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         pen = QPen(theme.colour("controlBorder"), 1)
         pen.setDashPattern([5, 4])
         painter.setPen(pen)
         painter.drawRoundedRect(
-            whole.adjusted(0.5, 0.5, -0.5, -0.5), theme.radius("panel"), theme.radius("panel")
+            rect.adjusted(0.5, 0.5, -0.5, -0.5), theme.radius("panel"), theme.radius("panel")
         )
         painter.setFont(theme.font("small"))
         painter.setPen(theme.colour("textSecondary"))
-        inside = whole.adjusted(_PADDING, _PADDING, -_PADDING, -_PADDING)
+        text_area = rect.adjusted(_PADDING, _PADDING, -_PADDING, -_PADDING)
         flags = int(Qt.AlignmentFlag.AlignCenter) | int(Qt.TextFlag.TextWordWrap)
-        painter.drawText(inside, flags, self._words)
+        painter.drawText(text_area, flags, self._words)

@@ -60,12 +60,12 @@ class WebPagesSheet(Overlay):
         window: QWidget,
         web: WebPages,
         robots: Callable[[], tuple[str, ...]],
-        say: ShowToast,
+        show_toast: ShowToast,
         open_url: Callable[[QUrl], bool] = open_externally,
     ) -> None:
         # `robots` returns the names of connected robots; `open_url` opens a page in the browser.
         super().__init__(theme, window, _("Web pages and tablets"))
-        self._web, self._say, self._open_url = web, say, open_url
+        self._web, self._say, self._open_url = web, show_toast, open_url
         self._dismissed: set[tuple[str, ...]] = set()
         self._tab_order: list[QWidget] = []
         self.access = AccessForm(theme, web)
@@ -102,7 +102,7 @@ class WebPagesSheet(Overlay):
 
     def _make_footer(self) -> None:
         theme = self.theme
-        self.command = ElidedLabel("code", "text", least=round(theme.scaled(90)))
+        self.command = ElidedLabel("code", "text", min_width=round(theme.scaled(90)))
         self.command.mode = Qt.TextElideMode.ElideRight
         self.copy_command = IconButton(theme, "copy", _("Copy the command"), size=26)
         self.copy_page = Button(theme, "", "copy")
@@ -128,14 +128,14 @@ class WebPagesSheet(Overlay):
         notice = QHBoxLayout()
         notice.setContentsMargins(_TABLE_SIDE, 0, _TABLE_SIDE, 0)
         notice.addWidget(self.notice)
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(1, 10, 1, 8)
-        whole.setSpacing(8)
-        whole.addLayout(self._header_row())
-        whole.addWidget(self._area, 1)
-        whole.addLayout(notice)
-        whole.addWidget(Separator(self.theme))
-        whole.addLayout(self._footer_row())
+        outer_column = QVBoxLayout(self)
+        outer_column.setContentsMargins(1, 10, 1, 8)
+        outer_column.setSpacing(8)
+        outer_column.addLayout(self._header_row())
+        outer_column.addWidget(self._area, 1)
+        outer_column.addLayout(notice)
+        outer_column.addWidget(Separator(self.theme))
+        outer_column.addLayout(self._footer_row())
 
     def _header_row(self) -> QHBoxLayout:
         title = QWidget()
@@ -143,9 +143,9 @@ class WebPagesSheet(Overlay):
         row.addWidget(RoleIcon(self.theme, "globe", side=20))
         row.addWidget(label(_("Web pages and tablets"), "heading", wrap=True))
         row.addWidget(self.count)
-        head = self.make_header(title)
-        head.setContentsMargins(_SIDE, 0, 10, 0)
-        return head
+        header = self.make_header(title)
+        header.setContentsMargins(_SIDE, 0, 10, 0)
+        return header
 
     def _form(self) -> QVBoxLayout:
         switches = Flow(gap=12)
@@ -178,14 +178,14 @@ class WebPagesSheet(Overlay):
         return part
 
     def _footer_row(self) -> Flow:
-        foot = Flow(gap=8)
-        foot.setContentsMargins(_SIDE, 0, _SIDE - 7, 0)
-        foot.addWidget(label(_("In a terminal:"), "small", role="textSecondary"))
-        foot.add_elastic(self.command, greedy=True)
-        foot.addWidget(self.copy_command)
-        foot.addWidget(self.copy_page)
-        foot.addWidget(self.test_page)
-        return foot
+        footer = Flow(gap=8)
+        footer.setContentsMargins(_SIDE, 0, _SIDE - 7, 0)
+        footer.addWidget(label(_("In a terminal:"), "small", role="textSecondary"))
+        footer.add_elastic(self.command, greedy=True)
+        footer.addWidget(self.copy_command)
+        footer.addWidget(self.copy_page)
+        footer.addWidget(self.test_page)
+        return footer
 
     def _connect(self) -> None:
         access, table = self.access, self.table
@@ -214,8 +214,8 @@ class WebPagesSheet(Overlay):
         return self.switch
 
     def preferred_size(self, room: QSize) -> QSize:
-        least = self._inside.minimumSizeHint().width() + _SCROLL_BAR
-        return QSize(min(room.width(), max(round(self.theme.scaled(WIDTH)), least)), room.height())
+        min_width = self._inside.minimumSizeHint().width() + _SCROLL_BAR
+        return QSize(min(room.width(), max(round(self.theme.scaled(WIDTH)), min_width)), room.height())
 
     def _geometry_at(self, top: int) -> QRect:
         window = self.covered_window()
@@ -266,45 +266,45 @@ class WebPagesSheet(Overlay):
 
     def _show_switch(self) -> None:
         web, is_foxglove = self._web, self._selected_protocol == "foxglove"
-        words = _("Let Foxglove and Lichtblick connect") if is_foxglove else _("Let web pages connect")
-        if words != self.switch.text():
-            self.switch.set_text(words)
+        text = _("Let Foxglove and Lichtblick connect") if is_foxglove else _("Let web pages connect")
+        if text != self.switch.text():
+            self.switch.set_text(text)
             self.switch.updateGeometry()
         self.switch.setChecked(self._selected_protocol in web.protocols)
         for protocol in ("rosbridge", "foxglove"):
             self.tabs.set_dot(protocol, protocol in web.protocols and web.state == "on")
         quiet = "" if is_foxglove else _("Always off when Studio starts")
-        said = web.sentence or (_("Starting…") if web.state == "starting" else quiet)
+        status_text = web.sentence or (_("Starting…") if web.state == "starting" else quiet)
         set_role(self.state, "error" if web.sentence else "textTertiary")
-        if said != self.state.text():
-            self.state.setText(said)
-            paint.show_when(self.state, bool(said))
-            self.switch.setAccessibleDescription(said)
+        if status_text != self.state.text():
+            self.state.setText(status_text)
+            paint.show_when(self.state, bool(status_text))
+            self.switch.setAccessibleDescription(status_text)
         if web.free_port:
             self.other_port.set_label(_("Use {port}").format(port=web.free_port))
         paint.show_when(self.other_port, bool(web.free_port))
 
     def _show_pages(self) -> None:
         web = self._web
-        listed, count = web.listed_pages, len(web.connected)
-        self.model.show_pages([sorted_topics(each) for each in listed])
-        words = ngettext("{count} connected", "{count} connected", count).format(count=group_digits(count))
-        self.count.set(words if count else "", "ok")
+        pages, count = web.listed_pages, len(web.connected)
+        self.model.show_pages([sorted_topics(each) for each in pages])
+        text = ngettext("{count} connected", "{count} connected", count).format(count=group_digits(count))
+        self.count.set(text if count else "", "ok")
         sums = _("{count}, {bandwidth} in total").format(
             count=group_digits(count), bandwidth=bandwidth_text(web.bytes_per_s)
         )
         self.sums.setText(sums if count else "")
-        paint.show_when(self.table, bool(listed))
-        paint.show_when(self.empty, not listed)
+        paint.show_when(self.table, bool(pages))
+        paint.show_when(self.empty, not pages)
         if web.state == "on":
-            words = (
+            text = (
                 _("No pages yet. Scan the code with a tablet, or open the test page.")
                 if self.access.qr.text
                 else _("No pages yet. Open the test page, or a page that connects to the address above.")
             )
         else:
-            words = _("Let web pages connect to see them here.")
-        self.empty.setText(words)
+            text = _("Let web pages connect to see them here.")
+        self.empty.setText(text)
 
     def _set_tab_order(self) -> None:
         # Sets the tab order to the reading order; Qt would append widgets that are created later.
@@ -324,9 +324,9 @@ class WebPagesSheet(Overlay):
         change()
         self.refresh()
 
-    def _copy(self, text: str, words: str) -> None:
+    def _copy(self, text: str, message: str) -> None:
         QGuiApplication.clipboard().setText(text)
-        self._say(words)
+        self._say(message)
 
     def _copy_address(self) -> None:
         self._copy(self._web.url, _("Copied the address"))
@@ -335,14 +335,14 @@ class WebPagesSheet(Overlay):
         if self._selected_protocol == "foxglove":
             self._copy(self._web.full_url, _("Copied the link"))
         else:
-            words = _("Copied a starter page. Paste it into a file such as page.html.")
-            self._copy(self._web.template_page(), words)
+            message = _("Copied a starter page. Paste it into a file such as page.html.")
+            self._copy(self._web.template_page(), message)
 
     def _replace_token(self) -> None:
         web, before = self._web, self._web.token
         count = web.generate_token()
         self.refresh()
-        words = ngettext(
+        message = ngettext(
             "New token. {count} page was disconnected.", "New token. {count} pages were disconnected.", count
         )
 
@@ -350,7 +350,7 @@ class WebPagesSheet(Overlay):
             if web.token and web.host:
                 self._apply(partial(web.set_token, before))
 
-        self._say(words.format(count=group_digits(count)) if count else _("New token"), _("Undo"), undo)
+        self._say(message.format(count=group_digits(count)) if count else _("New token"), _("Undo"), undo)
 
     def _disconnect(self, page_id: int) -> None:
         page = next((each for each in self._web.connected if each.id == page_id), None)
@@ -358,9 +358,9 @@ class WebPagesSheet(Overlay):
             return
         self._web.block_page(page)
         self.refresh()
-        words = _("Disconnected {page}. It is now blocked.")
+        message = _("Disconnected {page}. It is now blocked.")
         self._say(
-            words.format(page=page_name(page)),
+            message.format(page=page_name(page)),
             _("Undo"),
             lambda: self._apply(partial(self._web.unblock_page, page_id)),
         )

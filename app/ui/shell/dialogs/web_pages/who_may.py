@@ -42,30 +42,30 @@ class OriginField(TokenField):
         self._arrange()
 
     def _on_edited(self, text: str) -> None:
-        self._set_invalid(wrong=False)
+        self._set_invalid(invalid=False)
         if text.strip() and text[-1] in " ,":
             self._end_typing()
         self.changed.emit()
 
     def _end_typing(self) -> None:
-        wrong = []
-        for word in self.edit.text().replace(",", " ").split():
+        rejected = []
+        for origin in self.edit.text().replace(",", " ").split():
             try:
-                self._web.add_origin(word)
+                self._web.add_origin(origin)
             except NepError:
-                wrong.append(word)
-        self.edit.setText(" ".join(wrong))
+                rejected.append(origin)
+        self.edit.setText(" ".join(rejected))
         self.show_origins(self._web.origins)
-        self._set_invalid(wrong=bool(wrong))
+        self._set_invalid(invalid=bool(rejected))
         self.editing_finished.emit()
 
     def _remove(self, token: Token) -> None:
         self._web.set_origins([each.entry for each in self.tokens if each is not token])
         super()._remove(token)
 
-    def _set_invalid(self, *, wrong: bool) -> None:
-        self.is_wrong = wrong
-        self.set_invalid(wrong)
+    def _set_invalid(self, *, invalid: bool) -> None:
+        self.is_wrong = invalid
+        self.set_invalid(invalid)
 
 
 class _ReadOnlyRow(QWidget):
@@ -125,10 +125,10 @@ class RobotChoice(QWidget):
     def show_state(self) -> None:
         """Update the names of the allowed robots, and the check boxes of all connected or allowed robots."""
         names = self._web.robots
-        said = format_list(list(names)) if names else _("none")
-        words = _("Robots that pages can move: {robots}").format(robots=said)
-        if words != self.words.text():
-            self.words.setText(words)
+        names_text = format_list(list(names)) if names else _("none")
+        text = _("Robots that pages can move: {robots}").format(robots=names_text)
+        if text != self.words.text():
+            self.words.setText(text)
         role = "warn" if names else "text"
         set_role(self.words, role)
         self.icon.set("triangle-alert" if names else "bot", role if names else "textSecondary")
@@ -145,19 +145,19 @@ class RobotChoice(QWidget):
                 first.setFocus()
 
     def _show_boxes(self) -> None:
-        wanted = sorted({*self._robots(), *self._web.robots}, key=str.casefold)
-        for name in [each for each in self.boxes if each not in wanted]:
+        robots = sorted({*self._robots(), *self._web.robots}, key=str.casefold)
+        for name in [each for each in self.boxes if each not in robots]:
             box = self.boxes.pop(name)
             self._flow.removeWidget(box)
             box.deleteLater()
-        for name in wanted:
+        for name in robots:
             if name not in self.boxes:
                 box = self.boxes[name] = CheckBox(self._theme, name)
                 box.clicked.connect(self._apply)
                 self._flow.addWidget(box)
                 box.show()
             self.boxes[name].setChecked(name in self._web.robots)
-        self.none.setVisible(not wanted)
+        self.none.setVisible(not robots)
 
     def _apply(self) -> None:
         self._web.set_robots([name for name, box in self.boxes.items() if box.isChecked()])
@@ -175,8 +175,8 @@ class PermissionForm(QWidget):
         self.origins = OriginField(theme, web)
         self.origins_state = label("", "small", wrap=True)
         self.robots = RobotChoice(theme, web, robots)
-        said = _("Pages can read topics and publish their own. Add a robot's name here to let pages move it.")
-        self.robots_state = label(said, "small", role="textTertiary", wrap=True)
+        hint = _("Pages can read topics and publish their own. Add a robot's name here to let pages move it.")
+        self.robots_state = label(hint, "small", role="textTertiary", wrap=True)
         self._grid = grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(10)
@@ -190,11 +190,11 @@ class PermissionForm(QWidget):
         theme.changed.connect(self._measure)
         self._measure()
 
-    def _add_row(self, place: int, title: QLabel, field: QWidget, said: QLabel) -> None:
+    def _add_row(self, row: int, title: QLabel, field: QWidget, hint: QLabel) -> None:
         self._titles = [*self._titles, title]
-        self._grid.addWidget(title, place, 0, Qt.AlignmentFlag.AlignTop)
-        self._grid.addWidget(field, place, 1)
-        self._grid.addWidget(said, place + 1, 1)
+        self._grid.addWidget(title, row, 0, Qt.AlignmentFlag.AlignTop)
+        self._grid.addWidget(field, row, 1)
+        self._grid.addWidget(hint, row + 1, 1)
 
     def _measure(self) -> None:
         self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDTH)))
