@@ -24,7 +24,7 @@ from app.blocks.runtime.interrupts import without_interrupts
 from app.core.documents.document import read
 from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES, VirtualProcesses
 from app.core.robots.motion.permission import actions_by_robot, risky_actions
-from app.core.robots.stop.lines import StopTarget
+from app.core.robots.stop.channels import StopTarget
 from app.core.robots.stop.report import StopReport
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner, RunnerEvent

@@ -43,7 +43,7 @@ from nep.nodes.original import read_json as read_json
 from nep.nodes.publisher import Publisher as Publisher
 from nep.nodes.subscriber import Subscriber as Subscriber
 from nep.nodes.timer import Timer as Timer
-from nep.patterns.parameters.owned import Parameters as Parameters
+from nep.patterns.parameters.node_parameters import Parameters as Parameters
 from nep.patterns.parameters.parameter import NodeParameter as NodeParameter
 from nep.patterns.parameters.remote import RemoteParameters as RemoteParameters
 from nep.patterns.services.client import Client as Client

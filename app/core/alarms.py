@@ -20,8 +20,8 @@ from app.core.robots.stop.moved_robots import OnMoved, ignore_moved
 from app.core.robots.voices import Notes, RobotVoices
 from app.core.run.control import Runs
 from app.core.storage.atomic_file import write_atomically
-from app.core.storage.kept_file import read_stored
 from app.core.storage.settings import Settings
+from app.core.storage.user_file import read_stored
 from nep.i18n import _, format_list, lazy
 from nep.messages.message import Message
 from nep.nodes.node import Node

@@ -55,7 +55,7 @@ from app.core.robots.last_robots import LastRobots
 from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES, Launcher, LaunchFailed, VirtualProcesses
 from app.core.robots.motion.bridged_commands import BridgedCommands
 from app.core.robots.room import SessionRoom
-from app.core.robots.stop.lines import StopTarget
+from app.core.robots.stop.channels import StopTarget
 from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopCompleted
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.robots.voices import RobotVoices

@@ -18,8 +18,8 @@ from PySide6.QtCore import QEvent, QObject, QTimer, qVersion
 from PySide6.QtGui import QGuiApplication, QImage
 
 from app.core.robots.robot_link import RobotLink
-from app.core.self_test import SelfTest, bounds
-from app.core.self_test.surroundings import PICTURE
+from app.core.self_test import SelfTest, timeouts
+from app.core.self_test.environment import PICTURE
 from app.core.session import Session
 from app.ui.application import Options, run, startup_problem
 from app.ui.self_drive import SelfDrive, Step
@@ -108,7 +108,7 @@ class WindowSteps:
                 _("a screenshot of the window"),
                 lambda: None,
                 lambda: True,
-                bounds.STEP_TIMEOUTS_S["picture"],
+                timeouts.STEP_TIMEOUTS_S["picture"],
                 PICTURE.removesuffix(".png"),
                 SETTLE_S,
                 name="picture",
@@ -127,7 +127,7 @@ class WindowSteps:
             expected,
             action,
             is_visible,
-            bounds.STEP_TIMEOUTS_S[name],
+            timeouts.STEP_TIMEOUTS_S[name],
             settle_s=0.0,
             failure_reason=failure_reason,
             name=name,

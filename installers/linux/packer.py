@@ -16,7 +16,7 @@ from pathlib import Path
 
 from installers.context import APP, ROOT, Context, PackageError
 from installers.freeze import add_licences, freeze
-from installers.icons_of import ICON_SIZES, paint_icons
+from installers.icon_files import ICON_SIZES, paint_icons
 from installers.linux.film_libraries import leave_out_films
 from installers.linux.system_libraries import libc_needed, system_packages
 

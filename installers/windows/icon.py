@@ -22,6 +22,6 @@ def ico(pictures: dict[int, bytes]) -> bytes:
 
 
 def write_icon(painted: Path, name: str, target: Path) -> Path:
-    """Combine the painted images of a name (`installers.icons_of`) into an .ico file and return it."""
+    """Combine the painted images of a name (`installers.icon_files`) into an .ico file and return it."""
     target.write_bytes(ico({side: (painted / f"{name}-{side}.png").read_bytes() for side in SIDES}))
     return target

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from installers.context import APP, Context, PackageError
 from installers.freeze import add_licences, freeze
-from installers.icons_of import paint_icons
+from installers.icon_files import paint_icons
 from installers.windows.icon import write_icon
 from installers.windows.nsis import BEHAVIOUR_ICON, make_setup
 from installers.windows.version import version_resource

@@ -13,7 +13,7 @@ from typer.main import get_command, get_group
 from typer.models import CommandInfo
 
 from nep.cli.screen import print_error_message, write
-from nep.cli.typer_words import TranslatedCommand, TranslatedGroup
+from nep.cli.typer_texts import TranslatedCommand, TranslatedGroup
 from nep.errors import NepError
 from nep.i18n import _
 from nep.system.addresses import MASTER_VARIABLE, master_address

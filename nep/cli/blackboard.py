@@ -12,7 +12,7 @@ from nep.cli import interrupts
 from nep.cli.complete import complete_topic
 from nep.cli.options import JsonOption, MasterOption, check_duration
 from nep.cli.screen import UNKNOWN, TextColumn, duration, print_status, show_json, show_table
-from nep.cli.typer_words import TranslatedGroup
+from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import format_payload
 from nep.errors import NepError, NoServerError, RequestRefusedError, ServiceError
 from nep.i18n import _, lazy

@@ -22,7 +22,7 @@ from nep.cli.screen import (
     write,
 )
 from nep.cli.topic_wait import suggestion
-from nep.cli.typer_words import TranslatedGroup
+from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import service_type_text
 from nep.errors import NepError
 from nep.i18n import _, lazy

@@ -18,14 +18,14 @@ from nep.cli.json_input import decode_text, parse_json
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.publish import read_file
 from nep.cli.screen import UNKNOWN, TextColumn, print_status, show_json, show_table, write
-from nep.cli.typer_words import TranslatedGroup
+from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import encode_json, format_payload
 from nep.errors import DecodeError, MasterUnreachable, NepError, WaitTimeoutError, did_you_mean
 from nep.i18n import _, lazy
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
-from nep.patterns.parameters.owned import MSG_TYPE, parameters_topic
+from nep.patterns.parameters.node_parameters import MSG_TYPE, parameters_topic
 from nep.patterns.parameters.remote import RemoteParameters, node_with_parameters
 from nep.system.replace_file import replace_file
 from nep.text import bounded_str, escaped, shortened

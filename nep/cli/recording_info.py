@@ -18,7 +18,7 @@ from nep.text import escaped, quotable
 
 if TYPE_CHECKING:
     from nep.recordings import file_reader, reader
-    from nep.recordings.formats import figures
+    from nep.recordings.formats import message_counts
 else:  # imported on use: other commands stay fast and need no extra packages
     file_reader = lazy_module("nep.recordings.file_reader")
     reader = lazy_module("nep.recordings.reader")
@@ -78,7 +78,7 @@ def info(
         exit_if_damaged(recording)
 
 
-def _show(recording: reader.Recording, topic_figures: Mapping[str, figures.TopicStats]) -> None:
+def _show(recording: reader.Recording, topic_figures: Mapping[str, message_counts.TopicStats]) -> None:
     summary = _("{messages} messages in {time}, {size}, from {started}").format(
         messages=recording.message_count,
         time=clock_text(recording.duration_s),
@@ -153,7 +153,7 @@ def _timestamp_text(at_ns: int) -> str:
 
 
 def _row(
-    recording: reader.Recording, topic: reader.RecordedTopic, topic_figures: figures.TopicStats | None
+    recording: reader.Recording, topic: reader.RecordedTopic, topic_figures: message_counts.TopicStats | None
 ) -> tuple[str, ...]:
     duration = recording.duration_s
     return (
@@ -171,7 +171,7 @@ def _row(
 
 
 def _to_plain(
-    recording: reader.Recording, topic_figures: Mapping[str, figures.TopicStats]
+    recording: reader.Recording, topic_figures: Mapping[str, message_counts.TopicStats]
 ) -> dict[str, object]:
     file_info = recording.info
     return {

@@ -21,7 +21,7 @@ from nep.cli.recording_files import (
     selected_topics,
 )
 from nep.cli.screen import UNKNOWN, print_status, show_json, size
-from nep.cli.typer_words import TranslatedGroup
+from nep.cli.typer_texts import TranslatedGroup
 from nep.i18n import _, ngettext, number
 from nep.system.lazy_import import lazy_module
 

@@ -15,7 +15,7 @@ from nep.cli.options import JsonOption, MasterOption, check_duration
 from nep.cli.publish import read_file
 from nep.cli.screen import UNKNOWN, TextColumn, print_status, show_alerts, show_json, show_table, size, write
 from nep.cli.topic_wait import suggestion
-from nep.cli.typer_words import TranslatedGroup
+from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import convert_ids_to_text, format_payload, service_type_text
 from nep.errors import NepError
 from nep.i18n import _, lazy

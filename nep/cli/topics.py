@@ -22,7 +22,7 @@ from nep.cli.screen import (
     show_table,
 )
 from nep.cli.topic_info import find, info, show_type
-from nep.cli.typer_words import TranslatedGroup
+from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import convert_ids_to_text
 from nep.i18n import _, lazy
 from nep.protocol.graph_view import GraphView, TopicInfo

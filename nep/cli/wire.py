@@ -8,7 +8,7 @@ import typer
 
 from nep.cli.options import JsonOption
 from nep.cli.screen import console, print_error_message, print_status, show_json, write
-from nep.cli.typer_words import TranslatedGroup
+from nep.cli.typer_texts import TranslatedGroup
 from nep.i18n import _, ngettext
 from nep.system.lazy_import import lazy_module
 from nep.text import escaped

@@ -57,9 +57,9 @@ from nep.nodes.subscriber import Subscriber
 from nep.nodes.timer import Timer
 from nep.nodes.typed import MsgType, codec_of, name_of, new_subscriber, wrap_sink
 from nep.nodes.work import Callback, Work
-from nep.patterns.parameters.owned import MSG_TYPE, Parameters, parameters_topic
+from nep.patterns.parameters.node_parameters import MSG_TYPE, Parameters, parameters_topic
 from nep.patterns.parameters.remote import RemoteParameters, node_with_parameters
-from nep.patterns.services.owned import ServiceRegistry
+from nep.patterns.services.registry import ServiceRegistry
 from nep.patterns.services.service_node import ServiceNode
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, derive_id, derive_node_id

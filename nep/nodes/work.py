@@ -12,7 +12,7 @@ from nep.errors import ClosedError, DecodeError, NepError
 from nep.i18n import _
 from nep.nodes.subscriber import WAIT_SLICE_S, Subscriber
 from nep.nodes.timer import Timer, next_due
-from nep.patterns.services.owned import ServiceRegistry
+from nep.patterns.services.registry import ServiceRegistry
 from nep.system.arguments import is_coroutine_function
 
 NO_MESSAGE = object()

@@ -14,8 +14,8 @@ import orjson
 from nep.errors import RecordingError
 from nep.i18n import _
 from nep.recordings.formats.channels import ChannelDecoder, encoding_of, recorder_channel
-from nep.recordings.formats.figures import TopicCounter, changed
 from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
+from nep.recordings.formats.message_counts import TopicCounter, changed
 from nep.recordings.formats.records import RawMessage
 from nep.recordings.reader import Recording
 

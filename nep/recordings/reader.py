@@ -13,8 +13,8 @@ import orjson
 from nep.messages.message import Message
 from nep.recordings.file_reader import CACHE_BYTES, FileInfo, FileReader, RawFile
 from nep.recordings.formats.channels import ChannelDecoder, ChannelDefinition, Role
-from nep.recordings.formats.figures import TopicStats, parse_stats
 from nep.recordings.formats.index import CorruptRange
+from nep.recordings.formats.message_counts import TopicStats, parse_stats
 from nep.recordings.formats.records import RawMessage
 
 if TYPE_CHECKING:

@@ -25,8 +25,8 @@ from nep.messages.message import Message
 from nep.recordings.formats.channels import Role
 from nep.recordings.formats.compression import decompress
 from nep.recordings.formats.destination import DEFAULT_LIMITS, WriterLimits, disk_error
-from nep.recordings.formats.figures import TopicStats, parse_stats
 from nep.recordings.formats.mcap_file import ChannelTable, FileWriter
+from nep.recordings.formats.message_counts import TopicStats, parse_stats
 from nep.recordings.formats.records import (
     HEAD_BYTES,
     ChunkInfo,

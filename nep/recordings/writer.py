@@ -37,8 +37,8 @@ from nep.recordings.formats.destination import (
     WriterLimits,
     disk_error,
 )
-from nep.recordings.formats.figures import MAX_TOPICS, TopicCounter, TopicStats, changed
 from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
+from nep.recordings.formats.message_counts import MAX_TOPICS, TopicCounter, TopicStats, changed
 
 if TYPE_CHECKING:
     from typing_extensions import Self

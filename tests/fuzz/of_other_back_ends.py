@@ -15,7 +15,7 @@ from nep.backends.nanomsg.endpoints import (
     split_message,
     subscriber_topic_part,
 )
-from nep.backends.ros import carried, definition
+from nep.backends.ros import definition, type_mapping
 from nep.backends.ros.address import ros_master_address
 from nep.backends.ros2.names import (
     dds_topic,
@@ -195,7 +195,7 @@ def carried_by_ros(data: bytes) -> None:
         ("image", "sensor_msgs/CompressedImage"),
         ("image", "sensor_msgs/Image"),
     ):
-        reader = carried.unpacker_for(msg_type, kind, "")
+        reader = type_mapping.unpacker_for(msg_type, kind, "")
         try:
             body, extension = reader.unpack(memoryview(data))
         except (WireError, struct.error) as error:

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from installers.context import Context, PackageError
-from installers.icons_of import ICON_SIZES
+from installers.icon_files import ICON_SIZES
 from installers.linux import packer
 from installers.linux.system_libraries import libc_needed, system_packages
 from installers.package import SUMS, write_sums

@@ -13,7 +13,7 @@ import nep
 from nep.cli import log as log_command
 from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, LOG_TOPIC, LOG_TYPE, LogRecord
-from nep.patterns.parameters.owned import parameters_topic
+from nep.patterns.parameters.node_parameters import parameters_topic
 from nep.programs.alarms.rule import NUMBER_KINDS, VALUE_KINDS
 from nep.programs.blackboard.server import BlackboardServer
 from nep.programs.bridges.trail import TRAIL_KEY

@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from app.blocks.model.block import Block, RobotUse
 from app.blocks.model.category import Category, Group, ToolboxEntry
 from app.blocks.model.fields import ChoiceField, LiveField, NumberField, robot_field
-from app.blocks.model.robot_text import BlockTemplate, about, block_type_of, field_of, input_of
-from app.blocks.model.robot_words import (
+from app.blocks.model.robot_keywords import (
     CHANGE_SEARCH_WORDS,
     PASS_SEARCH_WORDS,
     action_search_words,
     bilingual_search_words,
     sensor_search_words,
 )
+from app.blocks.model.robot_text import BlockTemplate, about, block_type_of, field_of, input_of
 from app.robots.description.description import Action, Event, Robot, Sensor
 from app.robots.description.json_access import display_text, names
 from nep.i18n import _, pgettext, translate

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from app.blocks.compiler.conflicts import ConflictFinder
-from app.blocks.compiler.loose_ends import NameUsage
 from app.blocks.compiler.lowering import END_BLOCK, Function, Lowering
 from app.blocks.compiler.problems import ProblemCollector
 from app.blocks.compiler.render import render_instrumented, render_source
+from app.blocks.compiler.unused_names import NameUsage
 from app.blocks.model.block import Block
 from app.blocks.model.block_text import block_text
 from app.blocks.model.fields import (

@@ -16,7 +16,6 @@ from app.blocks.runtime.publishing import PublishGuard
 from app.robots import rize
 from app.robots.description.description import Robot
 from app.robots.heartbeat import Heartbeat
-from app.robots.held_messages import PendingMessages
 from app.robots.identity import (
     Senders,
     first_announcer,
@@ -25,6 +24,7 @@ from app.robots.identity import (
     stop_error_text,
     subscriber_nodes,
 )
+from app.robots.message_buffer import PendingMessages
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message

@@ -13,7 +13,7 @@ from app.core.network.graph_changes import UNNAMED_PREFIX
 from app.core.network.nodes import NodeEntry
 from app.core.network.source import NODE_NAME
 from app.core.network.topics import Topic, key_of
-from app.core.network.web_words import PageNode
+from app.core.network.web_texts import PageNode
 from app.core.networks.kinds import find_kind
 from nep.protocol.graph_view import ServiceInfo
 from nep.protocol.topic_pattern import is_pattern, matches

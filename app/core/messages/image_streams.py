@@ -12,8 +12,8 @@ from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
+from app.core.messages.image_style import PLAIN, PictureLook
 from app.core.messages.picture import Picture, Size, decode, reuse_picture
-from app.core.messages.picture_look import PLAIN, PictureLook
 from app.core.network.watches import WatchHandle
 from nep.i18n import _
 from nep.messages.message import Message

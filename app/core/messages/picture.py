@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from app.core.messages.picture_look import (
+from app.core.messages.image_style import (
     PLAIN,
     ColourScale,
     PictureLook,

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from app.core.network.topics import key_of
-from nep.patterns.parameters.owned import parameters_topic
+from nep.patterns.parameters.node_parameters import parameters_topic
 from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView, NodeInfo
 
 GONE_DISPLAY_S = 10.0

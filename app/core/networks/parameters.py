@@ -23,7 +23,7 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.node import Node
-from nep.patterns.parameters.owned import parameters_topic
+from nep.patterns.parameters.node_parameters import parameters_topic
 from nep.patterns.parameters.remote import RemoteParameters
 from nep.text import bounded_str
 

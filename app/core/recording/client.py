@@ -24,7 +24,7 @@ from app.core.alerts import Alerts
 from app.core.own_process import module_command
 from nep.i18n import _, ngettext
 from nep.masters.process import NO_CONSOLE
-from nep.recordings.formats.figures import TopicStats, parse_stats
+from nep.recordings.formats.message_counts import TopicStats, parse_stats
 
 LOW_DISK_BYTES = 1_000_000_000
 """Free disk space in bytes below which the user is warned. The recorder itself stops at 200 MB."""

@@ -11,16 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.core.alerts import Alerts
-from app.core.recording.choice import (
-    RecordingChoice,
-    RingSettings,
-    choice_to_json,
-    file_stem,
-    free_path,
-    parse_choice,
-    parse_ring_settings,
-    ring_settings_to_json,
-)
 from app.core.recording.client import (
     RecorderClient,
     RecorderEvent,
@@ -30,6 +20,16 @@ from app.core.recording.client import (
     StartRecorder,
 )
 from app.core.recording.events import RecordedEvents
+from app.core.recording.topic_choice import (
+    RecordingChoice,
+    RingSettings,
+    choice_to_json,
+    file_stem,
+    free_path,
+    parse_choice,
+    parse_ring_settings,
+    ring_settings_to_json,
+)
 from app.core.storage.settings import Settings, data_home
 from app.errors import SettingsError
 from nep.i18n import _

@@ -10,7 +10,8 @@ from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.core.robots.announcements import Announcements, Claim, RizeNames
 from app.core.robots.command_publishers import CommandPublishers, Submit, close_publishers
-from app.core.robots.known import KnownRobots
+from app.core.robots.invocations import ManualInvocations
+from app.core.robots.known_robots import KnownRobots
 from app.core.robots.motion.gate import MotionGate, MovableRobots
 from app.core.robots.motion.permission import MayNotMoveError, MotionPermission
 from app.core.robots.own_messages import OwnMessageFilter, decode_mapping
@@ -24,11 +25,10 @@ from app.core.robots.robot_link import (
     topics_of,
 )
 from app.core.robots.robot_messages import RobotMessages
-from app.core.robots.stop.lines import MAX_TOPICS, StopTarget
+from app.core.robots.stop.channels import MAX_TOPICS, StopTarget
 from app.core.robots.stop.moved_robots import MovedRobots
 from app.core.robots.stop.reach import targets_of, unlisted_targets
 from app.core.robots.stop.report import STOPPING_DISPLAY_DELAY_S, StopReport
-from app.core.robots.tries import ManualInvocations
 from app.core.storage.settings import Settings
 from app.errors import AppError, RobotInputError, UnknownRobotError
 from app.robots import rize

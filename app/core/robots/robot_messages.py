@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from app.core.network.mailbox import Batch
+from app.core.robots.invocations import ManualInvocations
 from app.core.robots.own_messages import OwnMessageFilter, decode_mapping
 from app.core.robots.robot_link import FINAL_STATES, Payload, RobotLink
 from app.core.robots.stop.moved_robots import MovedRobots
-from app.core.robots.tries import ManualInvocations
 from app.robots import rize
-from app.robots.held_messages import PendingMessages
 from app.robots.identity import is_may_move_error, safe_error_text, stop_error_text
+from app.robots.message_buffer import PendingMessages
 from nep.i18n import _
 from nep.messages.message import Message
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from app.blocks.model.program import Program
 from app.blocks.model.workspace import saved_blocks
-from app.core.run.wanted import RequestedRun
+from app.core.run.requests import RequestedRun
 from app.core.storage import deep_json
 
 _CONTENT_KEYS = ("type", "fields", "inputs", "extraState", "enabled", "disabledReasons")

@@ -25,10 +25,11 @@ from app.core.run.asking import OpenQuestion
 from app.core.run.block_errors import BlockErrors
 from app.core.run.edits_since_run import EditsSinceRun
 from app.core.run.program_robots import ProgramRobots, owners_of
+from app.core.run.requests import OpenBehaviours, RequestedRun
 from app.core.run.run_warnings import RunWarnings
 from app.core.run.runner import Runner, RunnerEvent
 from app.core.run.stop_job import stop_program, stop_robot
-from app.core.run.stop_news import StopReporter
+from app.core.run.stop_reports import StopReporter
 from app.core.run.trial import Trial, TriedValue
 from app.core.run.view import (
     RunState,
@@ -37,7 +38,6 @@ from app.core.run.view import (
     result_text,
     view_of,
 )
-from app.core.run.wanted import OpenBehaviours, RequestedRun
 from app.errors import AppError
 from nep.i18n import _
 

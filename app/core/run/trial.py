@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Program
 from app.core.documents.document import Document
-from app.core.run.wanted import RequestedRun
+from app.core.run.requests import RequestedRun
 from app.robots.description.description import Robot
 from nep.i18n import _
 

@@ -15,9 +15,9 @@ from typing import TextIO
 
 import psutil
 
-from app.core.self_test import bounds
+from app.core.self_test import timeouts
+from app.core.self_test.environment import CRASH, REPORT, TestEnvironment, remove_home
 from app.core.self_test.report import Report
-from app.core.self_test.surroundings import CRASH, REPORT, TestEnvironment, remove_home
 from nep.i18n import _, format_list
 
 FAILED_EXIT_CODE = 1
@@ -31,15 +31,15 @@ class SelfTest:
     def __init__(self, environment: TestEnvironment, info: dict[str, object]) -> None:
         # Starts the watchdog: from now on the process ends in time, whatever its threads do.
         self.place = environment
-        self.report = Report(environment.path(REPORT), {**info, "bound_s": bounds.TOTAL_TIMEOUT_S})
+        self.report = Report(environment.path(REPORT), {**info, "bound_s": timeouts.TOTAL_TIMEOUT_S})
         self._changed = threading.Condition()
-        self._all_until = time.monotonic() + bounds.TOTAL_TIMEOUT_S
+        self._all_until = time.monotonic() + timeouts.TOTAL_TIMEOUT_S
         self._step_until = self._all_until
         self._awaited = ""
         self._crash: TextIO = environment.path(CRASH).open("w", encoding="utf-8")
         faulthandler.enable(self._crash)
         # This second watchdog needs neither Python code nor the GIL; it writes the stack of all threads.
-        last_s = bounds.TOTAL_TIMEOUT_S + 2 * bounds.GRACE_S
+        last_s = timeouts.TOTAL_TIMEOUT_S + 2 * timeouts.GRACE_S
         faulthandler.dump_traceback_later(last_s, exit=True, file=self._crash)
         threading.Thread(target=self._watch, name="self-test watch", daemon=True).start()
 
@@ -49,12 +49,12 @@ class SelfTest:
         """Start a step.
 
         Args:
-            name: Name of the step, a key of `bounds.STEP_TIMEOUTS_S`.
+            name: Name of the step, a key of `timeouts.STEP_TIMEOUTS_S`.
             description: Expected result, as a sentence for the report.
         """
-        bound_s = bounds.STEP_TIMEOUTS_S[name]
+        bound_s = timeouts.STEP_TIMEOUTS_S[name]
         self.report.start_step(name, description, bound_s)
-        self._wait_until(time.monotonic() + bound_s + bounds.GRACE_S, description)
+        self._wait_until(time.monotonic() + bound_s + timeouts.GRACE_S, description)
 
     def record_success(self, details: str = "") -> None:
         """Record that the current step has succeeded.
@@ -107,7 +107,7 @@ class SelfTest:
         if not self.report.failure:
             logging.shutdown()  # the log file is in the folder too, and Windows can't delete an open file
             remove_home(self.place)
-        self._wait_until(time.monotonic() + bounds.EXIT_TIMEOUT_S, _("the end of the process"))
+        self._wait_until(time.monotonic() + timeouts.EXIT_TIMEOUT_S, _("the end of the process"))
 
     # -- processes ----------------------------------------------------------------------------------------
 
@@ -126,7 +126,7 @@ class SelfTest:
         for process in masters:
             with suppress(psutil.Error):
                 process.terminate()
-        _gone, alive = psutil.wait_procs(family, timeout=bounds.STEP_TIMEOUTS_S["processes"])
+        _gone, alive = psutil.wait_procs(family, timeout=timeouts.STEP_TIMEOUTS_S["processes"])
         if alive:
             names = format_list([f"{process.pid} ({' '.join(command(process)[:4])})" for process in alive])
             self.fail(_("These processes didn't exit: {names}").format(names=names))
@@ -144,7 +144,7 @@ class SelfTest:
     def _watch(self) -> None:
         with self._changed:
             while (
-                remaining_s := min(self._step_until, self._all_until + bounds.GRACE_S) - time.monotonic()
+                remaining_s := min(self._step_until, self._all_until + timeouts.GRACE_S) - time.monotonic()
             ) > 0:
                 self._changed.wait(remaining_s)
             awaited = self._awaited

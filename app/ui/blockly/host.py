@@ -21,7 +21,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app import resources
 from app.core.reports.crash import crash_extra
 from app.ui.blockly.bridge import BlocklyBridge, Json
-from app.ui.blockly.held_keys import KeyBuffer
+from app.ui.blockly.key_buffer import KeyBuffer
 from app.ui.blockly.scheme import PAGE_URL, SCHEME, RequestBlocker, SchemeHandler, register_scheme
 from app.ui.widgets.keyboard import focus_proxy, is_keyboard_navigation
 from nep import i18n

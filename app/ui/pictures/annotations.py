@@ -8,7 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF, QTransform
 
 from app.core.messages.annotations import AnnotationShape, Colour
-from app.core.messages.picture_look import ColourScale
+from app.core.messages.image_style import ColourScale
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import number

@@ -30,7 +30,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets.buttons import Button, StopButton
 from app.ui.widgets.keyboard import is_keyboard_navigation
-from app.ui.widgets.letters import key_of, mnemonic_positions, strip_mnemonic
+from app.ui.widgets.mnemonics import key_of, mnemonic_positions, strip_mnemonic
 from app.ui.widgets.paint import RIGHT, box, text_line, width_of
 
 MASKED_PLATFORMS = frozenset({"xcb"})

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 from nep.backends.connection import Direct
 from nep.backends.deadlines import Deadlines
-from nep.backends.nanomsg.answering import REPLY_TIMEOUT_S, NanomsgServer
-from nep.backends.nanomsg.calling import NanomsgClient
+from nep.backends.nanomsg.client import NanomsgClient
 from nep.backends.nanomsg.direct import attach, dial
 from nep.backends.nanomsg.library import listen, new_socket
+from nep.backends.nanomsg.server import REPLY_TIMEOUT_S, NanomsgServer
 from nep.backends.nanomsg.surveys import NanomsgSurveyor
 from nep.backends.services import ClientSpec, ServerSpec
 from nep.errors import ClosedError

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from nep.backends.connection import Direct
-from nep.backends.nanomsg.answering import close_context, receive
 from nep.backends.nanomsg.direct import attach
 from nep.backends.nanomsg.library import load_pynng, new_socket, prevent_finalization
+from nep.backends.nanomsg.server import close_context, receive
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_call_limits
 from nep.backends.zeromq.sockets import wait_until
 from nep.errors import ClosedError, NepError

@@ -5,7 +5,7 @@ See docs/ros.md. Modules:
 - `library`: loading of rospy
 - `process`: the single ROS node of this process
 - `master`: client for the ROS master
-- `definition`, `carried`: conversion of ROS messages
+- `definition`, `type_mapping`: conversion of ROS messages
 - `transport`: implementation of `nep.backends.base`
 """
 
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from nep.backends.base import Backend, Transport
 from nep.backends.ros.address import ros_master_address
-from nep.backends.ros.carried import codec_of
+from nep.backends.ros.type_mapping import codec_of
 from nep.protocol.requests import NodeRecord
 
 

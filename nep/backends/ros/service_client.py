@@ -9,11 +9,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from nep.backends.ros.carried import version_error
 from nep.backends.ros.master import RosMasterUnreachable
 from nep.backends.ros.process import RosProcess
 from nep.backends.ros.service_connection import ServiceConnection
 from nep.backends.ros.service_types import NEP_CALL, ServiceType, installed_service
+from nep.backends.ros.type_mapping import version_error
 from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_call_limits
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError
 from nep.i18n import _

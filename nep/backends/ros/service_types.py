@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 
-from nep.backends.ros.carried import is_ros_type, not_installed_error
 from nep.backends.ros.definition import parse
 from nep.backends.ros.library import service_definition
+from nep.backends.ros.type_mapping import is_ros_type, not_installed_error
 from nep.backends.typed_services import CALL_REQUEST, CALL_RESPONSE, TypedService
 from nep.errors import NepError
 from nep.i18n import _

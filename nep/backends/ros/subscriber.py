@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from nep.backends.base import SubscriberSpec
-from nep.backends.ros.carried import STAMP, Unpacker, installed_definition, is_ros_type, unpacker_for
 from nep.backends.ros.graph import publisher_id
 from nep.backends.ros.process import RosProcess, RosShutdownError
+from nep.backends.ros.type_mapping import STAMP, Unpacker, installed_definition, is_ros_type, unpacker_for
 from nep.backends.waking import WakingSubscriber
 from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import DecodeError, NepError, WireError

@@ -10,7 +10,6 @@ from typing import Any
 
 from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
-from nep.backends.ros.carried import installed_definition, ros_type_of, to_ros_body
 from nep.backends.ros.graph import LocalNode, graph_view
 from nep.backends.ros.library import get_rospy
 from nep.backends.ros.master import RosMaster, RosMasterUnreachable
@@ -19,6 +18,7 @@ from nep.backends.ros.queue_room import QueueLimit
 from nep.backends.ros.service_client import RosClient
 from nep.backends.ros.service_server import RosServer
 from nep.backends.ros.subscriber import RospySubscriber
+from nep.backends.ros.type_mapping import installed_definition, ros_type_of, to_ros_body
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec, wake_on_call
 from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import ClosedError, NepError

@@ -11,7 +11,7 @@ Modules:
 """
 
 from nep.backends.base import Backend
-from nep.backends.zenoh.places import validate_address
+from nep.backends.zenoh.addresses import validate_address
 from nep.backends.zenoh.transport import ZenohTransport
 
 BACKEND = Backend(

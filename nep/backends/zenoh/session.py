@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
+from nep.backends.zenoh.addresses import open_session_at
 from nep.backends.zenoh.keys import (
     ALL_CALLS_KEY,
     ALL_TOKENS_KEY,
@@ -26,7 +27,6 @@ from nep.backends.zenoh.keys import (
     subscriber_key,
 )
 from nep.backends.zenoh.library import close_session, create_handler, load_zenoh
-from nep.backends.zenoh.places import open_session_at
 from nep.backends.zenoh.publisher import ZenohPublisher
 from nep.backends.zenoh.roster import Roster
 from nep.backends.zenoh.subscriber import ZenohSubscriber

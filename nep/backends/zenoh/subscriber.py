@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from nep.backends.base import Sink, SubscriberSpec
 from nep.backends.waking import WakingSubscriber
-from nep.backends.zenoh.early import EarlyMessages
+from nep.backends.zenoh.early_messages import EarlyMessages
 from nep.backends.zenoh.inboxes import Inboxes
 from nep.backends.zenoh.keys import topic_of
 from nep.backends.zeromq.loss import PublisherTracker

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nep.errors import NepError, RequestRefusedError, did_you_mean
 from nep.i18n import _
-from nep.patterns.parameters.owned import parameters_topic
+from nep.patterns.parameters.node_parameters import parameters_topic
 from nep.patterns.services.client import Client
 from nep.protocol.graph_view import GraphView
 from nep.text import bounded_str, escaped

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from nep.backends.base import Transport
 from nep.backends.connection import Configuration
 from nep.patterns.services.client import Client
-from nep.patterns.services.owned import ServiceRegistry
+from nep.patterns.services.registry import ServiceRegistry
 from nep.patterns.services.server import Callback, Server
 from nep.patterns.services.survey import Respondent, Surveyor
 from nep.patterns.services.typed import call_types

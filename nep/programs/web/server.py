@@ -23,10 +23,10 @@ from nep.i18n import _
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.access import Access, AuthVerifier, is_local_host, path_with_token
+from nep.programs.web.blocked_pages import BlockedPages
 from nep.programs.web.context import ConnectedPage, Rejection, RejectionKind, WebCounts
 from nep.programs.web.foxglove import SUBPROTOCOLS, ChannelFormat, FoxglovePage, is_offered
 from nep.programs.web.handshake import address_of, host_of, is_handshake, origin_of, server_origin
-from nep.programs.web.kept_out import BlockedPages
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
 from nep.programs.web.rosbridge.page import Page, authenticate
 from nep.programs.web.served_pages import PageRequest, respond

@@ -14,7 +14,7 @@ from app.core.graph.node_graph import (
 )
 from app.core.network.nodes import Nodes
 from app.core.network.topics import Topics
-from app.core.network.web_words import PageNode
+from app.core.network.web_texts import PageNode
 from nep.protocol.graph_view import (
     BRIDGES_TOPIC,
     ClientInfo,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.core.messages.picture import decode
-from app.core.messages.picture_look import (
+from app.core.messages.image_style import (
     COLOUR_MAPS,
     PLAIN,
     PictureLook,
@@ -14,6 +13,7 @@ from app.core.messages.picture_look import (
     apply_tones,
     parse_look,
 )
+from app.core.messages.picture import decode
 from nep.messages.message import Message
 
 ENCODINGS = {("uint8", 1): "mono8", ("uint16", 1): "mono16", ("uint8", 3): "bgr8"}

@@ -10,7 +10,7 @@ import pytest
 
 from app.core.network.web_page_list import GONE_DISPLAY_S, PageList
 from app.core.network.web_pages import WebPages, WebServerStarted
-from app.core.network.web_words import notices, page_name, share_text, terminal_command, web_status
+from app.core.network.web_texts import notices, page_name, share_text, terminal_command, web_status
 from nep.errors import NepError
 from nep.masters.master import master_address
 from nep.programs.web.context import PageTopic, Rejection

@@ -20,7 +20,7 @@ from app.core.networks.parameters import (
 )
 from app.core.session import Session
 from nep.masters.master import Master
-from nep.patterns.parameters.owned import parameters_topic
+from nep.patterns.parameters.node_parameters import parameters_topic
 from tests.core.waiting import tick_until
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from app.core.alerts import Alerts
-from app.core.recording.choice import RecordingChoice, RingSettings
 from app.core.recording.client import RecorderEvent, RecorderExited
 from app.core.recording.recordings import (
     CHOOSE_FOLDER_COMMAND,
@@ -18,6 +17,7 @@ from app.core.recording.recordings import (
     SessionRecordings,
     saved_file_name,
 )
+from app.core.recording.topic_choice import RecordingChoice, RingSettings
 from app.core.storage.settings import Settings
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmEvent, AlarmRule
 from tests.core.recording.test_client import OrdersOnly, status

@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 import nep
-from app.core.robots.stop.lines import StopTarget
+from app.core.robots.stop.channels import StopTarget
 from app.core.robots.stop.report import RobotStop, StopReport, unreached_result
 from app.core.robots.stop.stopper import RobotStopper
 from app.robots.description.description import RobotTopics

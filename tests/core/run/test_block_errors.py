@@ -9,7 +9,7 @@ import pytest
 
 from app.core.documents.document import Document
 from app.core.run.block_errors import BlockErrors
-from app.core.run.wanted import RequestedRun
+from app.core.run.requests import RequestedRun
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from tests.blocks.fakes import until

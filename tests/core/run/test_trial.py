@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from app.blocks.compiler.stack import Stack
 from app.core.documents.document import Document
+from app.core.run.requests import RequestedRun
 from app.core.run.trial import Trial
-from app.core.run.wanted import RequestedRun
 from tests.blocks.samples import block, robot, say, started, workspace
 
 BATTERY = Stack("bat", "value", block("robot_pepper_get_battery", "bat", ROBOT="Pepper"))

@@ -13,8 +13,8 @@ import psutil
 import pytest
 
 from app.__main__ import main
+from app.core.self_test.environment import UnwritableFolderError, prepare
 from app.core.self_test.report import Report
-from app.core.self_test.surroundings import UnwritableFolderError, prepare
 from app.core.self_test.test import is_windows_program
 
 ROOT = Path(__file__).parents[3]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nep
-from nep.backends.zenoh.early import EarlyMessages
+from nep.backends.zenoh.early_messages import EarlyMessages
 from nep.backends.zeromq.loss import EARLY_MESSAGE_WINDOW_S, PublisherTracker
 from nep.masters.master import Master
 from nep.messages.history import MAX_HISTORY_BYTES, History

@@ -16,9 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nep
-from nep.backends.ros.carried import codec_of, is_ros_type, ros_type_of, to_ros_body, unpacker_for
 from nep.backends.ros.definition import parse
 from nep.backends.ros.library import message_definition
+from nep.backends.ros.type_mapping import codec_of, is_ros_type, ros_type_of, to_ros_body, unpacker_for
 from nep.errors import WireError
 from nep.messages.encoded import Encoded
 from tests.nep.backends.ros_programs import skip_without_ros

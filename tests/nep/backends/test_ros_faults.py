@@ -10,8 +10,8 @@ import pytest
 
 import nep
 from nep.backends.ros.address import ros_master_address
-from nep.backends.ros.carried import unpacker_for
 from nep.backends.ros.queue_room import QueueLimit
+from nep.backends.ros.type_mapping import unpacker_for
 from tests.nep.backends.ros_programs import FIND_ROS, free_port, ros_master, skip_without_ros, told
 from tests.nep.programs import running
 

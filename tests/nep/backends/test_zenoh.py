@@ -16,8 +16,8 @@ import pytest
 
 import nep
 from nep.backends.zenoh import keys
+from nep.backends.zenoh.addresses import CONFIG_VARIABLE, validate_address
 from nep.backends.zenoh.library import create_handler, load_zenoh
-from nep.backends.zenoh.places import CONFIG_VARIABLE, validate_address
 from nep.backends.zenoh.rendezvous import Rendezvous, SessionEntry
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
 from tests.nep.programs import Program, eventually, running

@@ -15,8 +15,8 @@ import pytest
 from nep.errors import RecordingError
 from nep.messages.clocks import OWN_CLOCK, ClockDifference, PublisherClock
 from nep.messages.message import Message, message_kind, received_message
-from nep.recordings.formats.figures import MAX_LOST
 from nep.recordings.formats.mcap_file import FileWriter
+from nep.recordings.formats.message_counts import MAX_LOST
 from nep.recordings.reader import Recording
 from nep.recordings.repair import repair
 from nep.recordings.writer import RecordingWriter

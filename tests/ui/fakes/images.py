@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from app.core.messages import image_streams as images_module
+from app.core.messages.image_style import PictureLook
 from app.core.messages.picture import Picture
-from app.core.messages.picture_look import PictureLook
 from app.core.network.watches import Watches
 from nep.messages.message import Message
 

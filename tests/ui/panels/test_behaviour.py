@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 from app.core.documents.workspace_json import WorkspaceJson
 from app.core.reports.not_installed import ALERT_ID
 from app.ui.panels.base import Panel
-from app.ui.panels.behaviour.carried_blocks import POINTER_OFFSET, DragImage, transfer_text
+from app.ui.panels.behaviour.dragged_blocks import POINTER_OFFSET, DragImage, transfer_text
 from app.ui.panels.behaviour.panel import BehaviourPanel
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.theme.theme import Theme

@@ -20,7 +20,7 @@ from app.core.graph.walk import GraphSelection
 from app.core.network.master import MasterState
 from app.ui.panels.graph.panel import DOT_KIND, PANEL, SVG_KIND, GraphPanel
 from app.ui.panels.graph.scene import GraphScene
-from app.ui.panels.graph.words import line_width, short_rate
+from app.ui.panels.graph.texts import line_width, short_rate
 from nep.protocol.graph_view import (
     ClientInfo,
     GraphView,

@@ -10,7 +10,7 @@ from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QImage, QPainter, QTransform
 
 from app.core.messages.annotations import MAX_COORDINATE_PX, parse_shapes
-from app.core.messages.picture_look import ColourScale
+from app.core.messages.image_style import ColourScale
 from app.ui.panels.image.overlays import MAX_OVERLAYS
 from app.ui.panels.image.panel import PANEL, ImagePanel
 from app.ui.pictures.annotations import bar_image, paint_annotations, paint_colour_bar

@@ -13,7 +13,7 @@ from app.core.networks.parameters import ReportedParameter
 from app.ui.panels.nodes.panel import PANEL, NodesPanel
 from app.ui.panels.nodes.parameters import CHOICE, LINE, allowed_values_text
 from nep.messages.message import Message
-from nep.patterns.parameters.owned import parameters_topic
+from nep.patterns.parameters.node_parameters import parameters_topic
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, ServerInfo, ServiceInfo, TopicInfo
 from tests.pseudo import untranslated
 from tests.ui.clipping import clipped

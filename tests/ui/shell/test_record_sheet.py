@@ -9,9 +9,9 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.core.recording.choice import RecordingChoice, RingSettings
 from app.core.recording.client import RecorderEvent
 from app.core.recording.recordings import SessionRecordings
+from app.core.recording.topic_choice import RecordingChoice, RingSettings
 from app.ui.shell.dialogs.record import RecordSheet
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme

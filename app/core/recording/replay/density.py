@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.recording.replay.spans import RecordedSpans, spans_of
 from nep.errors import NepError, RecordingError
-from nep.recordings.formats.figures import TopicStats
+from nep.recordings.formats.message_counts import TopicStats
 from nep.recordings.reader import Recording
 
 MAX_MARKS = 2_000

@@ -10,7 +10,7 @@ from app.core.recording.opener import LocalOpener, RecordingOpener
 from nep.errors import RecordingError
 from nep.i18n import _
 from nep.recordings.bookmarks import Bookmarks
-from nep.recordings.formats.figures import TopicStats
+from nep.recordings.formats.message_counts import TopicStats
 from nep.recordings.reader import Recording
 
 MAX_TOPICS = 10_000

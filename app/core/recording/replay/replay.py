@@ -28,7 +28,7 @@ from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 from nep.recordings.bookmarks import Bookmark
 from nep.recordings.formats.damage import corruption_text
-from nep.recordings.formats.figures import TopicStats
+from nep.recordings.formats.message_counts import TopicStats
 from nep.recordings.player import SPEED_MAX, SPEED_MIN, Playback, PlayerStatus
 from nep.recordings.reader import RecordedTopic
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from app.core.robots.robot_link import RobotLink
-from app.core.robots.stop.lines import StopTarget
+from app.core.robots.stop.channels import StopTarget
 from app.core.robots.stop.moved_robots import MovedRobots
 from app.robots.description.description import Robot, RobotTopics, SafeStop, topic_of
 from app.robots.identity import identity_of, publisher_nodes, subscriber_nodes

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
-from app.core.robots.stop.lines import StopLine
+from app.core.robots.stop.channels import StopLine
 from app.core.robots.stop.report import RobotStop
 from app.robots.description.description import RobotTopics
-from app.robots.held_messages import PendingMessages
+from app.robots.message_buffer import PendingMessages
 from nep.errors import NepError
 from nep.messages.message import Message
 

@@ -15,12 +15,11 @@ from contextlib import suppress
 from functools import partial
 
 from app.core.faults import error_text
-from app.core.robots.stop.lines import StopChannel, StopLine, StopNode, StopTarget
+from app.core.robots.stop.channels import StopChannel, StopLine, StopNode, StopTarget
 from app.core.robots.stop.report import RobotStop, StopReport
 from app.core.robots.stop.request import StopRequest
 from app.robots import rize
 from app.robots.description.description import Robot, RobotTopics
-from app.robots.held_messages import PendingMessages
 from app.robots.identity import (
     Senders,
     first_announcer,
@@ -29,6 +28,7 @@ from app.robots.identity import (
     stop_error_text,
     subscriber_nodes,
 )
+from app.robots.message_buffer import PendingMessages
 from nep.errors import NepError
 from nep.i18n import _, lazy, ngettext
 from nep.messages.message import Message

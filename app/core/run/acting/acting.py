@@ -35,8 +35,8 @@ from app.core.run.acting.shelf import (
 )
 from app.core.run.acting.templates import is_editable, is_plain_text
 from app.core.storage.atomic_file import write_atomically
-from app.core.storage.kept_file import read_stored
 from app.core.storage.settings import Settings
+from app.core.storage.user_file import read_stored
 from nep.errors import NepError
 from nep.i18n import _, format_list, ngettext
 

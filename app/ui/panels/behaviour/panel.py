@@ -20,8 +20,8 @@ from app.core.reports.not_installed import MissingLibraries, alert_missing, miss
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import SettingsError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.panels.behaviour.backpack_keeper import BackpackController
-from app.ui.panels.behaviour.carried_blocks import BlockDrag
+from app.ui.panels.behaviour.backpack_storage import BackpackController
+from app.ui.panels.behaviour.dragged_blocks import BlockDrag
 from app.ui.panels.behaviour.live_values import sensor_texts
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.panels.behaviour.tab import TabState

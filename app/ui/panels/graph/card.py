@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout
 
 from app.core.graph.node_graph import DrawnNode
 from app.core.network.topics import Topic, key_of, split_key
-from app.ui.panels.graph.words import finite_or_none, percent_text, short_rate
+from app.ui.panels.graph.texts import finite_or_none, percent_text, short_rate
 from app.ui.text.nodes import cpu_text, generation_text
 from app.ui.text.numbers import age_text, bandwidth_text, group_digits, latency_text, rate_text, size_text
 from app.ui.theme.theme import Theme

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPen
 
 from app.core.graph.walk import GraphSelection
 from app.ui.panels.graph.scene import BRIDGE_END_WIDTH, GraphScene, GroupItem, LineItem, NodeItem
-from app.ui.panels.graph.words import group_note, node_icon, percent_text, quiet_text
+from app.ui.panels.graph.texts import group_note, node_icon, percent_text, quiet_text
 from app.ui.theme.icons import paint_icon
 from app.ui.widgets import paint
 

@@ -30,15 +30,14 @@ from app.core.graph.node_graph import (
 )
 from app.core.graph.walk import GraphSelection
 from app.core.network.topics import split_key
-from app.core.network.web_words import page_nodes
+from app.core.network.web_texts import page_nodes
 from app.core.storage.atomic_file import write_atomically
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.graph.canvas import GraphCanvas, GraphOverview
 from app.ui.panels.graph.card import WIDTH, CardSources, GraphCard, node_card, topic_card
 from app.ui.panels.graph.painting import paint_scene
 from app.ui.panels.graph.scene import GraphScene
-from app.ui.panels.graph.tools import GraphLegend, GraphTools
-from app.ui.panels.graph.words import (
+from app.ui.panels.graph.texts import (
     LineStats,
     counts_text,
     finite_or_none,
@@ -49,6 +48,7 @@ from app.ui.panels.graph.words import (
     node_name,
     short_rate,
 )
+from app.ui.panels.graph.tools import GraphLegend, GraphTools
 from app.ui.panels.row_actions import (
     RowAction,
     copy_action,

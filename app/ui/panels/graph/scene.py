@@ -16,7 +16,7 @@ from PySide6.QtGui import QFont, QFontMetricsF, QPainterPath, QPolygonF
 
 from app.core.graph.layout import MAX_AVOIDING_ROUTES, GraphLayout, LayoutSizes, Position
 from app.core.graph.node_graph import DrawnNode, GraphGroup, GraphLine, NodeGraph
-from app.ui.panels.graph.words import (
+from app.ui.panels.graph.texts import (
     LineStats,
     group_name,
     line_name,

@@ -11,15 +11,15 @@ from PySide6.QtGui import QAction, QGuiApplication, QImage, QKeySequence, QResiz
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.messages import snapshots
-from app.core.messages.picture_look import PLAIN, PictureLook, parse_look
+from app.core.messages.image_style import PLAIN, PictureLook, parse_look
 from app.core.networks.networks import topic_label
 from app.ui.other_programs import open_externally
 from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget, paused_blocker
 from app.ui.panels.image.actions import PictureActions
-from app.ui.panels.image.look_bar import LookBar
 from app.ui.panels.image.overlays import Overlays
 from app.ui.panels.image.point_bar import PointBar
 from app.ui.panels.image.snapshot import SnapshotJob
+from app.ui.panels.image.style_bar import LookBar
 from app.ui.pictures.boxes import boxes_in_camera, robot_of_camera
 from app.ui.pictures.clicks import ClickablePicture
 from app.ui.pictures.placement import PicturePlacement

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.series.curves import Curves, topics_of
-from app.ui.panels.plot.shown_curve import PlotCurve
+from app.ui.panels.plot.plotted_curve import PlotCurve
 from app.ui.theme.theme import Theme
 from app.ui.widgets import label
 from app.ui.widgets.buttons import LinkButton

@@ -33,7 +33,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QGraphicsView
 
 from app.core.series.samples import Polyline
-from app.ui.panels.plot.shown_curve import MINUS, PlotCurve
+from app.ui.panels.plot.plotted_curve import MINUS, PlotCurve
 from app.ui.text.numbers import seconds_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint

@@ -16,8 +16,8 @@ from PySide6.QtWidgets import QWidget
 from app.core.series.csv_export import CsvColumn, columns_of, csv_chunks
 from app.core.storage.atomic_file import write_atomically
 from app.ui.panels.base import PanelContext
-from app.ui.panels.plot.look import Stroke
-from app.ui.panels.plot.shown_curve import PlotCurve
+from app.ui.panels.plot.curve_style import Stroke
+from app.ui.panels.plot.plotted_curve import PlotCurve
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.file_dialogs import FileKind

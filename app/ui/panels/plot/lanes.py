@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 from app.core.series.states import StateRun
 from app.ui.panels.plot.canvas import PlotCanvas
-from app.ui.panels.plot.look import paint_state
-from app.ui.panels.plot.shown_curve import PlotCurve
+from app.ui.panels.plot.curve_style import paint_state
+from app.ui.panels.plot.plotted_curve import PlotCurve
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint

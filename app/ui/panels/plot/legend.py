@@ -10,8 +10,8 @@ from PySide6.QtGui import QKeyEvent
 from app.core.series.curves import Curves
 from app.core.series.formula import FieldSource
 from app.core.series.samples import RangeStats
-from app.ui.panels.plot.look import COLOUR_NAMES, CurveLook, Stroke
-from app.ui.panels.plot.shown_curve import MINUS, PlotCurve, number_text, value_text
+from app.ui.panels.plot.curve_style import COLOUR_NAMES, CurveLook, Stroke
+from app.ui.panels.plot.plotted_curve import MINUS, PlotCurve, number_text, value_text
 from app.ui.text.numbers import group_digits, seconds_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu

@@ -26,7 +26,7 @@ from app.ui.panels.plot.export import CSV_KIND, PNG_KIND, SVG_KIND, PlotExport
 from app.ui.panels.plot.lanes import StateLanes
 from app.ui.panels.plot.legend import LegendStats, LegendTable, caption_text, columns, next_look
 from app.ui.panels.plot.pace import DrawThrottle
-from app.ui.panels.plot.shown_curve import PlotCurve, parse_look
+from app.ui.panels.plot.plotted_curve import PlotCurve, parse_look
 from app.ui.panels.plot.time_view import SPANS, TimeView
 from app.ui.panels.plot.tools import PlotTools
 from app.ui.panels.plot.xy_canvas import XYCanvas

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app.core.messages.reader import LARGE_BYTES, read
 from app.core.series.field_path import PlottableField, complete, fields_of
 from app.core.series.formula import FUNCTIONS, WINDOW_FUNCTIONS, FieldSource
-from app.ui.panels.plot.shown_curve import value_text
+from app.ui.panels.plot.plotted_curve import value_text
 from app.ui.panels.plot.time_view import SPANS
 from app.ui.text import plain
 from app.ui.theme.theme import Theme

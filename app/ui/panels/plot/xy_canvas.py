@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QGraphicsView
 from app.core.series.calculated import held_values
 from app.core.series.samples import Floats
 from app.ui.panels.plot.canvas import FLAG_SIZE, MAX_ABS_VALUE, ValueAxis
-from app.ui.panels.plot.shown_curve import PlotCurve
+from app.ui.panels.plot.plotted_curve import PlotCurve
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import _

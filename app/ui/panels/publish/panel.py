@@ -23,8 +23,8 @@ from app.ui.panels.row_actions import RowAction, fill_menu
 from app.ui.text.numbers import group_digits, rate_text
 from app.ui.widgets import Button, EmptyAction, EmptyState, label
 from app.ui.widgets.inputs.fields import FilterField
-from app.ui.widgets.lists.list_beside import ListDetailView
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
+from app.ui.widgets.lists.split_list import ListDetailView
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.paint import show_when
 from nep.errors import NepError

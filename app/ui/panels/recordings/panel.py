@@ -14,13 +14,13 @@ from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.messages.picture import Picture
-from app.core.recording.choice import file_stem
-from app.core.recording.choice import free_path as free
 from app.core.recording.exporting import RecordingExport
 from app.core.recording.film_strip import FilmStripPreview, film_strip
 from app.core.recording.folder import FolderScan, RecordingFolder, RecordingInfo, read_picture
 from app.core.recording.opener import RecordingOpener
 from app.core.recording.recordings import FOLDER_KEY
+from app.core.recording.topic_choice import file_stem
+from app.core.recording.topic_choice import free_path as free
 from app.ui.other_programs import open_externally
 from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.recordings.columns import THUMBNAIL_SIZE, columns, crop_to_thumbnail

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.core.robots.awaited import awaited_values
+from app.core.robots.awaited_values import awaited_values
 from app.errors import SettingsError, UnknownRobotError
 from app.robots.description.description import Event
 from app.robots.virtual.room import Ball, Box, Room

@@ -13,7 +13,7 @@ from app.errors import InputProblem
 from app.robots.description.description import Action
 from app.ui.panels.robots.controls.chooser import ImageSource
 from app.ui.panels.robots.form import ActionForm
-from app.ui.panels.robots.tries import (
+from app.ui.panels.robots.invocations import (
     TryList,
     output_text,
     progress_of,

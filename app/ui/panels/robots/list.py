@@ -23,7 +23,7 @@ from nep.i18n import _
 
 if TYPE_CHECKING:
     from app.core.robots.fleet import Fleet
-    from app.core.robots.known import KnownRobot
+    from app.core.robots.known_robots import KnownRobot
     from app.core.robots.robot_link import RobotLink
 
 TURTLE_KIND = "diffdrive"

@@ -14,7 +14,7 @@ from app.core.run.acting.json_text import JsonText, format_json, parse_json_text
 from app.ui.panels.armed_strip import ArmDurationMenu, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.row_actions import RowAction, copy_action, fill_menu
-from app.ui.panels.services.answer import ReplyView, clock_text, duration_cell
+from app.ui.panels.services.reply_view import ReplyView, clock_text, duration_cell
 from app.ui.panels.services.request_form import RequestForm
 from app.ui.panels.services.service_list import ServiceList, count_text, offered_services
 from app.ui.text import plain
@@ -32,8 +32,8 @@ from app.ui.widgets import (
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.inputs.json_edit import JsonEdit
-from app.ui.widgets.lists.list_beside import ListDetailView
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
+from app.ui.widgets.lists.split_list import ListDetailView
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView

@@ -13,8 +13,8 @@ from PySide6.QtWidgets import QAbstractButton, QMenuBar, QWidget
 from app.ui.shell.actions.command import Command, UnknownCommandError
 from app.ui.theme.theme import Theme
 from app.ui.widgets import assign_command
-from app.ui.widgets.letters import with_mnemonics
 from app.ui.widgets.menus import Menu
+from app.ui.widgets.mnemonics import with_mnemonics
 from nep.i18n import _
 
 STOP_COMMAND = "run.stop"

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QMenuBar, QWidget
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.letters import strip_mnemonic
+from app.ui.widgets.mnemonics import strip_mnemonic
 
 
 class _AltKeyFilter(QObject):

@@ -11,7 +11,7 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.network.remote_access import access_status
-from app.core.network.web_words import host_text, web_status
+from app.core.network.web_texts import host_text, web_status
 from app.core.recording.replay.scale import clock_text, date_text
 from app.core.robots.health_facts import has_reported, health_items
 from app.core.robots.robot_link import STOPPING

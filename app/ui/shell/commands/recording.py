@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from app.core.network.topics import split_key
-from app.core.recording.choice import RecordingChoice
+from app.core.recording.topic_choice import RecordingChoice
 from app.core.session import Session
 from app.ui.shell.commands.shell import Shell
 from app.ui.text.numbers import length_text, size_text

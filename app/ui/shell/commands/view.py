@@ -16,7 +16,7 @@ from PySide6.QtGui import QAction
 
 from app import resources
 from app.core.faults import log_folder
-from app.core.recording.choice import file_stem
+from app.core.recording.topic_choice import file_stem
 from app.core.session import Session
 from app.core.storage.atomic_file import read_regular_file, write_atomically
 from app.ui.other_programs import open_externally

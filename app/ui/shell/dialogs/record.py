@@ -10,7 +10,8 @@ from PySide6.QtCore import QPoint, QRect, QSize, Qt, QTimer
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QScrollArea, QVBoxLayout, QWidget
 
 from app.core.network.topics import Topic
-from app.core.recording.choice import (
+from app.core.recording.client import LOW_DISK_BYTES
+from app.core.recording.topic_choice import (
     MAX_GB,
     MAX_MINUTES,
     MAX_S,
@@ -19,7 +20,6 @@ from app.core.recording.choice import (
     MIN_S,
     RecordingChoice,
 )
-from app.core.recording.client import LOW_DISK_BYTES
 from app.ui.shell.dialogs.overlay import EDGE_MARGIN, Overlay
 from app.ui.text.numbers import age_text, bandwidth_text, group_digits, length_text, rate_text, size_text
 from app.ui.theme.theme import Theme

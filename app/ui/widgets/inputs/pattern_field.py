@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.core.recording.choice import EXCLUDE_KEYWORD, parse_patterns
+from app.core.recording.topic_choice import EXCLUDE_KEYWORD, parse_patterns
 from app.ui.widgets.inputs.token_field import Token, TokenField
 from nep.i18n import _
 

@@ -21,7 +21,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import cast
 
-from nep.backends.ros import carried
+from nep.backends.ros import type_mapping
 from nep.errors import DecodeError, EncodeError, NepError
 from nep.i18n import _
 from nep.messages import image_codec
@@ -134,12 +134,12 @@ def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
         return _image_bytes(message, _RAW_IMAGE_TYPE if as_pixels else _COMPRESSED_IMAGE_TYPE)
     if message.codec in {"string", "bytes"}:
         ros_type = _ROS_TYPES[message.codec]
-        return carried.to_ros_body(ros_type, message.codec, Encoded(bytes(message.data)))
+        return type_mapping.to_ros_body(ros_type, message.codec, Encoded(bytes(message.data)))
     definition = definition_of(bare_type(ros_type_of(message.msg_type)))
     if definition is not None and definition.name not in {JSON_TYPE, MSGPACK_TYPE}:
         return definition.encode(_with_ros1_times(message.payload))
     text = bytes(message.data) if message.codec == "json" else codec_for("json").encode(message.payload).data
-    return carried.to_ros_body(_STRING_TYPE, "json", Encoded(bytes(text)))
+    return type_mapping.to_ros_body(_STRING_TYPE, "json", Encoded(bytes(text)))
 
 
 def _image_bytes(message: Message, ros_type: str) -> bytes:
@@ -150,7 +150,7 @@ def _image_bytes(message: Message, ros_type: str) -> bytes:
         encoded = image_codec.encode(message.payload)
     elif ros_type == _RAW_IMAGE_TYPE and layout is None:
         encoded = image_codec.raw_image(message.payload)
-    body = carried.to_ros_body(ros_type, "image", encoded)
+    body = type_mapping.to_ros_body(ros_type, "image", encoded)
     stamp_ns = message.stamp_ns
     if stamp_ns is None or not 0 <= stamp_ns < 2**32 * _NS_PER_S:
         return body
@@ -225,7 +225,7 @@ def _image(fields: Mapping[str, object], ros_type: str) -> object:
     if ros_type != _RAW_IMAGE_TYPE:
         return data  # the codec reads whether it is a JPEG or a PNG
     definition = definition_of(_RAW_IMAGE_TYPE)
-    unpack = carried.unpacker_for(
+    unpack = type_mapping.unpacker_for(
         "image", _RAW_IMAGE_TYPE, full_definition_text(_RAW_IMAGE_TYPE) or ""
     ).unpack
     try:

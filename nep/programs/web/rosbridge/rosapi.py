@@ -14,7 +14,7 @@ import orjson
 from nep.errors import NepError
 from nep.i18n import _
 from nep.nodes.node import Node
-from nep.patterns.parameters.owned import parameters_topic
+from nep.patterns.parameters.node_parameters import parameters_topic
 from nep.programs.web.messages.payloads import ros_type_of
 from nep.programs.web.messages.ros_definitions import (
     JSON_TYPE,

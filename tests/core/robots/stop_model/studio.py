@@ -14,8 +14,8 @@ from app.core.network.source import GraphReceived, MasterFound
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.acting.arming import Target
 from app.core.run.acting.shelf import SavedMessage
+from app.core.run.requests import RequestedRun
 from app.core.run.runner import RunnerEvent
-from app.core.run.wanted import RequestedRun
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.errors import AppError

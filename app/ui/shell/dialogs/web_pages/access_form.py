@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from app.core.network.web_pages import WebPages
-from app.core.network.web_words import address_text
+from app.core.network.web_texts import address_text
 from app.ui.shell.dialogs.web_pages.fields import CopyField, RoleIcon
 from app.ui.shell.dialogs.web_pages.qr_code import SIDE, QrCode
 from app.ui.theme.theme import Theme

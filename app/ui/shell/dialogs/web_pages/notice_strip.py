@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Signal
 
-from app.core.network.web_words import WebNotice
+from app.core.network.web_texts import WebNotice
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, label, paint
 from app.ui.widgets.cards import AlertBox

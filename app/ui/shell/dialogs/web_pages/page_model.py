@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QObject, QPersistentModelIndex, Qt
 
 from app.core.network.web_page_list import ListedPage
-from app.core.network.web_words import page_name
-from app.ui.shell.dialogs.web_pages.page_words import page_description, topic_description
+from app.core.network.web_texts import page_name
+from app.ui.shell.dialogs.web_pages.page_texts import page_description, topic_description
 from nep.i18n import _
 
 if TYPE_CHECKING:

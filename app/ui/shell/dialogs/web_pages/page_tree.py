@@ -36,9 +36,9 @@ from PySide6.QtWidgets import (
 )
 
 from app.core.network.web_page_list import ListedPage
-from app.core.network.web_words import location_text, page_icon, page_name
+from app.core.network.web_texts import location_text, page_icon, page_name
 from app.ui.shell.dialogs.web_pages.page_model import PageTreeModel
-from app.ui.shell.dialogs.web_pages.page_words import (
+from app.ui.shell.dialogs.web_pages.page_texts import (
     direction_text,
     dropped_text,
     limit_text,

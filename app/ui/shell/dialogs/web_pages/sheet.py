@@ -11,7 +11,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from app.core.network.web_pages import WebPages, WebProtocol
-from app.core.network.web_words import notices, page_name, terminal_command
+from app.core.network.web_texts import notices, page_name, terminal_command
 from app.ui.other_programs import open_externally
 from app.ui.panels.base import ShowToast
 from app.ui.shell.dialogs.overlay import STOP_GAP, Overlay, stop_buttons_in
@@ -20,7 +20,7 @@ from app.ui.shell.dialogs.web_pages.fields import RoleIcon
 from app.ui.shell.dialogs.web_pages.notice_strip import NoticeStrip
 from app.ui.shell.dialogs.web_pages.page_model import PageTreeModel, sorted_topics
 from app.ui.shell.dialogs.web_pages.page_tree import PageTree
-from app.ui.shell.dialogs.web_pages.who_may import PermissionForm
+from app.ui.shell.dialogs.web_pages.permissions_form import PermissionForm
 from app.ui.text.numbers import bandwidth_text, group_digits
 from app.ui.theme.theme import Theme
 from app.ui.widgets import (

@@ -6,7 +6,7 @@ import datetime as dt
 from typing import TYPE_CHECKING
 
 from app.core.network.web_page_list import ListedPage, dropped_share
-from app.core.network.web_words import location_text, page_name, share_text
+from app.core.network.web_texts import location_text, page_name, share_text
 from app.ui.text.dates import clock_text
 from app.ui.text.numbers import bandwidth_text, rate_text
 from nep.i18n import _, number

@@ -9,7 +9,7 @@ from math import isfinite
 from app.core.series.curves import Curve
 from app.core.series.field_path import MISSING
 from app.core.series.formula import FieldSource
-from app.ui.panels.plot.look import CurveLook
+from app.ui.panels.plot.curve_style import CurveLook
 from app.ui.text.numbers import group_digits
 from nep.i18n import number
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.storage.kept_file import StoredFile, read_stored
+from app.core.storage.user_file import StoredFile, read_stored
 from nep.errors import NepError
 
 

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from nep.cli.app import app
-from nep.cli.typer_words import translated
+from nep.cli.typer_texts import translated
 from tests.pseudo import untranslated
 
 OURS = ("nep", "topic", "echo", "pub", "hz", "list", "root", "payload", "count", "json", "timeout", "mastr")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import nep
-from app.robots.held_messages import PendingMessages
+from app.robots.message_buffer import PendingMessages
 
 
 def message(publisher: int, seq: int = 1) -> nep.Message:

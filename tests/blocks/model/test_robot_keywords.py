@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.blocks.model.robot_words import (
+from app.blocks.model.robot_keywords import (
     CHANGE_SEARCH_WORDS,
     action_search_words,
     bilingual_search_words,

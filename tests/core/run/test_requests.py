@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.blocks.compiler.stack import Stack
 from app.core.documents.document import Document
-from app.core.run.wanted import RequestedRun
+from app.core.run.requests import RequestedRun
 from tests.blocks.samples import block, robot, say, started, workspace
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.robots.awaited import MAX_VALUES, awaited_values
+from app.core.robots.awaited_values import MAX_VALUES, awaited_values
 from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
+from app.core.robots.invocations import FIRST_REPLY_TIMEOUT_S, GRACE_S, ManualInvocations
 from app.core.robots.robot_link import MAX_PAST_INVOCATIONS, Invocation, Payload, RobotLink
-from app.core.robots.tries import FIRST_REPLY_TIMEOUT_S, GRACE_S, ManualInvocations
 from app.robots.description.description import Action, Robot, parse, thing_description
 from app.robots.turtle import ROBOT
 

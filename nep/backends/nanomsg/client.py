@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from nep.backends.deadlines import Deadlines
-from nep.backends.nanomsg.answering import close_context, join_parts, split_parts
 from nep.backends.nanomsg.library import load_pynng, prevent_finalization
+from nep.backends.nanomsg.server import close_context, join_parts, split_parts
 from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_call_limits
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
 from nep.i18n import _

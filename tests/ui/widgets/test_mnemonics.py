@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from app.ui.shell.commands.table import COMMANDS, MENUS
-from app.ui.widgets.letters import key_of, mnemonic_positions, strip_mnemonic, with_mnemonics
+from app.ui.widgets.mnemonics import key_of, mnemonic_positions, strip_mnemonic, with_mnemonics
 from nep import i18n
 
 

@@ -9,8 +9,8 @@ from math import exp, log
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
+from app.core.messages.image_style import COLOUR_MAPS, MAX_CONTRAST, PLAIN, PictureLook
 from app.core.messages.picture import Picture
-from app.core.messages.picture_look import COLOUR_MAPS, MAX_CONTRAST, PLAIN, PictureLook
 from app.robots.description.typed_number import parse_number
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, NumberEdit, ToggleButton, label

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.recording.choice import (
+from app.core.recording.topic_choice import (
     RecordingChoice,
     RingSettings,
     choice_to_json,

@@ -8,7 +8,7 @@ from PySide6.QtGui import QFocusEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 
-from app.ui.blockly.held_keys import KeyBuffer
+from app.ui.blockly.key_buffer import KeyBuffer
 
 
 class Watch(QObject):
