@@ -1,4 +1,4 @@
-"""What the benchmarks share: interleaved blocks, medians, a child to talk to, and when a run counts."""
+"""Helpers for benchmarks: interleaved blocks, medians, a child process and the check of a run's validity."""
 
 from __future__ import annotations
 
@@ -26,30 +26,30 @@ __all__ = [
 ]
 
 TRUSTED = 0.05
-"""A run counts when plain pyzmq differs from itself by no more than this."""
+"""Maximum relative difference between two measurements of plain pyzmq in a valid run."""
 
 
 class Sample(NamedTuple):
-    """What one message took: by the clock, and of all processors in both processes."""
+    """Cost of one message: wall time and CPU time of both processes."""
 
     seconds: float
     cpu_s: float
 
 
 class Child:
-    """The other process: one line asks, one line answers."""
+    """Child process with a line-based request and reply protocol."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self._process = process
 
     def write(self, line: str) -> None:
-        """Ask."""
+        """Send a request line."""
         assert self._process.stdin is not None
         self._process.stdin.write(line + "\n")
         self._process.stdin.flush()
 
     def read(self) -> str:
-        """The answer. Ends the program when the child is gone."""
+        """Return the reply line; exit if the child process has ended."""
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
@@ -57,14 +57,14 @@ class Child:
         return line.strip()
 
     def kill(self) -> None:
-        """Kill it, and wait until it is gone."""
+        """Kill the process and wait for its end."""
         self._process.kill()
         self._process.wait()
 
 
 @contextmanager
 def other_process(program: str, arguments: Sequence[str], master: str) -> Iterator[Child]:
-    """A Python process that runs `program`; killed at the end."""
+    """Context manager of a Python process that runs `program` and is killed on exit."""
     environment = {**os.environ, "NEP_MASTER": master, "PYTHONPATH": str(Path(__file__).parents[1])}
     process = subprocess.Popen(
         [sys.executable, "-c", program, *arguments],
@@ -81,7 +81,7 @@ def other_process(program: str, arguments: Sequence[str], master: str) -> Iterat
 
 
 def cpu_s() -> float:
-    """Processor time of this process so far, all threads, user and system, in seconds."""
+    """Return the user and system CPU time of all threads of this process, in seconds."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     return used.ru_utime + used.ru_stime
 
@@ -89,10 +89,10 @@ def cpu_s() -> float:
 def interleaved(
     variants: Mapping[str, Callable[[], Sample]], blocks: int, *, limit: int = 1
 ) -> dict[str, Sample]:
-    """Each variant once a block, in random order; the medians, in the order given.
+    """Measure each variant once per block, in random order; return the medians in the given order.
 
-    While "plain again" is not within `TRUSTED` of "plain", as many blocks again are added, until there are
-    `limit` times as many. What the other variants gave is not looked at for that.
+    While "plain again" differs from "plain" by more than `TRUSTED`, the same number of blocks is added,
+    up to `limit` times the number. The results of other variants do not affect this.
     """
     taken: dict[str, list[Sample]] = {name: [] for name in variants}
     for measure in variants.values():
@@ -108,12 +108,12 @@ def interleaved(
 
 
 def is_trusted(again: float) -> bool:
-    """Whether plain against itself is close enough to 1."""
+    """Return whether the ratio of the two plain measurements is close enough to 1."""
     return abs(again - 1.0) <= TRUSTED
 
 
 def medians(taken: Mapping[str, Sequence[Sample]]) -> dict[str, Sample]:
-    """The median of each column."""
+    """Return the median wall time and CPU time of each variant."""
     return {
         name: Sample(
             statistics.median(each.seconds for each in samples),
@@ -124,7 +124,7 @@ def medians(taken: Mapping[str, Sequence[Sample]]) -> dict[str, Sample]:
 
 
 def verdict(again: float) -> int:
-    """Print whether the run counts, by the ratio of plain against itself; 0 when it does, else 1."""
+    """Print whether the run is valid, from the ratio of the plain measurements; return 0 if it is, else 1."""
     counts = is_trusted(again)
     said = "this run counts" if counts else "this run does NOT count, the computer is too busy"
     print(f"plain against itself: {again:.3f}; {said} (within {TRUSTED:.0%} counts)")

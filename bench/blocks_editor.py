@@ -1,10 +1,10 @@
-"""How quick the block editor is with 1000 blocks: loading, dropping one, what is told of it, a running block.
+"""Benchmark of the block editor with 1000 blocks: load time, drop latency and CPU use during a run.
 
     python3 dev.py bench blocks_editor -- --rounds 9
 
-"20 blocks" is the same with next to nothing on the page, "1000 blocks again" tells how far to trust the rest.
-Times are medians, from what a person does until the next picture is there. Offscreen unless
-``QT_QPA_PLATFORM`` says otherwise; drawn by software when ``QT_QUICK_BACKEND=software``.
+"20 blocks" is the baseline of a nearly empty page, "1000 blocks again" shows the repeatability.
+Times are medians, from the user's input to the next painted frame. Offscreen unless ``QT_QPA_PLATFORM``
+is set; software rendering with ``QT_QUICK_BACKEND=software``.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ FRAME = """(window.benchShown = false,
 
 
 def number(value: float) -> dict[str, object]:
-    """A gap's own number."""
+    """Return a shadow block with a number for an input."""
     return {"shadow": {"type": "values_number", "fields": {"NUMBER": value}}}
 
 
 def program(blocks: int) -> dict[str, object]:
-    """That many blocks, shadows not counted: scripts of some 20, with conditions, loops, lists and sums."""
+    """Return a workspace of at least this many blocks, without shadows, in scripts of about 20 blocks."""
     tops: list[dict[str, object]] = []
     made = 0
     while made < blocks:
@@ -74,7 +74,7 @@ def program(blocks: int) -> dict[str, object]:
 
 
 def _part(made: int, last: dict[str, object]) -> tuple[int, dict[str, object]]:
-    """Four more blocks below: a wait, and an if with a comparison of the variable."""
+    """Append four blocks: a wait, and an if that compares the variable."""
     wait: dict[str, object] = {"type": "control_wait", "id": f"w{made}", "inputs": {"SECONDS": number(2)}}
     variable: dict[str, object] = {"type": "variables_get", "id": f"v{made}", "fields": {"VAR": {"id": "v"}}}
     below: dict[str, object] = {"type": "values_compare", "id": f"c{made}", "fields": {"RELATION": "<"}}
@@ -87,10 +87,10 @@ def _part(made: int, last: dict[str, object]) -> tuple[int, dict[str, object]]:
 
 
 class Bench:
-    """One page, used by a person in a hurry."""
+    """Editor page driven by scripts and mouse events without pauses."""
 
     def __init__(self) -> None:
-        """Open the page and wait until it is there."""
+        """Open the page and wait until it is ready."""
         self.view = BlocklyView()
         self.view.resize(1440, 900)
         self.view.set_definitions(editor_definitions([]))
@@ -101,7 +101,7 @@ class Bench:
         self.ask(f"(() => {{ {WATCH} return 0 }})()")
 
     def ask(self, script: str) -> object:
-        """What a script says."""
+        """Return the result of a script, or None if it has none."""
         assert self.view.web is not None
         said: list[object] = []
         loop = QEventLoop()
@@ -115,7 +115,7 @@ class Bench:
         return json.loads(str(said[0])) if said[0] else None
 
     def wait_for(self, script: str) -> None:
-        """Until a script says true."""
+        """Wait until a script returns true; exit after a timeout."""
         watch = QElapsedTimer()
         watch.start()
         while not self.ask(script):
@@ -123,7 +123,7 @@ class Bench:
                 raise SystemExit(f"it never came: {script}")
 
     def load_s(self, workspace: Mapping[str, object]) -> float:
-        """From the call until the blocks are on the screen."""
+        """Load a workspace and return the seconds until its blocks are painted."""
         began = time.perf_counter()
         self.view.load(workspace)
         loop = QEventLoop()
@@ -134,9 +134,9 @@ class Bench:
         return time.perf_counter() - began
 
     def drop_ms(self, there: bool) -> tuple[float, float]:
-        """Pull the first script's second part off, or back.
+        """Drag the second part of the first script away, or back.
 
-        Until the next picture is there, and the longest standstill.
+        Return the time from the drop to the next painted frame and the longest frame gap, in ms.
         """
         box = "document.querySelector('[data-id=w1]').getBoundingClientRect()"
         where = self.ask(f"(r => [r.left, r.top])({box})")
@@ -157,7 +157,7 @@ class Bench:
         return float(str(self.ask("window.benchDrops.at(-1)"))), float(str(self.ask("window.benchGap")))
 
     def running_share(self, seconds: float, per_s: int) -> float:
-        """Share of one core of all our processes while so many blocks a second run."""
+        """Return the CPU use of all processes in cores while ``per_s`` blocks per second are highlighted."""
         ids = [str(each) for each in range(1, 60, 4)]
         at = 0
 
@@ -187,9 +187,10 @@ def _cpu_s() -> float:
 
 
 def measured(bench: Bench, rounds: int) -> dict[str, tuple[float, float, float]]:
-    """Load, drop and standstill of each size; the sizes take turns, the large one always after the small.
+    """Return the load time (s), drop latency (ms) and longest frame gap (ms) of each size.
 
-    What is loaded after a large page pays for clearing it away.
+    Sizes alternate, a large one always after a small one, because loading includes clearing the
+    previous page.
     """
     sizes: dict[str, Mapping[str, object]] = {
         "20 blocks": program(20), "1000 blocks": program(1000),
@@ -210,7 +211,7 @@ def _middle(rows: list[tuple[float, float, float]]) -> tuple[float, float, float
 
 
 def main() -> int:
-    """Print the table; 1 when the run does not count or a goal was missed."""
+    """Print the table; return 1 if the run is not valid or misses a goal."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,13 +1,13 @@
-"""How soon Studio answers each press in the films of a person's first hour and path.
+"""Benchmark of the response times of Studio in the films of a user's first hour and path.
 
     python3 dev.py bench film -- --runs 5 --film hour_mouse
 
-Each film (an end-to-end test with real mouse or keys) is played so many times. Of each step the slowest
-answer of a run counts: from the press until its effect is painted in the window, or as the page of the editor
-tells it (Event Timing, in steps of 8 ms). Printed are the median and the smallest of these over the runs; a
-step is too slow when its median is above 200 ms. The smallest says what it costs when nothing disturbs,
-"work" how long the window's own thread was at it (least of the runs): on a busy computer only that can be
-compared.
+Each film (an end-to-end test with real mouse or keyboard input) is played several times. The slowest
+response of a step in a run is used: from the input until its effect is painted in the window, or as
+reported by the editor page (Event Timing, in steps of 8 ms). The table shows median and minimum over
+the runs; a step is too slow if its median is above 200 ms. The minimum is the cost without disturbance.
+"work" is the time that the GUI thread was busy (minimum of the runs), the only comparable value on a
+busy computer.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ TIME_S = 900.0
 
 @dataclass(frozen=True)
 class Answer:
-    """The slowest answer of a step, as a film keeps it."""
+    """Slowest response of a step, as saved by a film."""
 
     where: str
     what: str
@@ -45,14 +45,14 @@ Reactions = Mapping[str, Mapping[str, Any]]
 
 
 def films() -> dict[str, Path]:
-    """The films by their names: "hour_mouse", "path_keys"."""
+    """Return the films by name, such as "hour_mouse" and "path_keys"."""
     folder = ROOT / "tests" / "e2e"
     found = sorted((*folder.glob("test_hour_*.py"), *folder.glob("test_path_*.py")))
     return {path.stem.removeprefix("test_"): path for path in found}
 
 
 def play(film: Path, folder: Path) -> dict[str, Reactions]:
-    """Play a film; of each title what its steps took. What a failed one showed until then counts, too."""
+    """Play a film and return the response times of its steps by title, also if the film failed."""
     command = [sys.executable, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", str(film)]
     environment = {**os.environ, "NEP_FILM": str(folder)}
     done = subprocess.run(
@@ -65,7 +65,7 @@ def play(film: Path, folder: Path) -> dict[str, Reactions]:
 
 
 def table(taken: Mapping[str, Sequence[Answer]]) -> int:
-    """Print the steps, the slowest first; how many are too slow."""
+    """Print the steps, slowest first, and return how many are too slow."""
     rows = sorted(
         ((statistics.median(each.took_ms for each in answers), step) for step, answers in taken.items()),
         reverse=True,
@@ -79,7 +79,7 @@ def table(taken: Mapping[str, Sequence[Answer]]) -> int:
 
 
 def main() -> int:
-    """Print a table for each film; 1 when a run does not count or a step is too slow."""
+    """Print a table for each film; return 1 if a run is not valid or a step is too slow."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

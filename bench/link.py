@@ -1,11 +1,10 @@
-"""Two networks of their own with a link between them that has a Wi-Fi's delay, jitter and rate.
+"""Two network namespaces connected by a link with the delay, jitter and rate of Wi-Fi.
 
-The network that this process is in is one, which it must own (`unshare -rn`); the other is made. With the
-kernel's netem the link is a veth pair that netem delays. Where the kernel has no netem, a process of ours is
-the link: it reads IP packets from a TUN device of each network and writes them to the other one's when their
-time has come. So every program sees an ordinary network with its TCP, and none has to be told a thing.
+This process must run in its own network namespace (`unshare -rn`); the other one is created. With the
+kernel's netem, the link is a veth pair. Without netem, a process forwards IP packets between TUN
+devices of both namespaces after their delay. Programs see an ordinary TCP network and need no options.
 
-    python bench/link.py DELAY_MS JITTER_MS RATE_MBIT       the process that is the link
+    python bench/link.py DELAY_MS JITTER_MS RATE_MBIT       run the forwarding process
 """
 
 from __future__ import annotations
@@ -33,13 +32,13 @@ HOSTS = ("10.77.0.1", "10.77.0.2")
 OWN, OTHER = "nep-own", "nep-other"
 MTU = 1500
 QUEUE = 1000
-"""Packets that wait at each end of the link; more are dropped. netem's own default."""
+"""Maximum number of packets queued at each end of the link, as in netem; further packets are dropped."""
 TUNSETIFF, IFF_TUN, IFF_NO_PI = 0x400454CA, 0x0001, 0x1000
 
 
 @dataclass(frozen=True)
 class Wifi:
-    """What a packet meets in one direction."""
+    """Delay, jitter and rate of one direction."""
 
     delay_ms: float = 1.0
     jitter_ms: float = 0.3
@@ -48,20 +47,20 @@ class Wifi:
 
 @dataclass
 class Link:
-    """A link that is up: how it is made, and what stands before a command to run it at the other end."""
+    """Active link: its implementation, and the command prefix that runs a program at the other end."""
 
     made_by: str
     elsewhere: tuple[str, ...]
     told: dict[str, float] = field(default_factory=dict)
-    """What the process that is the link says of itself when it ends."""
+    """Statistics that the forwarding process prints at its end."""
 
 
 class LinkError(Exception):
-    """Why there is no link."""
+    """Reason why the link could not be created."""
 
 
 def why_no_networks() -> str:
-    """What is missing for networks of one's own; empty when nothing is."""
+    """Return why network namespaces are unavailable, or ""."""
     missing = [each for each in ("unshare", "nsenter", "ip") if shutil.which(each) is None]
     if missing:
         return f"networks of their own need {', '.join(missing)} (Linux: util-linux, iproute2)"
@@ -71,7 +70,7 @@ def why_no_networks() -> str:
 
 @contextmanager
 def joined(wifi: Wifi) -> Iterator[Link]:
-    """The link, in a process that has a network of its own. Raises `LinkError`."""
+    """Context manager of the link, for a process in its own network namespace. Raises `LinkError`."""
     with ExitStack() as stack:
         # The other network lives as long as a process in it, which ends with its standard input.
         holder = subprocess.Popen(["unshare", "-n", "cat"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -96,14 +95,14 @@ def joined(wifi: Wifi) -> Iterator[Link]:
 
 
 def run(*command: str) -> None:
-    """Raises `LinkError` with what the command said."""
+    """Run a command; raise `LinkError` with its error output if it fails."""
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         raise LinkError(f"'{' '.join(command)}' failed: {done.stderr.strip()[:200]}")
 
 
 def by_netem(wifi: Wifi, other_pid: int, link: Link) -> str:
-    """A veth pair that netem delays; why not, when there is none. Raises `LinkError`."""
+    """Create a veth pair with netem; return why netem is unavailable, or "". Raises `LinkError`."""
     if shutil.which("tc") is None:
         return "there is no 'tc'"
     run("ip", "link", "add", OWN, "type", "veth", "peer", "name", OTHER, "netns", str(other_pid))
@@ -119,7 +118,7 @@ def by_netem(wifi: Wifi, other_pid: int, link: Link) -> str:
 
 @contextmanager
 def by_process(wifi: Wifi, other_pid: int, link: Link) -> Iterator[None]:
-    """The link as a process of ours, which ends with its standard input. Raises `LinkError`."""
+    """Context manager of a forwarding process, which ends with its standard input. Raises `LinkError`."""
     command = [sys.executable, __file__, *map(str, (wifi.delay_ms, wifi.jitter_ms, wifi.rate_mbit))]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True) as process:
@@ -141,14 +140,14 @@ def by_process(wifi: Wifi, other_pid: int, link: Link) -> Iterator[None]:
 
 
 def tun(name: str) -> int:
-    """A TUN device's file, with packets as they are."""
+    """Open a TUN device for raw IP packets and return its file descriptor."""
     device = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)
     fcntl.ioctl(device, TUNSETIFF, struct.pack("16sH14x", name.encode(), IFF_TUN | IFF_NO_PI))
     return device
 
 
 class Way:
-    """One direction: packets wait for the rate, then for delay and jitter, and stay in their order."""
+    """One direction of the link: packets in order, delayed by rate, delay and jitter."""
 
     def __init__(self, wifi: Wifi, source: int, target: int) -> None:
         self.source, self._target = source, target
@@ -160,7 +159,7 @@ class Way:
         self.late: deque[float] = deque(maxlen=100_000)
 
     def read(self, now: float) -> None:
-        """Take all packets that are there."""
+        """Read and queue all available packets."""
         while True:
             try:
                 packet = os.read(self.source, 1 << 16)
@@ -176,7 +175,7 @@ class Way:
             self._waiting.append((self._arrives, packet))
 
     def deliver(self, now: float) -> float:
-        """Write what is due; when the next one is."""
+        """Write the packets that are due; return the time at which the next one is due."""
         while self._waiting and self._waiting[0][0] <= now:
             due, packet = self._waiting.popleft()
             self.late.append(now - due)
@@ -188,7 +187,7 @@ class Way:
 
 
 def main() -> int:
-    """Be the link until standard input ends, then tell how it went."""
+    """Forward packets until standard input ends, then print statistics."""
     wifi = Wifi(*map(float, sys.argv[1:4]))
     try:
         own, other = tun(OWN), tun(OTHER)

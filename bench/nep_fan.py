@@ -1,21 +1,21 @@
-"""One publisher to many subscribers and many publishers to one: what a delivered message costs, and the rest.
+"""Benchmark of the cost per delivered message from one publisher to many subscribers, and the reverse.
 
     python3 dev.py bench nep_fan                                 five minutes at most
     python3 dev.py bench nep_fan -- --blocks 3 --ends 1 10 50
 
-Every one of the many is a process of its own; this process is the one. What is told is the processor time
-of all of them, with all their threads, for each message that was delivered: other programs on the computer
-change it little, however late they make the messages. Variants are interleaved in random order in each block;
-the medians count when plain pyzmq against itself is within 5 %.
+Each of the many ends is a process; this process is the single end. The result is the CPU time of all
+processes and threads for each delivered message, which depends little on the load of the computer.
+Variants are interleaved in random order in each block; a run is valid if plain pyzmq differs from
+itself by at most 5 %.
 
-    out      this process publishes, each of the others receives every message
-    in       each of the others publishes, this process receives all messages
-    paced    50 a second from each publisher: nearly every message wakes who waits for it
-    burst    1000 as fast as it goes: who receives finds many waiting each time that it wakes, fewer the more
-             processes there are for each processor; so this tells of the scheduler as well
+    out      this process publishes, each other process receives every message
+    in       each other process publishes, this process receives all messages
+    paced    50 messages/s from each publisher: nearly every message wakes its receiver
+    burst    1000 messages without pause: a receiver finds several messages at each wake-up, fewer with
+             more processes per processor; the result depends on the scheduler too
 
-The whole cost of one message is fitted by a straight line over the number of ends: a + b * ends. Linear means
-that 50 ends cost no more for each delivery than 1.2 times what 10 do; that is judged of the paced messages.
+The total cost of a message is fitted by a line over the number of ends: a + b * ends. Scaling is linear
+if a delivery to 50 ends costs at most 1.2 times a delivery to 10; paced messages decide.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ SIZE = 1000
 LINEAR = 1.2
 WAIT_S = 30.0
 ROOM = 1_000_000
-"""Messages that a subscriber may keep: a burst of all fits, as it does in plain sockets without a bound."""
+"""Inbox size of a subscriber in messages: a complete burst fits, as in plain sockets without a limit."""
 WAYS, PACES = ("out", "in"), ("paced", "burst")
 COUNTS = {"burst": 1000, "paced": 50}
 PACED_HZ = 50.0
@@ -96,7 +96,7 @@ for line in sys.stdin:
 
 
 class Cell(NamedTuple):
-    """One variant: what carries, in which way, at what pace, to or from how many."""
+    """Variant: library ("nep" or "plain"), direction, pace and number of ends."""
 
     what: str
     way: str
@@ -105,7 +105,7 @@ class Cell(NamedTuple):
 
 
 class Hub:
-    """The one, in this process: a publisher, a subscriber and plain sockets for each number of ends."""
+    """Single end in this process: publisher, subscriber and plain sockets for each number of ends."""
 
     def __init__(self, node: nep.Node, context: zmq.Context[zmq.Socket[bytes]], ends: Sequence[int]) -> None:
         self._data = bytes(SIZE)
@@ -123,11 +123,11 @@ class Hub:
 
     @property
     def plain_ends(self) -> dict[int, str]:
-        """Where the plain subscribers connect, by the number of ends."""
+        """Return the endpoints for the plain subscribers, by the number of ends."""
         return {n: each.getsockopt_string(zmq.LAST_ENDPOINT) for n, each in self._plain_pubs.items()}
 
     def meet(self, plain_ends: Sequence[Mapping[str, str]]) -> None:
-        """Connect to the plain publishers of all ends; returns when everybody hears everybody."""
+        """Connect to the plain publishers of all ends and wait until all subscribers are connected."""
         for each in plain_ends:
             for number, end in each.items():
                 self._plain_subs[int(number)].connect(end)
@@ -143,7 +143,7 @@ class Hub:
             pause.wait(0.01)
 
     def do(self, cell: Cell) -> Callable[[], object]:
-        """What handles one message."""
+        """Return the function that publishes or receives one message of a variant."""
         n = cell.ends
         if cell.what == "nep":
             return (
@@ -159,24 +159,24 @@ class Hub:
 
     @property
     def lost(self) -> int:
-        """Messages that were published and did not come."""
+        """Return the number of lost messages."""
         return sum(each.lost or 0 for each in self._subs.values())
 
 
 def used_s(children: Sequence[Child]) -> float:
-    """Processor time so far of this process and these."""
+    """Return the CPU time of this process and the child processes, in seconds."""
     return cpu_s() + sum(map(float, tell(children, "cpu")))
 
 
 def tell(children: Sequence[Child], what: str) -> list[str]:
-    """Their answers to a word."""
+    """Send a request to all child processes and return their replies."""
     for each in children:
         each.write(json.dumps(what))
     return [each.read() for each in children]
 
 
 def cost(hub: Hub, children: Sequence[Child], cell: Cell) -> float:
-    """Processor time of all processes for each delivered message, in seconds."""
+    """Return the CPU time of all processes for each delivered message, in seconds."""
     count = COUNTS[cell.pace]
     active = children[: cell.ends]
     do = hub.do(cell)
@@ -201,7 +201,7 @@ def cost(hub: Hub, children: Sequence[Child], cell: Cell) -> float:
 def measure(
     hub: Hub, children: Sequence[Child], ends: Sequence[int], blocks: int, ends_at: float
 ) -> dict[tuple[str, Cell], list[float]]:
-    """Each variant once a block, for so many blocks or until the time is over; "again" is plain once more."""
+    """Measure each variant once per block until ``blocks`` or ``ends_at``; "again" repeats the plain ones."""
     cells = [Cell(*each) for each in itertools.product(("nep", "plain"), WAYS, PACES, ends)]
     variants = [(each.what, each) for each in cells] + [
         ("again", each) for each in cells if each.what == "plain"
@@ -222,7 +222,7 @@ def measure(
 
 
 def line(ends: Sequence[int], each: Sequence[float]) -> tuple[float, float]:
-    """The straight line through the whole cost of one message: what it costs anyhow, and for each end."""
+    """Fit a line to the total cost of a message; return the constant cost and the cost for each end."""
     if len(ends) < 2:
         return 0.0, each[0]
     slope, beginning = statistics.linear_regression(
@@ -232,7 +232,7 @@ def line(ends: Sequence[int], each: Sequence[float]) -> tuple[float, float]:
 
 
 def show(taken: Mapping[tuple[str, Cell], Sequence[float]], ends: Sequence[int]) -> int:
-    """Print the tables; 1 when a run does not count or is not linear."""
+    """Print the tables; return 1 if the run is not valid or scaling is not linear."""
     medians = {key: statistics.median(found) for key, found in taken.items()}
     again = []
     is_linear = True
@@ -263,12 +263,12 @@ def show(taken: Mapping[tuple[str, Cell], Sequence[float]], ends: Sequence[int])
 
 
 def words(number: int, ends: Sequence[int], plain_ends: Mapping[int, str]) -> tuple[str, ...]:
-    """What an end is told: in which numbers of ends it is, where plain messages come from, and its pace."""
+    """Return the arguments of an end: its numbers of ends, the plain endpoints and the pace."""
     return json.dumps([n for n in ends if number < n]), json.dumps(plain_ends), str(PACED_HZ)
 
 
 def main() -> int:
-    """Measure and print; 1 when the run does not count or is not linear."""
+    """Measure and print the tables; return 1 if the run is not valid or scaling is not linear."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,16 +1,17 @@
-"""How long `import nep` takes, and its names: many fresh processes of Python.
+"""Benchmark of the time to import nep and its names, in new Python processes.
 
     python bench/nep_import.py [--blocks 40]
 
-Every figure is that of a whole process beyond one that does nothing, all interleaved in random order:
+Each value is the time of a process minus that of an empty one; all are interleaved in random order:
 
-    plain       python -c pass; "plain again" is the same again and tells how far to trust the rest
-    json, zmq   `import json` and `import zmq`, to compare with
-    nep         `import nep`: its names come when the first of them is asked for
-    a name      `import nep; nep.node`: all of nep that a program with a node needs, and pyzmq with it
-    others      what nep imports that is not nep's; "all there" is both: what lies between is nep's own
+    plain       python -c pass; "plain again" repeats it and shows the repeatability
+    json, zmq   `import json` and `import zmq`, for comparison
+    nep         `import nep`, which imports its names lazily, on first use
+    a name      `import nep; nep.node`: everything that a program with a node needs, including pyzmq
+    others      the external modules that nep imports; "all there" is these and nep, the difference is
+                the cost of nep's own modules
 
-`import nep` alone could promise anything, as it puts off its work: so the names are shown, too.
+The names are measured because a lazy `import nep` alone shows little.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ LIMIT = 4
 
 
 def start(program: str) -> Callable[[], Sample]:
-    """Runs a fresh process of this Python to its end."""
+    """Return a function that measures a new Python process which runs ``program``."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-c", program]
 
@@ -59,7 +60,7 @@ def start(program: str) -> Callable[[], Sample]:
 
 
 def main() -> int:
-    """Measure and print a table; 1 when `import nep` is beyond its goal or the run does not count."""
+    """Measure and print a table; return 1 if `import nep` misses its goal or the run is not valid."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,14 +1,15 @@
-"""How long a program needs to join: a new node and its first publisher, with live and killed subscribers.
+"""Benchmark of the time to join: a new node and its first publisher, with live and killed subscribers.
 
     python bench/nep_join.py [--subscribers 10] [--rounds 40]
 
-Every subscriber is a process of its own. `Node` and `new_pub` are timed together; when `new_pub` returns, the
-first message reaches every subscriber, so nothing else has to be waited for (and that is checked here).
+Each subscriber is a process. `Node` and `new_pub` are timed together; after `new_pub`, the first
+message must reach every subscriber without further waiting, which is checked.
 
-    live       all subscribers are there
-    killed     one more was there and has just been killed (SIGKILL); the master does not know yet
-    plain      a bound XPUB of plain pyzmq that waits until as many plain subscribers in other processes have
-               connected: what processes and sockets cost without a master; "plain again" is the same again
+    live       all subscribers are alive
+    killed     one more subscriber has just been killed (SIGKILL), unnoticed by the master
+    plain      a bound XPUB socket of plain pyzmq waits for the same number of plain subscribers in
+               other processes: the cost of processes and sockets without a master; "plain again"
+               repeats it
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ for line in sys.stdin:
 
 
 def join(master: str, name: str) -> tuple[float, nep.Node, nep.Publisher]:
-    """The time that a node with its first publisher takes, in seconds, and both."""
+    """Create a node and its first publisher; return the duration in seconds and both."""
     started = time.perf_counter()
     node = nep.node(name, master=master)
     publisher = node.new_pub("join", "bytes")
@@ -53,7 +54,7 @@ def join(master: str, name: str) -> tuple[float, nep.Node, nep.Publisher]:
 
 
 def live(master: str, children: list[Child], number: int) -> float:
-    """Join with all subscribers alive; every one must get the first message."""
+    """Join with live subscribers, each of which must receive the first message; return the duration."""
     taken, node, publisher = join(master, f"joiner{number}")
     publisher.publish(f"hello {number}".encode())
     with node:
@@ -66,7 +67,7 @@ def live(master: str, children: list[Child], number: int) -> float:
 
 
 def killed(master: str, children: list[Child], number: int) -> float:
-    """Join just after one more subscriber was killed."""
+    """Join right after one more subscriber was killed; return the duration."""
     with other_process(SUBSCRIBER, (), master) as victim:
         victim.read()
         victim.kill()
@@ -74,7 +75,7 @@ def killed(master: str, children: list[Child], number: int) -> float:
 
 
 def plain(context: zmq.Context[zmq.Socket[bytes]], children: list[Child]) -> float:
-    """Bind, and wait for as many subscriptions as there are children that connect."""
+    """Return the duration of binding and receiving the subscriptions of all child processes."""
     started = time.perf_counter()
     socket = context.socket(zmq.XPUB)
     socket.setsockopt(zmq.XPUB_VERBOSE, 1)
@@ -93,7 +94,7 @@ def plain(context: zmq.Context[zmq.Socket[bytes]], children: list[Child]) -> flo
 
 
 def show(name: str, seconds: list[float]) -> float:
-    """Print a row; its median."""
+    """Print a row and return its median."""
     ordered = sorted(seconds)
     tail = ordered[min(len(ordered) - 1, round(0.95 * len(ordered)))]
     median = statistics.median(ordered)
@@ -102,7 +103,7 @@ def show(name: str, seconds: list[float]) -> float:
 
 
 def main() -> int:
-    """Measure and print a table; 1 when a median is beyond its goal or the run does not count."""
+    """Measure and print a table; return 1 if a median misses its goal or the run is not valid."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--subscribers", type=int, default=10)
     parser.add_argument("--rounds", type=int, default=40)

@@ -1,17 +1,17 @@
-"""Large messages one way, from process to process: nep, plain pyzmq and zenoh's Python in one run.
+"""Benchmark of one-way large messages between two processes: nep, plain pyzmq and zenoh's Python.
 
-    python3 dev.py bench nep_large                          raw pictures of 1080p, and bytes of four sizes
+    python3 dev.py bench nep_large                          raw 1080p images and bytes of four sizes
     python3 dev.py bench nep_large -- --sizes 1000 --blocks 60
 
-The child sends bursts that fit into every queue, so nothing may be lost; this process receives them and takes
-the time from the first message to the last. Variants are interleaved in random order; a run counts when plain
-pyzmq against itself is within 5 %.
+The child process sends bursts that fit into every queue, so no message may be lost. This process
+receives them and measures the time from the first message to the last. The variants are interleaved
+in random order. A run counts only if two series of plain pyzmq differ by at most 5 %.
 
     plain           PUB.send(copy=False), SUB.recv(copy=False), over TCP
-    nep             a publisher's `publish` and `Subscriber.listen`; large ones through shared memory
-    nep, loan       the publisher writes into `Publisher.loan` (pictures only)
-    nep, socket     the same without shared memory
-    zenoh           Session.put of bytes over TCP, a callback that takes the payload's bytes
+    nep             a publisher's `publish` and `Subscriber.listen`; large messages use shared memory
+    nep, loan       the publisher writes into `Publisher.loan` (images only)
+    nep, socket     like nep, without shared memory
+    zenoh           Session.put of bytes over TCP, and a callback that copies the payload's bytes
 """
 
 from __future__ import annotations
@@ -71,14 +71,14 @@ for line in sys.stdin:
 
 
 class Bursts:
-    """Asks `child` for bursts of `count` messages and takes the time to receive them."""
+    """Measurement of bursts of `count` messages that `child` sends on request."""
 
     def __init__(self, child: Child, count: int) -> None:
         self._child = child
         self._count = count
 
     def take(self, what: str, one: Callable[[], object]) -> Sample:
-        """One burst; `one` receives a message. The time is from the first one to the last."""
+        """Receive a burst, one message per call of `one`; return the time per message after the first."""
         self._child.write(what)
         one()
         started = time.perf_counter()
@@ -90,7 +90,7 @@ class Bursts:
 
 
 def listen(subscriber: nep.Subscriber) -> object:
-    """The next payload."""
+    """Return the next payload; exit if none arrives within 10 s."""
     is_there, payload = subscriber.listen(timeout_s=10.0)
     if not is_there:
         raise SystemExit("a message did not come")
@@ -98,20 +98,20 @@ def listen(subscriber: nep.Subscriber) -> object:
 
 
 def heard(child: Child, what: str, is_there: Callable[[], bool]) -> None:
-    """Ask for single messages until they come."""
+    """Request single messages until `is_there` is true, that is, until the subscription is established."""
     while not is_there():
         child.write(f"one {what}")
         child.read()
 
 
 def free_port() -> int:
-    """A port for zenoh, which chooses none itself."""
+    """Return a free TCP port, because zenoh can't choose one itself."""
     with zmq.Context() as context, context.socket(zmq.PUB) as socket:
         return socket.bind_to_random_port("tcp://127.0.0.1")
 
 
 def measure(size: int, count: int, blocks: int, *, is_picture: bool) -> tuple[dict[str, Sample], int]:
-    """The samples of all variants, and how many messages were lost."""
+    """Return the samples of all variants and the number of lost messages."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     plain = context.socket(zmq.SUB)
     plain.setsockopt(zmq.RCVHWM, 0)
@@ -165,7 +165,7 @@ def measure(size: int, count: int, blocks: int, *, is_picture: bool) -> tuple[di
 
 
 def show(samples: dict[str, Sample], lost: int) -> int:
-    """Print the table; 1 when the run does not count."""
+    """Print the table; return 1 if the run does not count."""
     plain = samples["plain"]
     print(f"{'':>14} {'ms each':>9} {'plain ÷ it':>11} {'zenoh ÷ it':>11}")
     for name, sample in samples.items():
@@ -177,7 +177,7 @@ def show(samples: dict[str, Sample], lost: int) -> int:
 
 
 def main() -> int:
-    """Measure and print one table for each size; 1 when a run does not count."""
+    """Measure and print one table per size; return 1 if a run does not count."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,4 +1,4 @@
-"""What logging costs: a record that is published, one that a flood leaves out, and Studio's console.
+"""Benchmark of logging: a published record, a record dropped by the rate limit, and Studio's Console.
 
 python bench/nep_logs.py
 """
@@ -23,14 +23,14 @@ BUSY = 0.05
 
 
 class Nowhere:
-    """A publisher that sends nothing."""
+    """Publisher that discards every payload."""
 
     def publish(self, payload: object) -> None:
-        """Forget it."""
+        """Discard the payload."""
 
 
 def plain() -> float:
-    """Seconds for a record into a handler that does nothing: what Python's logging itself takes."""
+    """Return the seconds per record with a null handler: the cost of Python's logging itself."""
     logger = logging.getLogger("plain")
     logger.setLevel(logging.INFO)
     logger.propagate = False
@@ -39,7 +39,7 @@ def plain() -> float:
 
 
 def published() -> float:
-    """Seconds for a record that is published, without the publishing, which is in another thread."""
+    """Return the seconds per published record, without the publishing itself, which another thread does."""
     handler = LogHandler("bench", Nowhere, rate_hz=1e9, burst=COUNT * ROUNDS)
     handler.logger.propagate = False
     taken = timed(lambda: handler.logger.info("record %d", 7))
@@ -48,7 +48,7 @@ def published() -> float:
 
 
 def left_out() -> float:
-    """Seconds for a record of a flood, which is counted and dropped."""
+    """Return the seconds per record above the rate limit, which is counted and dropped."""
     handler = LogHandler("bench", Nowhere, rate_hz=0.0, burst=0)
     handler.logger.propagate = False
     taken = timed(lambda: handler.logger.info("record %d", 7))
@@ -57,13 +57,13 @@ def left_out() -> float:
 
 
 def unread() -> float:
-    """Seconds for a record that reaches Studio while nobody looks at the Console."""
+    """Return the seconds per record that Studio receives while the Console is not displayed."""
     console, messages = Console(), records()
     return timed(lambda: console.add_messages(messages), 50) / len(messages)
 
 
 def read() -> float:
-    """Seconds for a record that reaches Studio and is decoded for the Console."""
+    """Return the seconds per record that Studio receives and decodes for the Console."""
     console = Console()
 
     def take() -> None:
@@ -74,7 +74,7 @@ def read() -> float:
 
 
 def records() -> list[Message]:
-    """A hundred records as they come from the bus."""
+    """Return a hundred encoded log messages, as received from the log topic."""
     data = (
         b'{"level":"info","text":"record 7","name":"driver","node":"Pepper","stamp_ns":1795164093412000000}'
     )
@@ -82,7 +82,7 @@ def records() -> list[Message]:
 
 
 def timed(work: Callable[[], object], count: int = COUNT) -> float:
-    """Seconds of one call: the best of the rounds, the least disturbed one."""
+    """Return the seconds per call in the fastest round, which was disturbed least."""
     rounds = []
     for _ in range(ROUNDS):
         began = time.perf_counter()
@@ -93,7 +93,7 @@ def timed(work: Callable[[], object], count: int = COUNT) -> float:
 
 
 def main() -> int:
-    """Print a table; 1 when plain against itself differs by more than 5 %: then the run does not count."""
+    """Print a table; return 1 if two plain series differ by more than 5 %, because the run does not count."""
     base, again = plain(), plain()
     print(f"{'what':<44}{'us a record':>12}{'/ plain':>9}")
     for name, taken in (

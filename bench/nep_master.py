@@ -1,18 +1,19 @@
-"""The master with many nodes: what it costs at rest, and how soon it answers `nep topic list`.
+"""Benchmark of a master with many nodes: its idle cost and the response time of `nep topic list`.
 
     python bench/nep_master.py [--nodes 500] [--topics 2000] [--seconds 10] [--rounds 30]
 
-The master is a process of its own. A second process plays the nodes: a DEALER socket each, which joins with
-its share of publishers and with a subscriber for each of another node's topics. Each renews with counters
-that grow, when a node of the library does (`RenewalTimer`): every second, or when the master says.
+The master runs in its own process. A second process simulates the nodes: each is a DEALER socket that
+joins with its share of publishers and a subscriber for each topic of another node. Each renews its
+lease with growing counters at the times a real node would (`RenewalTimer`): every second, or when the
+master requests it.
 
     at rest       processor time of the master while all nodes renew, as a share of one core
-    answer        from sending `look` to having the whole reply, by a bare socket, ten times a second
-    answer alone  the same after five seconds in which nobody asked: every counter has changed meanwhile
-    graph         `Node.graph()`: the same and the reply as values, in a program that runs already
-    topic list    the whole command `nep topic list`, with the start of Python
+    answer        time from a graph query on a bare socket to its complete reply, ten times a second
+    answer alone  the same after five seconds without a query, in which every counter has changed
+    graph         `Node.graph()`: the same plus decoding the reply, in a program that already runs
+    topic list    the whole command `nep topic list`, including the start of Python
 
-"again" is another series of the same, to tell how far to trust the rest.
+"again" is a second series of the same measurement, which shows the noise.
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ while True:
 
 
 def at_rest(process: psutil.Process, seconds: float) -> float:
-    """The master's share of one core for so long."""
+    """Return the master's share of one core over `seconds`."""
     before = process.cpu_times()
     started = time.perf_counter()
     threading.Event().wait(seconds)
@@ -129,7 +130,7 @@ def at_rest(process: psutil.Process, seconds: float) -> float:
 
 
 def times(ask: Callable[[], object], rounds: int, pause_s: float = 0.1) -> list[float]:
-    """Seconds that each of some calls took, with pauses before them, as nobody asks all the time."""
+    """Return the seconds of each of `rounds` calls, with a pause before each as in occasional queries."""
     taken = []
     never = threading.Event()
     for _ in range(rounds):
@@ -141,7 +142,7 @@ def times(ask: Callable[[], object], rounds: int, pause_s: float = 0.1) -> list[
 
 
 def looker(context: zmq.Context[zmq.Socket[bytes]], address: str) -> Callable[[], object]:
-    """Asks for the graph with a bare socket."""
+    """Return a function that queries the graph on a bare socket and returns the reply's length in bytes."""
     socket = context.socket(zmq.DEALER)
     socket.connect(f"tcp://{address}")
     body = encode_request(QueryGraph(), 1)
@@ -154,7 +155,7 @@ def looker(context: zmq.Context[zmq.Socket[bytes]], address: str) -> Callable[[]
 
 
 def command(address: str) -> None:
-    """`nep topic list`."""
+    """Run `nep topic list`."""
     root = str(Path(__file__).parents[1])
     subprocess.run(
         [sys.executable, "-m", "nep", "topic", "list"],
@@ -165,7 +166,7 @@ def command(address: str) -> None:
 
 
 def show(name: str, seconds: list[float]) -> float:
-    """Print a row; its median."""
+    """Print a row; return its median in seconds."""
     ordered = sorted(seconds)
     tail = ordered[min(len(ordered) - 1, round(0.95 * len(ordered)))]
     median = statistics.median(ordered)
@@ -174,7 +175,7 @@ def show(name: str, seconds: list[float]) -> float:
 
 
 def measure(master: Child, arguments: argparse.Namespace) -> int:
-    """Measure and print; 1 when a goal is not reached or the run does not count."""
+    """Measure and print; return 1 if a goal is missed or the run does not count."""
     address, pid = master.read().split()
     process = psutil.Process(int(pid))
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()

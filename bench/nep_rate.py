@@ -1,21 +1,21 @@
-"""1 kB messages a second from process to process: nep's native wire ÷ plain pyzmq, measured in one run.
+"""Benchmark of 1 kB messages per second between two processes: nep's native wire ÷ plain pyzmq.
 
     python bench/nep_rate.py [--messages 9000] [--blocks 30] [--limit 5]
 
-The child sends bursts that fit into every queue, so nothing may be lost; this process receives them and takes
-the time from the first message to the last. The variants are interleaved in random order; "plain again" is
-plain pyzmq against itself: a run counts only when that is within 5 %, see `blocks.py` for what is done until
-then.
+The child process sends bursts that fit into every queue, so no message may be lost. This process
+receives them and measures the time from the first message to the last. The variants are interleaved
+in random order. "plain again" is a second series of plain pyzmq: a run counts only if both differ by
+at most 5 %. `blocks.py` describes how blocks are repeated until then.
 
-    plain           one part of 1000 bytes: PUB.send, SUB.recv as bytes; nobody counts, checks or decodes
-    plain, local    the same over a Unix socket, as nep goes on one computer where it can
-    plain, 3 parts  the same bytes behind a topic and 32 bytes: send_multipart, recv_multipart
+    plain           one part of 1000 bytes: PUB.send, SUB.recv as bytes; no counting, checks or decoding
+    plain, local    the same over a Unix socket, which nep uses on one computer where it can
+    plain, 3 parts  the same bytes after a topic and 32 bytes: send_multipart, recv_multipart
     listen          Subscriber.listen in the main thread
     spin            a callback that `Node.spin` calls in the main thread
-    sink            batches given to a sink in the node's thread, as Studio takes them
-    json            a robot's state that is encoded and decoded again, 1000 bytes of JSON, with listen
-    json, a text    the same with 1000 bytes that are nearly all one text
-    plain json      the robot's state with `json.dumps`, `json.loads` and one part, as many programs do it
+    sink            batches passed to a sink in the node's thread, as in Studio
+    json            a robot's state, encoded and decoded, 1000 bytes of JSON, with listen
+    json, a text    the same with 1000 bytes that are almost entirely one string
+    plain json      the robot's state with `json.dumps`, `json.loads` and one part, as in many programs
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from nep.messages.message import Message
 
 SIZE = 1000
 STATE_GOAL = 2.5
-"""A state as `json` comes at least so many times as often as by plain pyzmq and the `json` module."""
+"""Minimum ratio of the message rate of `json` to that of plain pyzmq with the `json` module."""
 NATIVE = ("listen", "spin", "sink", "json", "text")
 
 SENDER = """
@@ -79,7 +79,7 @@ for line in sys.stdin:
 
 
 def robot_state() -> dict[str, object]:
-    """What a robot may tell of itself; 1000 bytes as JSON."""
+    """Return a typical robot state of 1000 bytes as JSON."""
     joints = {f"joint_{n}": {"angle": 0.123 * n, "load": 0.5 - n / 100} for n in range(12)}
     state: dict[str, object] = {"name": "robot", "battery": 0.83, "position": [1.25, -0.5, 0.0], "text": ""}
     state |= {"joints": joints}
@@ -88,7 +88,7 @@ def robot_state() -> dict[str, object]:
 
 
 class Count:
-    """Takes messages until there are `wanted`, and the time that they took."""
+    """Receiver that counts `wanted` messages and measures the time they take."""
 
     def __init__(self, wanted: int) -> None:
         self._wanted = wanted
@@ -97,14 +97,17 @@ class Count:
         self.begin()
 
     def begin(self) -> None:
-        """Count from 0, with what is asked for now."""
+        """Reset the count and start the clock."""
         with self._lock:
             self._first = self._count = 0
             self._started, self._ended = time.perf_counter(), 0.0
             self.is_full.clear()
 
     def batch(self, messages: Sequence[Message]) -> None:
-        """So many more came; a sink. All may come at once, so the time is from asking for them."""
+        """Count a batch of messages; used as a sink.
+
+        The time starts at the request, because a whole burst may arrive in one batch.
+        """
         with self._lock:
             self._count += len(messages)
             self._ended = time.perf_counter()
@@ -112,7 +115,7 @@ class Count:
                 self.is_full.set()
 
     def one(self, _payload: object) -> None:
-        """One more came; a callback. The time is from the first one."""
+        """Count one message; used as a callback. The time starts at the first message."""
         self._count += 1
         if self._count == 1:
             self._first = 1
@@ -123,12 +126,12 @@ class Count:
 
     @property
     def seconds_each(self) -> float:
-        """How long one message took."""
+        """Seconds per message."""
         return (self._ended - self._started) / (self._count - self._first)
 
 
 class Bursts:
-    """Asks `child` for bursts of `count` messages and takes the time to receive them."""
+    """Measurement of bursts of `count` messages that `child` sends on request."""
 
     def __init__(self, child: Child, count: int) -> None:
         self._child = child
@@ -136,7 +139,10 @@ class Bursts:
         self._child_s = 0.0
 
     def take(self, what: str, one: Callable[[], object]) -> Sample:
-        """One burst of `what`; `one` receives a message. Processor time is that of both processes."""
+        """Receive a burst of `what`, one message per call of `one`.
+
+        The processor time of the sample is that of both processes.
+        """
         used = cpu_s()
         self._child.write(what)
         one()
@@ -146,7 +152,7 @@ class Bursts:
         return self._sample((time.perf_counter() - started) / (self._count - 1), used)
 
     def count(self, what: str, counted: Count, wait: Callable[[], object]) -> Sample:
-        """One burst of `what`, which `counted` counts while `wait` waits."""
+        """Receive a burst of `what` with `counted` while `wait` blocks."""
         counted.begin()
         used = cpu_s()
         self._child.write(what)
@@ -162,7 +168,7 @@ class Bursts:
 
 
 def connect(sockets: Sequence[zmq.Socket[bytes]], ends: Sequence[str], child: Child) -> None:
-    """Connect to the child's plain sockets, and wait until their messages come."""
+    """Connect to the child's plain sockets and wait until each receives messages."""
     for socket, end in zip(sockets, ends, strict=True):
         socket.setsockopt(zmq.RCVHWM, 0)
         socket.subscribe(b"")
@@ -176,7 +182,7 @@ def connect(sockets: Sequence[zmq.Socket[bytes]], ends: Sequence[str], child: Ch
 
 
 def show(samples: dict[str, Sample]) -> int:
-    """Print the table; 1 when the run does not count or the goal of a robot's state is missed."""
+    """Print the table; return 1 if the run does not count or the goal for a robot's state is missed."""
     plain = samples["plain"]
     print(f"{'':>16} {'messages/s':>11} {'÷ plain':>8} {'CPU µs':>7} {'÷ plain':>8}")
     for name, sample in samples.items():
@@ -190,7 +196,7 @@ def show(samples: dict[str, Sample]) -> int:
 
 
 def listen(subscriber: nep.Subscriber) -> object:
-    """The next payload."""
+    """Return the next payload; exit if none arrives within 5 s."""
     has_local_names, payload = subscriber.listen(timeout_s=5.0)
     if not has_local_names:
         raise SystemExit("a message did not come")
@@ -198,7 +204,7 @@ def listen(subscriber: nep.Subscriber) -> object:
 
 
 def spin(node: nep.Node, spun: Count) -> None:
-    """Spin until all have come."""
+    """Spin until all messages are counted, 10 s at most."""
     ending = threading.Thread(target=lambda: (spun.is_full.wait(10.0), node.stop_spin()))
     ending.start()
     node.spin(10.0)
@@ -206,7 +212,7 @@ def spin(node: nep.Node, spun: Count) -> None:
 
 
 def measure(count: int, blocks: int, limit: int) -> tuple[dict[str, Sample], int]:
-    """The samples of all variants, and how many messages were lost."""
+    """Return the samples of all variants and the number of lost messages."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     plain, parts, local = (context.socket(zmq.SUB) for _ in range(3))
     sunk, spun = Count(count), Count(count)
@@ -245,14 +251,14 @@ def measure(count: int, blocks: int, limit: int) -> tuple[dict[str, Sample], int
 
 
 def listen_once(bursts: Bursts, reader: nep.Subscriber) -> object:
-    """A burst of states; the last one."""
+    """Receive a burst of states; return the last one."""
     last: list[object] = []
     bursts.take("json", lambda: last.append(reader.listen(timeout_s=5.0)[1]))
     return last[-1]
 
 
 def main() -> int:
-    """Measure and print one table; 1 when the run does not count or a goal is missed."""
+    """Measure and print one table; return 1 if the run does not count or a goal is missed."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--messages", type=int, default=9_000)
     parser.add_argument("--blocks", type=int, default=30)

@@ -1,16 +1,17 @@
-"""Round trips of text between two programs: nep ÷ rospy, measured in one run.
+"""Benchmark of round trips of strings between two programs: nep ÷ rospy, measured in one run.
 
     python bench/nep_ros.py [--trips 30] [--blocks 16] [--limit 4]
 
-Each message is a `str` of ASCII letters, encoded, sent, decoded and looked at on both sides, over loopback.
-All variants are interleaved in random order within each block; "plain again" is rospy against itself: a row
-counts only when that is within 5 %.
+Each message is a `str` of ASCII letters that is encoded, sent, decoded and read on both sides, over
+loopback. All variants are interleaved in random order within each block. "plain again" is a second
+series of rospy: a row counts only if both differ by at most 5 %.
 
-    plain      rospy ↔ rospy, std_msgs/String; what comes is published again by the callback itself
-    native     nep's own wire, `string`: `publish` and `listen` in main threads
-    back end   the back end `ros` of nep, `string`, so the same messages as rospy's
+    plain      rospy ↔ rospy, std_msgs/String; the callback itself publishes the reply
+    native     nep's native wire, `string`: `publish` and `listen` in main threads
+    back end   nep's back end `ros`, `string`: the same messages as rospy's
 
-Needs Debian's python3-rospy, python3-rosmaster and python3-std-msgs; says so and ends where they are missing.
+Needs Debian's python3-rospy, python3-rosmaster and python3-std-msgs; exits with a message if they are
+missing.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from nep.backends.ros.library import get_rospy
 
 SIZES = (1_024, 16_384, 65_536, 262_144, 1_048_576, 4_194_304, 8_388_608)
 WAIT_S = 30.0
-"""A message that has not come back after this time is lost."""
+"""Seconds after which a message that was not returned counts as lost."""
 
 ECHO = """
 import sys, threading, time, nep
@@ -66,7 +67,7 @@ Trips = Callable[[Sequence[str]], list[float]]
 
 
 class RospyTrips:
-    """Messages of rospy; each that comes back sends the next, in rospy's thread."""
+    """Round trips with rospy; each returned message sends the next one, in rospy's thread."""
 
     def __init__(self, rospy: Any) -> None:  # noqa: ANN401 - it has no types
         from std_msgs.msg import String  # type: ignore[import-not-found] # noqa: PLC0415 - found with rospy
@@ -81,11 +82,11 @@ class RospyTrips:
 
     @property
     def is_connected(self) -> bool:
-        """Whether both ways are there."""
+        """True when both directions are connected."""
         return bool(self._pub.get_num_connections() and self._sub.get_num_connections())
 
     def __call__(self, texts: Sequence[str]) -> list[float]:
-        """There and back with each; seconds."""
+        """Send each text to the echo and back; return the seconds of each round trip."""
         self._texts, self._taken = list(texts), []
         self._done.clear()
         self._send()
@@ -108,7 +109,7 @@ class RospyTrips:
 
 
 class NepTrips:
-    """Messages of a node of nep."""
+    """Round trips with a nep node."""
 
     def __init__(self, node: nep.Node) -> None:
         self._sub = node.new_sub("pong_nep", "string")
@@ -116,11 +117,11 @@ class NepTrips:
 
     @property
     def is_connected(self) -> bool:
-        """Whether the echo is there."""
+        """True when the echo has subscribed."""
         return self._pub.subscribers > 0
 
     def __call__(self, texts: Sequence[str]) -> list[float]:
-        """There and back with each; seconds."""
+        """Send each text to the echo and back; return the seconds of each round trip."""
         taken = []
         for text in reversed(texts):
             started = time.perf_counter()
@@ -133,7 +134,7 @@ class NepTrips:
 
 
 def measure(trips: Trips, all_taken: list[float], ask: Child, size: int, count: int) -> Sample:
-    """The median of some round trips; processor time of both processes for each."""
+    """Return the median of `count` round trips and the processor time of both processes per trip."""
     texts = ["".join(random.choices("abcdefghijklmnop", k=16)) + "x" * (size - 16) for _ in range(count)]
     used = cpu_s() + child_s(ask)
     taken = trips(texts)
@@ -143,18 +144,18 @@ def measure(trips: Trips, all_taken: list[float], ask: Child, size: int, count: 
 
 
 def child_s(ask: Child) -> float:
-    """Processor time of the child so far."""
+    """Return the processor time that the child has used, in seconds."""
     ask.write("time")
     return float(ask.read())
 
 
 def p95(taken: list[float]) -> float:
-    """Of a hundred, five took longer."""
+    """Return the 95th percentile."""
     return statistics.quantiles(taken, n=20)[-1]
 
 
 def compare(variants: dict[str, Trips], ask: Child, blocks: int, count: int, limit: int) -> int:
-    """Print a row for each size."""
+    """Print a row for each size; return 1 if the run does not count."""
     others = [name for name in variants if name != "plain"]
     columns = " ".join(f"{name:>14} {'p95 ms':>7}" for name in others)
     print(f"{'bytes':>9} {'rospy ms':>9} {'p95 ms':>7} {columns}  CPU ms, rospy and native")
@@ -184,13 +185,13 @@ def compare(variants: dict[str, Trips], ask: Child, blocks: int, count: int, lim
 
 
 def mean(ratios: list[float]) -> float:
-    """The geometric mean."""
+    """Return the geometric mean."""
     return math.exp(statistics.fmean(math.log(each) for each in ratios))
 
 
 @contextmanager
 def ros_master() -> Iterator[str]:
-    """The address of a ROS master that listens on loopback."""
+    """Start a ROS master on loopback and yield its address."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -207,7 +208,7 @@ def ros_master() -> Iterator[str]:
 
 
 def main() -> int:
-    """Measure and print one table; 1 when the run does not count."""
+    """Measure and print one table; return 1 if the run does not count."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--trips", type=int, default=30)
     parser.add_argument("--blocks", type=int, default=16)

@@ -1,15 +1,16 @@
-"""Round trips of nep's native wire: their time, as a ratio to plain pyzmq measured in the same run.
+"""Benchmark of round trips on nep's native wire, as a ratio to plain pyzmq measured in the same run.
 
     python bench/nep_roundtrip.py [--trips 30] [--blocks 16] [--limit 4]
 
-One side runs in this process, the other in its child, over loopback, each in its main thread or a thread that
-does nothing else. All variants are interleaved in random order within each block; "plain again" is plain
-pyzmq against itself: a row counts only when that is within 5 %, and the mean of all only when the mean of
-that is. "local" goes through a Unix socket where there are some: plain pyzmq, and topics of strings (of bytes
-that are sent as they are, here), which nep sends so.
+One side runs in this process, the other in a child process, over loopback, each in its main thread or
+in a dedicated thread. All variants are interleaved in random order within each block. "plain again"
+is a second series of plain pyzmq: a row counts only if both differ by at most 5 %, and the mean of
+all rows only if the mean of "plain again" does. "local" uses a Unix socket where the platform has
+them: plain pyzmq, and nep with string topics (here bytes that are sent unchanged), which nep sends
+over Unix sockets.
 
-Every message lies at another place in memory: where exactly its bytes begin within a page can double the time
-that the kernel takes to copy it, see `bench/README.md`.
+Each message lies at a different offset in memory: where its bytes begin within a page can double the
+time that the kernel needs to copy it, see `bench/README.md`.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ Trip = Callable[[memoryview], None]
 
 
 class Plain:
-    """One pair of plain PUB and SUB sockets to the echo, bound to `end`."""
+    """Pair of plain PUB and SUB sockets to the echo; the PUB socket is bound to `end`."""
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], end: str) -> None:
         self.there = context.socket(zmq.PUB)
@@ -76,7 +77,7 @@ class Plain:
         self.end = self.there.getsockopt_string(zmq.LAST_ENDPOINT)
 
     def connect(self, end: str) -> None:
-        """Connect to the echo, and wait until both ways are there."""
+        """Connect to the echo and wait until both directions work."""
         self.back.connect(end)
         while not self.back.poll(50):
             self.there.send(b"x")
@@ -84,26 +85,26 @@ class Plain:
             self.back.recv()
 
     def trip(self, data: memoryview) -> None:
-        """There and back."""
+        """Send the data to the echo and wait for its return."""
         self.there.send(data, copy=False)
         self.back.recv(copy=False)
 
 
 class Native:
-    """A publisher and a subscriber of `node` to the echo, of a type."""
+    """Publisher and subscriber of `node` to the echo, with the message type `kind`."""
 
     def __init__(self, node: nep.Node, kind: str) -> None:
         self._sub = node.new_sub(f"pong_{kind}", kind)
         self._pub = node.new_pub(f"ping_{kind}", kind)
 
     def trip(self, data: memoryview) -> None:
-        """There and back."""
+        """Send the data to the echo and wait for its return."""
         self._pub.publish_bytes(data)
         if self._sub.receive(5.0) is None:
             raise SystemExit("a message did not come back")
 
     def close(self) -> None:
-        """Close both; nothing may have been lost."""
+        """Close both; exit if messages were lost."""
         if self._sub.lost:
             raise SystemExit(f"{self._sub.lost} messages were lost")
         self._pub.close()
@@ -111,7 +112,7 @@ class Native:
 
 
 def measure(trip: Trip, ask: Child, size: int, trips: int) -> Sample:
-    """The median of some round trips; processor time of both processes for each."""
+    """Return the median of some round trips and the processor time of both processes per trip."""
     room = os.urandom(size + PAGE)
     places = [memoryview(room)[place : place + size] for place in range(0, PAGE, 16)]
     taken = []
@@ -125,13 +126,13 @@ def measure(trip: Trip, ask: Child, size: int, trips: int) -> Sample:
 
 
 def child_s(ask: Child) -> float:
-    """Processor time of the child so far."""
+    """Return the processor time that the child has used, in seconds."""
     ask.write("time")
     return float(ask.read())
 
 
 def compare(variants: dict[str, Trip], ask: Child, blocks: int, trips: int, limit: int) -> int:
-    """Print the median round trip of "plain" and the others' ratio to it, for each size."""
+    """Print the median round trip of "plain" and the ratio of the other variants to it, for each size."""
     others = [name for name in variants if name != "plain"]
     print(f"{'bytes':>9} {'plain ms':>9}", *(f"{name:>14}" for name in others), " CPU ms  native CPU")
     ratios: dict[str, list[float]] = {name: [] for name in others}
@@ -157,12 +158,12 @@ def compare(variants: dict[str, Trip], ask: Child, blocks: int, trips: int, limi
 
 
 def mean(ratios: list[float]) -> float:
-    """The geometric mean."""
+    """Return the geometric mean."""
     return math.exp(statistics.fmean(math.log(each) for each in ratios))
 
 
 def main() -> int:
-    """Measure and print one table; 1 when the run does not count."""
+    """Measure and print one table; return 1 if the run does not count."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--trips", type=int, default=30)
     parser.add_argument("--blocks", type=int, default=16)

@@ -1,13 +1,14 @@
-"""How late messages are in the tail: nep's that may wait for others, and those that may not, in one run.
+"""Benchmark of the tail latency of nep with and without batching, in one run.
 
     python bench/nep_tail.py [--seconds 20] [--blocks 6]
 
-The child publishes a small message at a steady pace (1, 1 000 and 60 000 a second), or bursts of 40 with one
-alone 150 microseconds after each. This process takes each with `listen`. A message's age is the time of its
-arrival less that of its stamp, on one computer's clock. "batch" is a publisher as it comes, "never" one that
-was made with `batch=False`. The blocks of both are interleaved; the lone message is told from its burst.
+The child process publishes a small message at a steady rate (1, 1 000 and 60 000 per second), or
+bursts of 40 with a single message 150 microseconds after each. This process receives each of them.
+The age of a message is its arrival time minus its time stamp, on one computer's clock. "batch" is a
+publisher with default settings, "never" one created with `batch=False`. The blocks of both are
+interleaved. Messages of a burst and single messages are reported separately.
 
-What is late here is mostly the computer: the ratio tells what waiting for others adds.
+Most of the latency in the tail is caused by the computer; the ratio shows what batching adds.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ PACES = {"1 a second": 1, "1 000 a second": 1_000, "60 000 a second": 60_000, "b
 
 
 def ages(child: Child, subscriber: nep.Subscriber, order: list[object]) -> dict[bytes, list[int]]:
-    """How old each message was, in nanoseconds, by what it holds."""
+    """Return the age of each message in nanoseconds, grouped by its data."""
     came: dict[bytes, list[int]] = {}
     _name, rate, count = order
     assert isinstance(count, int)
@@ -70,7 +71,7 @@ def ages(child: Child, subscriber: nep.Subscriber, order: list[object]) -> dict[
 
 
 def at(sorted_ns: list[int], share: float) -> float:
-    """The age in microseconds that so large a share is not above."""
+    """Return the quantile `share` (0 to 1) of ascending ages, in microseconds."""
     return sorted_ns[min(len(sorted_ns) - 1, int(share * len(sorted_ns)))] / 1000
 
 

@@ -1,13 +1,13 @@
-"""How long the Studio of a package takes to start, beside the one of the source tree: both in turns.
+"""Benchmark of Studio's start time: an installed package and the source tree, interleaved.
 
     python bench/package_start.py FOLDER [--times 9] [--warm]
 
-FOLDER has the program `nep-studio`: an unpacked archive, or /opt/nep-studio. Each start has a home of its
-own, and is timed from the outside, from the moment when the process is asked for until its window does what
-another start asks of it: by then it has been painted and answers. "own work" is the processor time of the
-process until then, which other programs stretch less. Before each start the system forgets what it has read
-from the disk, as after switching on; that needs root, and without it, or with --warm, the files are in memory
-already. "source again" tells how far to trust the rest.
+FOLDER contains the program `nep-studio`: an unpacked archive, or /opt/nep-studio. Each start has its
+own home folder and is timed from outside: from the creation of the process until its window replies
+to the request of a second start. By then it has been painted and responds. "own work" is the
+processor time of the process until then, which depends less on other programs. Before each start the
+system's file cache is dropped, as after booting; that needs root. Without root, or with --warm, the
+files are cached already. "source again" is a second series of the source tree, which shows the noise.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ PAUSE = threading.Event()
 
 @dataclass(frozen=True)
 class Start:
-    """One start: the seconds until the window answered, and those that the process worked itself."""
+    """Seconds until the window replied, and processor time that the process used until then."""
 
     seconds: float
     work: float
 
 
 def forget() -> bool:
-    """Let the system forget what it has read from the disk; whether it did."""
+    """Drop the system's file cache; return False if that isn't permitted."""
     try:
         os.sync()
         DROP.write_text("3")
@@ -60,7 +60,7 @@ def forget() -> bool:
 
 @contextlib.contextmanager
 def surroundings() -> Iterator[dict[str, str]]:
-    """The environment of one start: a home, a runtime folder and a master's port that nobody else has."""
+    """Yield the environment of one start, with its own home folder, runtime folder and master port."""
     with tempfile.TemporaryDirectory(prefix="nep-start-") as folder, socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         environ = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
@@ -78,7 +78,7 @@ def surroundings() -> Iterator[dict[str, str]]:
 
 
 def until_answered(name: str, process: subprocess.Popen[bytes], until: float) -> None:
-    """Ask the window for nothing again and again, until it says that it has done it."""
+    """Send an empty request to the window repeatedly until it replies; exit on timeout."""
     while process.poll() is None and time.monotonic() < until:
         with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as line:
             line.settimeout(MAX_S)
@@ -91,7 +91,7 @@ def until_answered(name: str, process: subprocess.Popen[bytes], until: float) ->
 
 
 def once(command: Sequence[str], *, cold: bool) -> Start:
-    """Start Studio, wait until its window answers, and close it with all that it has started."""
+    """Start Studio, wait until its window replies, and stop it with all its child processes."""
     with surroundings() as environ:
         if cold:
             forget()
@@ -118,7 +118,7 @@ def once(command: Sequence[str], *, cold: bool) -> Start:
 
 
 def main() -> int:
-    """Measure, print a table; 0 when the goal was reached and the run counts."""
+    """Measure and print a table; return 0 if the goal was reached and the run counts."""
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=Path)
     parser.add_argument("--times", type=int, default=9)

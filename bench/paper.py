@@ -1,24 +1,26 @@
-"""The paper's two scenarios: round trips between two programs, by nep and by other libraries.
+"""Benchmark of the paper's two scenarios: round trips between two programs with nep and other libraries.
 
-    python3 dev.py bench paper                  both: four minutes, and most of an hour for 200 trips a size
-    python3 dev.py bench paper -- --write       and make docs/figures.md of it, with its pictures; a scenario
-                                                that is not measured stays there
+    python3 dev.py bench paper                  both: 4 minutes, most of an hour for 200 trips per size
+    python3 dev.py bench paper -- --write       also write docs/figures.md with its plots; results of a
+                                                scenario that is not measured are kept
     python3 dev.py bench paper -- --scenarios local --rows nep --kinds string json --seconds 60
-    python3 dev.py bench paper -- --from docs/figures.json --write      make them again, without measuring
+    python3 dev.py bench paper -- --from docs/figures.json --write      write again without measuring
 
     L-local     two programs on one computer
-    R-remote    two programs in two networks, joined by a link with a Wi-Fi's delay and rate (`link.py`)
+    R-remote    two programs in two networks, linked with the delay and rate of Wi-Fi (`link.py`)
 
-Each message is encoded, sent, received, decoded, and the same way back; both ends are processes of their own
-that do nothing else (`paper_ends.py`). Kinds are the paper's `string` and `json` (a map with one text), and
-`bytes`. All rows, kinds and sizes are interleaved in random order in each block: of L-local there are as many
-as there is time for, of R-remote ten with twenty trips of each size.
-"plain again" is plain pyzmq against itself: a size counts only when that is within 5 %.
+Each message is encoded, sent, received and decoded, and returned the same way. Both ends are separate
+processes that do nothing else (`paper_ends.py`). Kinds are the paper's `string` and `json` (a map
+with one string), and `bytes`. All rows, kinds and sizes are interleaved in random order in each
+block. L-local runs as many blocks as fit into its time, R-remote runs ten with twenty trips of each
+size. "plain again" is a second series of plain pyzmq: a size counts only if both differ by at most
+5 %.
 
-Rows that cannot be run say why, and the others are measured. rosbridge is in no package registry: give the
-folder of its sources (--rosbridge-sources, see `rosbridge.py`), or the address of a server that runs
-(--rosbridge ws://127.0.0.1:9090, L-local only; its ROS master is $ROS_MASTER_URI). The original NEP needs a
-Python 2.7 (--python2, see `paper_original.py`), rosnodejs its folder (--rosnodejs).
+Rows that can't run report the reason; the others are measured. rosbridge is in no package registry:
+pass the folder of its sources (--rosbridge-sources, see `rosbridge.py`), or the address of a running
+server (--rosbridge ws://127.0.0.1:9090, L-local only; its ROS master is $ROS_MASTER_URI). The
+original NEP needs Python 2.7 (--python2, see `paper_original.py`), rosnodejs needs its folder
+(--rosnodejs).
 """
 
 from __future__ import annotations
@@ -57,31 +59,31 @@ SIZES = {
     "remote": tuple(1024 * n for n in (1, 4, 16, 64, 256, 1024)),
 }
 TRIPS = {"local": ((256 * 1024, 20), (1024 * 1024, 10)), "remote": ()}
-"""So many trips in a block up to these sizes."""
+"""Trips per block for sizes up to the given number of bytes."""
 LARGE_TRIPS = {"local": 5, "remote": 20}
 REMOTE_BLOCKS = 10
-"""R-remote takes 200 trips of each size, as the paper does, however long that takes."""
+"""Blocks of R-remote: 200 trips of each size, as in the paper, however long they take."""
 WARM_TRIPS = {"local": 1, "remote": 0}
-"""So many more come first and are not counted: they pay for waking both ends."""
+"""Trips before each measurement that are not counted, because they include waking both ends."""
 PACKAGES = ("pyzmq", "pynng", "eclipse-zenoh", "iceoryx2", "orjson", "roslibpy")
 Cell = tuple[str, str, int]
 """Row, kind and size."""
 
 
 def trips(scenario: str, size: int) -> int:
-    """How many trips a block of it has."""
+    """Return the number of trips per block."""
     return next((count for most, count in TRIPS[scenario] if size <= most), LARGE_TRIPS[scenario])
 
 
 def sizes_of(scenario: str, arguments: argparse.Namespace) -> list[int]:
-    """Its sizes that were asked for; all when none was."""
+    """Return the requested sizes of the scenario; all of its sizes if none was requested."""
     return [size for size in SIZES[scenario] if size in arguments.sizes or not arguments.sizes]
 
 
 def start_pairs(
     rows: Sequence[str], places: Places, stack: ExitStack
 ) -> tuple[dict[str, Pair], dict[str, str]]:
-    """The pairs of all rows that can be run, and why the others can't."""
+    """Return the pairs of all rows that can run, and the reason for each row that can't."""
     pairs, not_run = {}, {}
     for row in rows:
         try:
@@ -94,7 +96,7 @@ def start_pairs(
 
 
 def measure(arguments: argparse.Namespace, scenario: str, places: Places) -> dict[str, Any]:
-    """All blocks of a scenario for which there is time."""
+    """Measure as many blocks of a scenario as fit into its time."""
     ends_at = time.monotonic() + arguments.seconds if scenario == "local" else math.inf
     most_blocks = arguments.blocks or (-1 if scenario == "local" else REMOTE_BLOCKS)
     taken: dict[Cell, list[float]] = {}
@@ -129,7 +131,7 @@ def measure(arguments: argparse.Namespace, scenario: str, places: Places) -> dic
 
 
 def cell_of(cell: Cell, seconds: Sequence[float]) -> dict[str, Any]:
-    """What is kept of a cell."""
+    """Return the statistics of a cell for the result file."""
     row, kind, size = cell
     return {
         "row": row,
@@ -142,7 +144,7 @@ def cell_of(cell: Cell, seconds: Sequence[float]) -> dict[str, Any]:
 
 
 def measure_local(arguments: argparse.Namespace) -> dict[str, Any]:
-    """L-local, all of it at 127.0.0.1."""
+    """Measure L-local over loopback."""
     here = ("127.0.0.1", "127.0.0.1")
     with around(
         here, (), arguments.rosbridge, arguments.rosbridge_sources, arguments.python2, arguments.rosnodejs
@@ -151,7 +153,7 @@ def measure_local(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def measure_remote(_arguments: argparse.Namespace) -> dict[str, Any]:
-    """R-remote: this program once more, in a network of its own. Raises `NotRunError`."""
+    """Measure R-remote by running this program again in its own network namespace. Raises `NotRunError`."""
     why = why_no_networks()
     if why:
         raise NotRunError(why)
@@ -173,7 +175,7 @@ def measure_remote(_arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def inside(arguments: argparse.Namespace) -> None:
-    """R-remote, in a network of its own; what was found goes to the file that was named."""
+    """Measure R-remote inside its network namespace and write the result to the file of `--inside`."""
     wifi = Wifi(arguments.delay_ms, arguments.jitter_ms, arguments.rate_mbit)
     found: dict[str, Any]
     try:
@@ -199,7 +201,7 @@ def inside(arguments: argparse.Namespace) -> None:
 
 
 def computer() -> dict[str, Any]:
-    """What the figures were taken on; no names."""
+    """Return the hardware and system of this computer, without names that identify it."""
     cpuinfo = Path("/proc/cpuinfo")
     lines = cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.exists() else []
     models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
@@ -212,7 +214,7 @@ def computer() -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Of what carries the messages."""
+    """Return the versions of Python, nep and the compared libraries."""
     found = {"Python": platform.python_version()}
     for name in ("nep-studio", *PACKAGES):
         try:
@@ -229,7 +231,7 @@ def versions() -> dict[str, str]:
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Measure what was asked for."""
+    """Measure the requested scenarios."""
     found: dict[str, Any] = {"scenarios": [], "not_run": {}}
     for scenario, measured in (("local", measure_local), ("remote", measure_remote)):
         if scenario not in arguments.scenarios:
@@ -249,7 +251,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def asked() -> argparse.Namespace:
-    """What the command line says."""
+    """Parse the command line."""
     wifi = Wifi()
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -292,7 +294,7 @@ def asked() -> argparse.Namespace:
 
 
 def main() -> int:
-    """Measure, keep and print it; 1 when a run does not count or a goal is missed."""
+    """Measure, save and print the result; return 1 if a run does not count or a goal is missed."""
     arguments = asked()
     signal.signal(signal.SIGTERM, lambda _number, _frame: sys.exit(143))  # so that all that runs is ended
     if arguments.inside:

@@ -1,4 +1,4 @@
-"""Rows of `paper.py` in which Python pings a program with nep.js, NEP for C# or rosnodejs."""
+"""Rows of `paper.py` in which Python pings a program that uses nep.js, NEP for C# or rosnodejs."""
 
 from __future__ import annotations
 

@@ -1,14 +1,16 @@
-"""One end of a ping-pong: what `paper.py` starts twice for each of its rows, as ping and as pong.
+"""One end of a ping-pong, started by `paper.py` twice for each of its rows: as ping and as pong.
 
     python bench/paper_ends.py ping|pong ROW OWN_HOST PLACE
 
-A row is one way to carry messages. Both ends encode, send, receive and decode each message: pong sends back
-what it has decoded. Where a library hands messages to callbacks, pong answers in the callback itself and ping
-takes the time in it; where a program waits for them, both wait in their main threads.
+A row is one way to transport messages. Both ends encode, send, receive and decode each message: pong
+returns what it has decoded. Where a library passes messages to callbacks, pong replies in the
+callback itself and ping takes the time in it; where a program waits for messages, both wait in their
+main threads.
 
-They talk in lines of JSON: {"end": ...} is where the other end connects, whose own end is then read;
-{"ready": true} says that messages pass; each further line read is [KIND, SIZE, COUNT] and answered by
-{"taken": [seconds, ...]}. {"not run": REASON} is the last line of an end that cannot go on.
+They exchange lines of JSON. {"end": ...} is the endpoint to which the other end connects; the
+endpoint of the other end is then read. {"ready": true} reports that messages arrive. Each further
+line read is [KIND, SIZE, COUNT] and gets the reply {"taken": [seconds, ...]}. {"not run": REASON} is
+the last line of an end that can't continue.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ NUMBERS = "numbers"
 TYPES = {**{kind: kind for kind in KINDS}, NUMBERS: "json"}
 """Message type of each kind of nep's own ends."""
 WAIT_S = 20.0
-"""A message that has not come back after this time is lost."""
+"""Seconds after which a message that was not returned counts as lost."""
 LOOK_S = 0.01
 LEAVE_S = 5.0
 
@@ -53,14 +55,14 @@ def payload(kind: str, size: int) -> object:
 
 
 def packed(kind: str, value: Any) -> Any:  # noqa: ANN401 - bytes or what is like them
-    """As plain programs send it: UTF-8, the json module's text, or what it is."""
+    """Encode a value as plain programs do: strings as UTF-8, `json` with the json module, bytes unchanged."""
     if kind == "bytes":
         return value
     return (json.dumps(value) if kind == "json" else value).encode()
 
 
 def unpacked(kind: str, data: Any) -> object:  # noqa: ANN401 - bytes or what is like them
-    """What `packed` made it of."""
+    """Decode the data that `packed` returned."""
     if kind == "bytes":
         return data
     text = bytes(data).decode() if isinstance(data, memoryview) else data.decode()
@@ -68,7 +70,7 @@ def unpacked(kind: str, data: Any) -> object:  # noqa: ANN401 - bytes or what is
 
 
 class End(ABC):
-    """One end; `end` tells the other where to connect."""
+    """One end of the ping-pong; `end` is the endpoint that the other end connects to."""
 
     end = ""
 
@@ -81,30 +83,30 @@ class End(ABC):
 
     @abstractmethod
     def connect(self, other: str) -> None:
-        """Returns when messages pass in both directions."""
+        """Connect to the other end; return once messages arrive in both directions."""
 
     @abstractmethod
     def send(self, kind: str, value: object) -> None:
-        """Encode and send it."""
+        """Encode and send a value."""
 
     @abstractmethod
     def trips(self, kind: str, payloads: Sequence[object]) -> list[float]:
-        """There and back with each; seconds."""
+        """Send each payload to pong and back; return the seconds of each round trip."""
 
     @abstractmethod
     def echo(self, kind: str, count: int) -> None:
-        """Returns when as many have been sent back."""
+        """Return `count` messages to ping."""
 
 
 class Listening(End):
-    """An end whose program waits for messages itself."""
+    """End whose program waits for messages itself."""
 
     @abstractmethod
     def receive(self, kind: str) -> object:
-        """The next one, decoded."""
+        """Wait for the next message and return its decoded value."""
 
     def trips(self, kind: str, payloads: Sequence[object]) -> list[float]:
-        """There and back with each; seconds."""
+        """Send each payload to pong and back; return the seconds of each round trip."""
         taken = []
         for value in payloads:
             started = time.perf_counter()
@@ -115,13 +117,13 @@ class Listening(End):
         return taken
 
     def echo(self, kind: str, count: int) -> None:
-        """Returns when as many have been sent back."""
+        """Return `count` messages to ping."""
         for _ in range(count):
             self.send(kind, self.receive(kind))
 
 
 class Called(End):
-    """An end whose library calls back with messages."""
+    """End whose library passes messages to a callback."""
 
     def __init__(self, role: str, host: str, place: str) -> None:
         super().__init__(role, host, place)
@@ -129,7 +131,7 @@ class Called(End):
         self._echoed = threading.Semaphore(0)
 
     def came(self, kind: str, value: object) -> None:
-        """A decoded message; called by the library."""
+        """Handle a decoded message; called by the library."""
         if self.is_ping:
             self._came.put((time.perf_counter(), value))
         else:
@@ -137,7 +139,7 @@ class Called(End):
             self._echoed.release()
 
     def trips(self, kind: str, payloads: Sequence[object]) -> list[float]:
-        """There and back with each; seconds."""
+        """Send each payload to pong and back; return the seconds of each round trip."""
         taken = []
         for value in payloads:
             started = time.perf_counter()
@@ -151,24 +153,24 @@ class Called(End):
         return taken
 
     def echo(self, kind: str, count: int) -> None:  # noqa: ARG002 - the callback knows it
-        """Returns when as many have been sent back."""
+        """Wait until the callback has returned `count` messages to ping."""
         for _ in range(count):
             if not self._echoed.acquire(timeout=WAIT_S):
                 raise LostError("a message was not received")
 
 
 class LostError(Exception):
-    """A message did not come in time, or came as another one."""
+    """A message did not arrive in time, or a different one arrived."""
 
 
 def check(came: object, sent: object) -> None:
-    """Raises `LostError` when it is not the same."""
+    """Raise `LostError` if the received value differs from the sent one."""
     if came != sent:
         raise LostError("another message came back")
 
 
 def wait_until(is_so: Callable[[], Any]) -> None:
-    """Look again and again, until the other end must be there."""
+    """Poll until the other end is connected; raise `LostError` after `WAIT_S`."""
     pause, deadline = threading.Event(), time.monotonic() + WAIT_S
     while not is_so():
         if time.monotonic() > deadline:
@@ -177,7 +179,7 @@ def wait_until(is_so: Callable[[], Any]) -> None:
 
 
 class PlainEnd(Listening):
-    """pyzmq alone: a PUB (here an XPUB, which tells who has come) and a SUB for each kind."""
+    """End with pyzmq alone: for each kind a SUB and a PUB (an XPUB, which reports subscriptions)."""
 
     def __init__(self, role: str, host: str, place: str) -> None:
         super().__init__(role, host, place)
@@ -194,7 +196,7 @@ class PlainEnd(Listening):
         self.end = " ".join(each.getsockopt_string(zmq.LAST_ENDPOINT) for each in self._out.values())
 
     def connect(self, other: str) -> None:
-        """Returns when messages pass in both directions."""
+        """Connect to the other end; return once messages arrive in both directions."""
         for kind, end in zip(KINDS, other.split(), strict=True):
             self._in[kind].connect(end)
         for each in self._out.values():
@@ -203,18 +205,18 @@ class PlainEnd(Listening):
             each.recv()
 
     def send(self, kind: str, value: object) -> None:
-        """Encode and send it."""
+        """Encode and send a value."""
         self._out[kind].send(packed(kind, value), copy=kind != "bytes")
 
     def receive(self, kind: str) -> object:
-        """The next one, decoded."""
+        """Wait for the next message and return its decoded value."""
         if kind == "bytes":
             return self._in[kind].recv(copy=False).buffer
         return unpacked(kind, self._in[kind].recv())
 
 
 class NepEnd(Listening):
-    """nep over one of its back ends; ping's process has the master, where there is one."""
+    """End with nep over one of its back ends; a master, if needed, runs in ping's process."""
 
     transport = "zeromq"
 
@@ -231,7 +233,7 @@ class NepEnd(Listening):
             self.end = f"{host}:{master.address.rpartition(':')[2]}"
 
     def connect(self, other: str) -> None:
-        """Returns when messages pass in both directions."""
+        """Connect to the other end; return once messages arrive in both directions."""
         self._meet(self._own if self.is_ping else other)
 
     def _meet(self, master: str) -> None:
@@ -243,11 +245,11 @@ class NepEnd(Listening):
         wait_until(lambda: all(each.subscribers for each in self._out.values()))
 
     def send(self, kind: str, value: object) -> None:
-        """Encode and send it."""
+        """Encode and send a value."""
         self._out[kind].publish(value)
 
     def receive(self, kind: str) -> object:
-        """The next one, decoded."""
+        """Wait for the next message and return its decoded value."""
         ok, value = self._in[kind].listen(timeout_s=WAIT_S)
         if not ok:
             raise LostError("a message was not received")
@@ -255,13 +257,13 @@ class NepEnd(Listening):
 
 
 class NepNanomsgEnd(NepEnd):
-    """nep over nanomsg's protocols, by pynng."""
+    """End with nep over the nanomsg protocols, implemented by pynng."""
 
     transport = "nanomsg"
 
 
 class NepZenohEnd(NepEnd):
-    """nep over zenoh; `place` is where nodes of zenoh meet."""
+    """End with nep over zenoh; both nodes use the zenoh endpoint `place`."""
 
     def __init__(self, role: str, host: str, place: str) -> None:
         Listening.__init__(self, role, host, place)
@@ -271,12 +273,12 @@ class NepZenohEnd(NepEnd):
         self.transport = "zenoh"
 
     def connect(self, other: str) -> None:  # noqa: ARG002 - both were told the place
-        """Returns when messages pass in both directions."""
+        """Connect to the other end; return once messages arrive in both directions."""
         self._meet(self.place)
 
 
 class ZenohEnd(Called):
-    """zenoh's own Python: ping listens at `place`, pong connects there."""
+    """End with zenoh's Python library: ping listens at `place`, pong connects there."""
 
     def __init__(self, role: str, host: str, place: str) -> None:
         super().__init__(role, host, place)
@@ -303,18 +305,18 @@ class ZenohEnd(Called):
         return lambda sample: self.came(kind, unpacked(kind, sample.payload.to_bytes()))
 
     def connect(self, other: str) -> None:  # noqa: ARG002 - both were told the place
-        """Returns when messages pass in both directions."""
+        """Connect to the other end; return once messages arrive in both directions."""
         if not self.is_ping:
             self._begin()
         wait_until(lambda: all(each.matching_status.matching for each in self._out.values()))
 
     def send(self, kind: str, value: object) -> None:
-        """Encode and send it."""
+        """Encode and send a value."""
         self._out[kind].put(packed(kind, value))
 
 
 class RospyEnd(Called):
-    """rospy: std_msgs/String, and UInt8MultiArray for bytes; `place` is the ROS master."""
+    """End with rospy: std_msgs/String, and UInt8MultiArray for bytes; `place` is the ROS master."""
 
     topics = "direct"
 
@@ -346,31 +348,34 @@ class RospyEnd(Called):
         self.came(kind, json.loads(message.data) if kind == "json" else message.data)
 
     def connect(self, other: str) -> None:  # noqa: ARG002 - the ROS master knows it
-        """Returns when messages pass in both directions."""
+        """Connect to the other end; return once messages arrive in both directions."""
         both = (*self._out.values(), *self._in.values())
         wait_until(lambda: all(each.get_num_connections() for each in both))
 
     def send(self, kind: str, value: object) -> None:
-        """Encode and send it."""
+        """Encode and send a value."""
         message = self._types[kind]()
         message.data = json.dumps(value) if kind == "json" else value
         self._out[kind].publish(message)
 
 
 class BridgedRospyEnd(RospyEnd):
-    """rospy whose other end is behind a rosbridge server; both rows may have one ROS master."""
+    """End with rospy whose peer is behind a rosbridge server.
+
+    The topics have names of their own, because this row and that of rospy may share a ROS master.
+    """
 
     topics = "bridged"
 
 
 class RosnodejsPeerEnd(RospyEnd):
-    """rospy whose other end is a program with rosnodejs."""
+    """End with rospy whose peer is a program with rosnodejs."""
 
     topics = "rosnodejs"
 
 
 class RoslibpyEnd(Called):
-    """roslibpy, connected to the rosbridge server at `place`; bytes travel as base64."""
+    """End with roslibpy, connected to the rosbridge server at `place`; bytes are sent as base64."""
 
     def __init__(self, role: str, host: str, place: str) -> None:
         super().__init__(role, host, place)
@@ -394,10 +399,10 @@ class RoslibpyEnd(Called):
         return lambda message: self.came(kind, read.get(kind, str)(message["data"]))
 
     def connect(self, other: str) -> None:
-        """Returns at once: ping is rospy, which sees both connections."""
+        """Do nothing: ping uses rospy, which waits for both connections."""
 
     def send(self, kind: str, value: Any) -> None:  # noqa: ANN401 - one of three types
-        """Encode and send it."""
+        """Encode and send a value."""
         data = json.dumps(value) if kind == "json" else value
         if kind == "bytes":
             layout = {"dim": [], "data_offset": 0}
@@ -423,7 +428,7 @@ ENDS: dict[str, tuple[type[End], type[End]]] = {
 
 
 def run(end: End, answer: Callable[[dict[str, object]], None]) -> None:
-    """Meet the other end, then make the trips that are asked for until nothing more is."""
+    """Connect to the other end, then make the requested trips until standard input ends."""
     answer({"end": end.end})
     end.connect(json.loads(sys.stdin.readline()))
     answer({"ready": True})
@@ -438,7 +443,7 @@ def run(end: End, answer: Callable[[dict[str, object]], None]) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """The end of a row; 1 when it cannot be run."""
+    """Run one end of a row; return 1 if it can't run."""
     role, row, host, place = arguments
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for the program that started this
     own = os.fdopen(os.dup(1), "w", buffering=1)

@@ -1,4 +1,4 @@
-"""What `paper.py` found: its ratios and goals, its tables for docs/figures.md, its pictures by matplotlib."""
+"""Results of `paper.py`: ratios and goals, tables for docs/figures.md, and plots with matplotlib."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ TITLES = {
     "remote": (9, "R-remote", "two programs, joined by a link with a Wi-Fi's delay and rate"),
     "local": (10, "L-local", "two programs on one computer"),
 }
-"""The figure's number in the paper, the scenario's name there, and what it is."""
+"""Number of the figure in the paper, name of the scenario there, and its description."""
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 JUDGED, MAX_SIZE = 16 * 1024, 8192 * 1024
 TOKENS = ROOT / "resources" / "theme" / "tokens.json"
 FONTS = ROOT / "resources" / "fonts"
 MARKS = "osD^vPX<>*h"
 MORE_COLOURS = ("run", "warn", "stop", "running")
-"""Of the theme, for rows beyond its series."""
+"""Theme colours for rows beyond the theme's series."""
 
 Found = Mapping[str, Any]
 
 
 class Goal(NamedTuple):
-    """A ratio of medians beside the most that it may be; `again` is plain's to itself at the same sizes."""
+    """Ratio of medians and its upper limit; `again` is the ratio of plain to itself at the same sizes."""
 
     what: str
     ratio: float
@@ -46,7 +46,7 @@ class Goal(NamedTuple):
 
     @property
     def is_reached(self) -> bool:
-        """Whether it is, and counts."""
+        """True if the ratio is within its limit and the measurement counts."""
         return self.ratio <= self.most and is_trusted(self.again)
 
     def __str__(self) -> str:
@@ -66,37 +66,37 @@ class Scenario:
         self.kinds = [kind for kind in KINDS if self.sizes(kind)]
 
     def sizes(self, kind: str) -> list[int]:
-        """The sizes that were measured, from small to large."""
+        """Return the measured sizes, in ascending order."""
         return sorted({size for _, of, size in self._cells if of == kind})
 
     def cell(self, row: str, kind: str, size: int) -> Found | None:
-        """What was found there, if anything."""
+        """Return the measured cell, or None."""
         return self._cells.get((row, kind, size))
 
     def ratio(self, row: str, other: str, kind: str, size: int) -> float | None:
-        """The median of `row` ÷ that of `other`."""
+        """Return the median of `row` ÷ that of `other`, or None if one of them was not measured."""
         one, two = self.cell(row, kind, size), self.cell(other, kind, size)
         return one["median_ms"] / two["median_ms"] if one and two else None
 
     def counts(self, kind: str, size: int) -> bool:
-        """Whether plain differs from itself by no more than 5 % there."""
+        """Return True if two series of plain pyzmq differ by at most 5 % at this size."""
         again = self.ratio(AGAIN, PLAIN, kind, size)
         return again is not None and is_trusted(again)
 
     def mean_ratio(self, row: str, other: str, kind: str, sizes: Iterable[int]) -> float | None:
-        """The geometric mean of the ratios at these sizes; None when one of them is not known."""
+        """Return the geometric mean of the ratios at these sizes, or None if one of them was not measured."""
         ratios = [self.ratio(row, other, kind, size) for size in sizes]
         known = [math.log(each) for each in ratios if each is not None]
         return math.exp(statistics.fmean(known)) if known and len(known) == len(ratios) else None
 
 
 def scenarios(found: Found) -> list[Scenario]:
-    """The scenarios of a run, in the order of the paper's figures."""
+    """Return the scenarios of a run, in the order of the paper's figures."""
     return sorted(map(Scenario, found["scenarios"]), key=lambda each: each.number)
 
 
 def goals(found: Found) -> list[Goal]:
-    """The goals for texts beside plain pyzmq on one computer, as far as they were measured."""
+    """Return the measured goals: strings and JSON relative to plain pyzmq on one computer."""
     local = next((Scenario(each) for each in found["scenarios"] if each["name"] == "local"), None)
     if local is None:
         return []
@@ -119,7 +119,7 @@ def goals(found: Found) -> list[Goal]:
 
 
 def does_count(found: Found) -> bool:
-    """Whether plain differs from itself by no more than 5 % in the mean of each scenario and kind."""
+    """Return True if the means of both plain series differ by at most 5 % in each scenario and kind."""
     means = [
         scenario.mean_ratio(AGAIN, PLAIN, kind, scenario.sizes(kind))
         for scenario in map(Scenario, found["scenarios"])
@@ -132,27 +132,27 @@ def does_count(found: Found) -> bool:
 
 
 def size_text(size: int) -> str:
-    """As in "64 kB", which are 65536 bytes."""
+    """Format a size in bytes, for example 65536 as "64 kB"."""
     return f"{size // 1024} kB" if size < 1 << 20 else f"{size >> 20} MB"
 
 
 def ms_text(ms: float) -> str:
-    """Three figures."""
+    """Format milliseconds with at most three decimals, fewer for larger values."""
     return f"{ms:.0f}" if ms >= 100 else f"{ms:.1f}" if ms >= 10 else f"{ms:.2f}" if ms >= 1 else f"{ms:.3f}"
 
 
 def times(ratio: float) -> str:
-    """As in "0.97" or "120" times."""
+    """Format a ratio as "0.97" or "120", for example."""
     return f"{ratio:.0f}" if ratio >= 9.95 else f"{ratio:.1f}" if ratio >= 1.95 else f"{ratio:.2f}"
 
 
 def cell_text(cell: Found | None) -> str:
-    """Its median and p95."""
+    """Format the median and p95 of a cell; empty without one."""
     return f"{ms_text(cell['median_ms'])} ({ms_text(cell['p95_ms'])})" if cell else ""
 
 
 def table(scenario: Scenario, kind: str) -> str:
-    """Medians and p95 of a kind in Markdown."""
+    """Return a Markdown table of the medians and p95 of a kind."""
     rows = scenario.rows
     lines = [f"| `{kind}` | {' | '.join(rows)} | A/A | |", f"|---:|{'---:|' * len(rows)}---:|---|"]
     for size in scenario.sizes(kind):
@@ -165,7 +165,7 @@ def table(scenario: Scenario, kind: str) -> str:
 
 
 def times_text(scenario: Scenario) -> str:
-    """How many times nep's median each row takes, in words; empty without nep."""
+    """Return a Markdown list of each row's ratio to nep's median; empty without nep."""
     said = []
     for row in scenario.rows:
         if row == NEP:
@@ -182,7 +182,7 @@ def times_text(scenario: Scenario) -> str:
 
 
 def head(scenario: Found) -> str:
-    """When, where and with what it was taken."""
+    """Return the date, computer and versions of a measurement as a sentence."""
     of = scenario["computer"]
     with_what = ", ".join(f"{name} {version}" for name, version in scenario["versions"].items())
     load = f", load {of['load_before']} before it" if of["load_before"] is not None else ""
@@ -193,7 +193,7 @@ def head(scenario: Found) -> str:
 
 
 def section(scenario: Scenario) -> str:
-    """A scenario's tables and what belongs to them."""
+    """Return the Markdown section of a scenario: its conditions, tables and ratios."""
     trips = [each["trips"] for each in scenario.found["cells"]]
     measured = f"{min(trips)} to {max(trips)} trips a figure" if trips else "nothing was measured"
     parts = [
@@ -213,7 +213,10 @@ def section(scenario: Scenario) -> str:
 
 
 def report(found: Found, pictures: str = "") -> str:
-    """All of it in Markdown; `pictures` is the folder of the figures, seen from the document."""
+    """Return the whole report in Markdown.
+
+    `pictures` is the folder of the figures relative to the document; without it, there are no figures.
+    """
     parts = [
         (
             "Milliseconds for a round trip: median (p95). A/A is plain pyzmq against itself; "
@@ -233,9 +236,9 @@ def report(found: Found, pictures: str = "") -> str:
 
 
 def write(found: Found, docs: Path) -> list[Path]:
-    """Write tables, pictures and numbers of a run into the documentation; return the written files.
+    """Write tables, plots and numbers of a run to the documentation; return the written files.
 
-    Scenarios that it doesn't have stay as they were.
+    Results of scenarios that are not in this run are kept.
     """
     figures = docs / "figures.json"
     if figures.exists():
@@ -258,7 +261,7 @@ def write(found: Found, docs: Path) -> list[Path]:
 
 
 def draw(found: Found, folder: Path) -> list[Path]:
-    """A figure of each scenario, as SVG and PNG."""
+    """Draw a figure for each scenario as SVG and PNG; return the written files."""
     import matplotlib as mpl  # noqa: PLC0415 - it takes long, and only those who draw need it
     from matplotlib import font_manager  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
@@ -286,7 +289,7 @@ def draw(found: Found, folder: Path) -> list[Path]:
 
 
 def plot(figure: Figure, scenario: Scenario, colours: Mapping[str, Any]) -> None:
-    """A panel for each kind, and what the lines are below them."""
+    """Plot a panel for each kind, with a legend below."""
     others = [row for row in ROWS if row != PLAIN]
     palette = dict(zip(others, (*colours["series"], *(colours[name] for name in MORE_COLOURS)), strict=True))
     palette[PLAIN] = colours["textTertiary"]
@@ -305,7 +308,7 @@ def plot(figure: Figure, scenario: Scenario, colours: Mapping[str, Any]) -> None
 
 
 def line(axes: Axes, scenario: Scenario, what: tuple[str, str], colour: str, mark: str) -> None:
-    """A row's medians with bars up to p95; hollow marks where it does not count."""
+    """Plot a row's medians with bars up to p95; sizes that do not count get hollow marks."""
     row, kind = what
     sizes = [size for size in scenario.sizes(kind) if scenario.cell(row, kind, size)]
     cells = [scenario.cell(row, kind, size) or {} for size in sizes]
@@ -327,7 +330,7 @@ def line(axes: Axes, scenario: Scenario, what: tuple[str, str], colour: str, mar
 
 
 def panel(axes: Axes, scenario: Scenario, kind: str) -> None:
-    """Its axes."""
+    """Set up the axes of a kind."""
     sizes: Sequence[int] = scenario.sizes(kind)
     axes.set_xscale("log", base=2)
     axes.set_yscale("log")

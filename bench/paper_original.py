@@ -1,9 +1,10 @@
-"""One end of a ping-pong of the original NEP, `nep` 0.5.3.5 in Python 2.7, as the paper has it.
+"""One end of a ping-pong with the original NEP, `nep` 0.5.3.5 in Python 2.7, as in the paper.
 
-`END` is its program: it runs in another Python, and so is text here. It talks as `paper_ends.py` does and has
-the kinds `string` and `json`. Each end binds a publisher of each kind and subscribes to the other end's,
-without a master (`one2many`), so that it also runs between two networks. That library does not tell when a
-subscriber is connected: each end waits for a second.
+`END` is its program, a string because it runs in another Python. It uses the same protocol as
+`paper_ends.py` and supports the kinds `string` and `json`. Each end binds a publisher of each kind
+and subscribes to those of the other end, without a master (`one2many`), so that it also works between
+two networks. The library does not report when a subscriber has connected, so each end waits for a
+second.
 """
 
 from __future__ import annotations
@@ -92,7 +93,7 @@ os._exit(0)
 
 
 def why_missing(python2: str) -> str:
-    """Return why the row can't be run with this interpreter; empty when it can."""
+    """Return why the row can't run with this interpreter, or an empty string."""
     asked = "import sys, nep, zmq; print(sys.version_info[0], hasattr(nep.node, 'direct'))"
     try:
         done = subprocess.run(

@@ -1,4 +1,4 @@
-"""What `paper.py` measures with: ping and pong of a row as processes, and what the rows need around them."""
+"""Processes of `paper.py`: ping and pong of a row, and the servers that rows need."""
 
 from __future__ import annotations
 
@@ -29,19 +29,20 @@ HERE = Path(__file__).parent
 START_S = 60.0
 END_S = 15.0
 ERRORS = "errors.txt"
-"""What the program of ROS that was started last says on standard error."""
+"""File with the standard error of the ROS program that was started last."""
 ROS_MASTER = "http://127.0.0.1:11311"
 
 
 class NotRunError(Exception):
-    """Why a row or a scenario is not measured."""
+    """A row or a scenario can't be measured; the message has the reason."""
 
 
 @dataclass(frozen=True)
 class Places:
-    """Where the ends of all rows meet: the hosts of both, and what stands before the command of pong.
+    """Environment of all rows: hosts of both ends, and the command prefix that runs pong in its network.
 
-    Two networks on one computer share its memory, which two computers don't: there nep is told not to.
+    Two networks on one computer share its memory, unlike two computers, so shared memory is disabled
+    there.
     """
 
     hosts: tuple[str, str]
@@ -52,17 +53,17 @@ class Places:
     rosbridge_master: str = ""
     python2: str = ""
     rosnodejs: str = ""
-    """Its folder."""
+    """Folder of rosnodejs, or an empty string."""
     missing: Mapping[str, str] = field(default_factory=dict)
-    """Why rows cannot be run, by their names."""
+    """Reasons why rows can't run, by row name."""
 
     @property
     def environment(self) -> dict[str, str]:
-        """What both ends find in their environment beside ours."""
+        """Environment variables that are added for both ends."""
         return {"NEP_SHARED_MEMORY": "0"} if self.elsewhere else {}
 
     def of(self, row: str) -> tuple[str, str]:
-        """What ping and pong are told. Raises `NotRunError`."""
+        """Return the `place` arguments of ping and pong. Raises `NotRunError`."""
         if row in self.missing:
             raise NotRunError(self.missing[row])
         if row == "zenoh":
@@ -104,7 +105,7 @@ class Places:
 
 
 class Process:
-    """One end of a row."""
+    """Process of one end of a row."""
 
     def __init__(self, command: Sequence[str], more: Mapping[str, str]) -> None:
         environment = {**os.environ, "PYTHONPATH": str(HERE.parent), **more}
@@ -113,7 +114,7 @@ class Process:
         )
 
     def write(self, what: object) -> None:
-        """Ask. Raises `NotRunError`."""
+        """Send a request as a line of JSON. Raises `NotRunError`."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps(what) + "\n")
@@ -122,7 +123,7 @@ class Process:
             raise NotRunError(self._last_words()) from None
 
     def read(self, key: str) -> Any:  # noqa: ANN401 - what was asked for
-        """The answer. Raises `NotRunError`, with the end's own words when it has some."""
+        """Return the value of `key` in the reply. Raises `NotRunError` with the reason that was reported."""
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         answer = json.loads(line) if line else {}
@@ -139,7 +140,7 @@ class Process:
         return f"one of its programs ended by itself with exit code {self._process.wait()}"
 
     def close(self) -> None:
-        """Let it end; kill it when it doesn't."""
+        """Close the process's standard input and wait until it ends; kill it after 15 s."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         with contextlib.suppress(BrokenPipeError):
@@ -149,7 +150,7 @@ class Process:
 
 
 class Pair:
-    """Ping and pong of a row. Raises `NotRunError`."""
+    """Running ping and pong of a row. Raises `NotRunError`."""
 
     def __init__(self, row: str, places: Places) -> None:
         own, others = places.of(row)
@@ -170,7 +171,7 @@ class Pair:
             self.close = stack.pop_all().close
 
     def take(self, kind: str, size: int, count: int, warm: int) -> list[float]:
-        """Some round trips, after `warm` that do not count; seconds. Raises `NotRunError`."""
+        """Return the seconds of `count` round trips, after `warm` uncounted ones. Raises `NotRunError`."""
         ping, pong = self._ends
         for each in (pong, ping):
             each.write([kind, size, warm + count])
@@ -180,7 +181,7 @@ class Pair:
 
 
 def free_port(host: str) -> int:
-    """A port that nobody has now."""
+    """Return a free TCP port."""
     with socket.socket() as free:
         free.bind((host, 0))
         port: int = free.getsockname()[1]
@@ -188,7 +189,7 @@ def free_port(host: str) -> int:
 
 
 def end(process: subprocess.Popen[Any]) -> None:
-    """Wait until it has ended, and kill it when that takes longer than fifteen seconds."""
+    """Wait until the process ends; kill it after 15 s."""
     try:
         process.wait(END_S)
     except subprocess.TimeoutExpired:
@@ -197,16 +198,16 @@ def end(process: subprocess.Popen[Any]) -> None:
 
 
 def guard() -> tuple[str, ...]:
-    """What stands before a command so that it ends with this process, however that ends (Linux).
+    """Return the command prefix that ends a command with this process, even if that is killed (Linux).
 
-    The ends of the rows and the link do so with their standard input.
+    The ends of the rows and the link don't need it: they end when their standard input is closed.
     """
     return ("setpriv", "--pdeathsig", "TERM") if shutil.which("setpriv") else ()
 
 
 @contextmanager
 def ros_master(host: str, folder: Path) -> Iterator[str]:
-    """The address of a ROS master. Raises `NotRunError`."""
+    """Start a ROS master and yield its address. Raises `NotRunError`."""
     program = shutil.which("rosmaster")
     if program is None:
         raise NotRunError("there is no 'rosmaster'; install it with 'sudo apt install python3-rosmaster'")
@@ -219,7 +220,7 @@ def ros_master(host: str, folder: Path) -> Iterator[str]:
 
 @contextmanager
 def rosbridge(sources: str, address: str, host: str, folder: Path) -> Iterator[str]:
-    """The address of a rosbridge server, started from its sources. Raises `NotRunError`."""
+    """Start a rosbridge server from its sources and yield its address. Raises `NotRunError`."""
     port = free_port(host)
     command = [sys.executable, str(HERE / "rosbridge.py"), sources, host, str(port)]
     with started(command, address, host, folder) as process:
@@ -231,7 +232,7 @@ def rosbridge(sources: str, address: str, host: str, folder: Path) -> Iterator[s
 def started(
     command: Sequence[str], ros_master: str, host: str, folder: Path
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """A program of ROS, which ends with the block."""
+    """Run a ROS program for the duration of the block."""
     environment = {**os.environ, "ROS_MASTER_URI": ros_master, "ROS_IP": host, "ROS_LOG_DIR": str(folder)}
     with (folder / ERRORS).open("wb") as errors:
         process = subprocess.Popen(
@@ -245,7 +246,7 @@ def started(
 
 
 def until_open(process: subprocess.Popen[bytes], folder: Path, at: tuple[str, int], what: str) -> None:
-    """Wait until somebody listens there. Raises `NotRunError`."""
+    """Wait until the server accepts connections at host and port `at`. Raises `NotRunError`."""
     pause, deadline = threading.Event(), time.monotonic() + START_S
     while True:
         with contextlib.suppress(OSError), socket.create_connection(at, 1.0):
@@ -268,7 +269,7 @@ def around(
     python2: str,
     rosnodejs: str,
 ) -> Iterator[Places]:
-    """The places where rows meet, with a ROS master and a rosbridge server where these can be had."""
+    """Yield the environment of all rows, with a ROS master and a rosbridge server where available."""
     missing = {}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nep-paper-")))

@@ -1,19 +1,21 @@
-"""Recording: as fast as a file? nep's recorder, its ring, mcap's own writer and a naive thread in one run.
+"""Benchmark of recording: nep's recorder and flight recorder, mcap's writer, a naive thread, a plain file.
 
-    python3 dev.py bench recorder                                 pictures and small messages; a file of 1 GB
-    python3 dev.py bench recorder -- --gigabytes 10 --blocks 9    the file of the goal
+    python3 dev.py bench recorder                              images and small messages; a file of 1 GB
+    python3 dev.py bench recorder -- --gigabytes 10 --blocks 9 the file size of the goal
 
-Each variant writes the same messages in this process, as fast as it can, until all are in its file. Variants
-are interleaved in random order; a run counts when plain against itself is within 5 %.
+Each variant writes the same messages in this process, as fast as it can, until all are in its file.
+The variants are interleaved in random order. A run counts only if two plain series differ by at most
+5 %.
 
-    plain           the same bytes, 1 MB at a time, into a file
+    plain           the same bytes to a file, 1 MB at a time
     naive           a thread that takes each message from a queue and writes it
-    mcap            the writer of the package `mcap`: no queue, no figures, nothing checked
-    nep             `RecordingWriter`: queue, thread, figures, each JSON tried
+    mcap            the writer of the package `mcap`: no queue, no statistics, no checks
+    nep             `RecordingWriter`: queue, thread, statistics, every JSON payload validated
     ring            `FlightRecorder` of 200 MB
 
-Then the goal's load for some seconds, paced: 100 MB/s of pictures and 20 000 small messages a second at once;
-and a file of so many gigabytes: opened, and sought in 50 times.
+Then the paced load of the goal for some seconds: 100 MB/s of images and 20 000 small messages per
+second at once. Last, a file of the given size in gigabytes is opened, and 50 random times are sought
+in it.
 """
 
 from __future__ import annotations
@@ -51,7 +53,7 @@ LIMITS = WriterLimits(queue_bytes=2_000_000_000, queue_messages=2_000_000, min_f
 
 
 def pictures(count: int) -> list[Message]:
-    """As a camera sends them: bytes that nobody makes smaller, behind the head of a JPEG."""
+    """Return messages as a camera sends them: incompressible bytes with the head of a JPEG."""
     kind = message_kind("/camera", "image", "image", clock=OWN_CLOCK)
     rnd = random.Random(1)
     data = [b"\xff\xd8\xff\xda\x00\x02" + rnd.randbytes(PICTURE_BYTES) for _each in range(20)]
@@ -62,7 +64,7 @@ def pictures(count: int) -> list[Message]:
 
 
 def states(count: int, topics: int = 20) -> list[Message]:
-    """As arms send them: 600 bytes of JSON."""
+    """Return messages as robot arms send them: 600 bytes of JSON."""
     kinds = [message_kind(f"/arm{number}/state", "json", "json", clock=OWN_CLOCK) for number in range(topics)]
     rnd = random.Random(2)
     data = [
@@ -76,14 +78,14 @@ def states(count: int, topics: int = 20) -> list[Message]:
 
 
 def timed(write: Callable[[], object], count: int) -> Sample:
-    """What one message took."""
+    """Return the time per message."""
     started, used = time.perf_counter(), cpu_s()
     write()
     return Sample((time.perf_counter() - started) / count, (cpu_s() - used) / count)
 
 
 class Ways:
-    """Each way to write the same messages into a folder."""
+    """Variants that write the same messages to a folder."""
 
     def __init__(self, folder: Path, messages: Sequence[Message]) -> None:
         self._folder, self._messages = folder, messages
@@ -94,13 +96,13 @@ class Ways:
         return path
 
     def plain(self) -> None:
-        """A megabyte at a time."""
+        """Write the bytes to a file, 1 MB at a time."""
         with self._path("plain").open("wb", buffering=1_000_000) as file:
             for each in self._messages:
                 file.write(each.data)
 
     def naive(self) -> None:
-        """A queue and a thread, and each message for itself."""
+        """Write each message on its own, in a thread with a queue."""
         waiting: queue.Queue[Message | None] = queue.Queue()
 
         def write() -> None:
@@ -117,7 +119,7 @@ class Ways:
         thread.join()
 
     def mcap(self) -> None:
-        """The package's own."""
+        """Write with the package `mcap`."""
         with self._path("mcap.mcap").open("wb") as file:
             writer = Writer(file)
             writer.start()
@@ -130,14 +132,14 @@ class Ways:
             writer.finish()
 
     def nep(self) -> None:
-        """Ours; every message must be there."""
+        """Write with nep's recorder; exit if messages are missing."""
         with RecordingWriter(self._path("nep.mcap"), limits=LIMITS) as writer:
             self._post(writer.post)
         if writer.status.message_count != len(self._messages):
             raise SystemExit(f"messages are missing: {writer.status}")
 
     def ring(self) -> None:
-        """The last 200 MB."""
+        """Write to a flight recorder of 200 MB."""
         with FlightRecorder(self._folder / "ring", size_bytes=200_000_000, limits=LIMITS) as ring:
             self._post(ring.post)
             ring._writer.flush(60.0)  # noqa: SLF001 - the end of the work, before its files are removed
@@ -148,7 +150,7 @@ class Ways:
 
 
 def compare(name: str, messages: Sequence[Message], folder: Path, blocks: int) -> float:
-    """Print the table of one kind of messages; plain against itself."""
+    """Print the table for one kind of messages; return the ratio of the two plain series."""
     ways = Ways(folder, messages)
     count, size = len(messages), sum(each.size_bytes for each in messages)
     variants = {
@@ -173,7 +175,7 @@ def compare(name: str, messages: Sequence[Message], folder: Path, blocks: int) -
 
 
 def paced(folder: Path, seconds: float) -> bool:
-    """100 MB/s of pictures and 20 000 small messages a second at once; whether nothing was lost."""
+    """Record 100 MB/s of images and 20 000 small messages per second; return True if nothing was lost."""
     path = folder / "paced.mcap"
     camera, arms = pictures(int(500 * seconds)), states(int(20_000 * seconds))
     never, step_s = threading.Event(), 0.01
@@ -199,7 +201,7 @@ def paced(folder: Path, seconds: float) -> bool:
 
 
 def large_file(folder: Path, gigabytes: float) -> bool:
-    """A file of so many gigabytes: opened within 0.5 s, sought within 50 ms."""
+    """Return True if a file of this size opens within 0.5 s and each seek takes at most 50 ms."""
     path = folder / "large.mcap"
     made = folder / "one.mcap"
     with RecordingWriter(made, limits=LIMITS) as writer:
@@ -248,12 +250,14 @@ def large_file(folder: Path, gigabytes: float) -> bool:
 
 
 def _later(chunk: ChunkInfo, shift: int) -> ChunkInfo:
-    """The same chunk at a later time."""
     return replace(chunk, start_ns=chunk.start_ns + shift, end_ns=chunk.end_ns + shift)
 
 
 def _indexes(data: bytes, shift: int) -> dict[int, bytes]:
-    """Message indexes whose times are later; those of the messages stay, because nobody looks at them."""
+    """Return message indexes shifted in time.
+
+    The times in the messages themselves stay the same, because nothing in this benchmark reads them.
+    """
     made, at = {}, 0
     while at < len(data):
         length = 9 + int.from_bytes(data[at + 1 : at + 9], "little")
@@ -266,7 +270,7 @@ def _indexes(data: bytes, shift: int) -> dict[int, bytes]:
 
 
 def main() -> int:
-    """Run it; 0 when it counts and the goals were reached."""
+    """Run the benchmark; return 0 if it counts and the goals were reached."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

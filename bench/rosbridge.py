@@ -1,12 +1,13 @@
-"""A rosbridge server of ROS 1, started from its sources beside Debian's rospy: `paper.py` needs one.
+"""Start a rosbridge server of ROS 1 from its sources with Debian's rospy, for `paper.py`.
 
     python bench/rosbridge.py SOURCES HOST PORT
 
-SOURCES is a folder with rosbridge_suite, branch ros1; the ROS master is $ROS_MASTER_URI. rosbridge is in no
-package registry, and its sources want a ROS workspace. What they miss of it is made here: the messages by
-which they tell of their clients, and the look-up of a topic's type. Services, rosapi and authentication are
-not there. It listens at HOST only, which it does not by itself. Python up to 3.11, with roslibpy (for
-autobahn), tornado and pymongo.
+SOURCES is a folder with rosbridge_suite, branch ros1; the ROS master is $ROS_MASTER_URI. rosbridge is
+in no package registry, and its sources need a ROS workspace. This program replaces the parts of it
+that they use: the messages that describe connected clients, and the lookup of a topic's type.
+Services, rosapi and authentication are not available. The server listens at HOST only, which
+rosbridge does not do by default. Needs Python up to 3.11 with roslibpy (for autobahn), tornado and
+pymongo.
 """
 
 from __future__ import annotations
@@ -29,14 +30,14 @@ time connection_time
 
 
 def module(name: str, **content: object) -> None:
-    """A module that can be imported from now on."""
+    """Register a module with this content, so that it can be imported."""
     made = types.ModuleType(name)
     vars(made).update(content)
     sys.modules[name] = made
 
 
 def topic_type(topic: str, *_rest: object) -> tuple[str | None, str | None, None]:
-    """As rostopic answers it: the type that is published there."""
+    """Return the type of a published topic, in the form of rostopic's `get_topic_type`."""
     import rospy  # type: ignore[import-not-found] # noqa: PLC0415 - `library` has found it
 
     found = dict(rospy.get_published_topics()).get(topic)
@@ -44,7 +45,7 @@ def topic_type(topic: str, *_rest: object) -> tuple[str | None, str | None, None
 
 
 def main(arguments: list[str]) -> None:
-    """Serve until it is ended."""
+    """Run the server until the process is stopped."""
     sources, host, port = arguments
     get_rospy()
     import genpy.dynamic  # type: ignore[import-not-found] # noqa: PLC0415

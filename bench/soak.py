@@ -1,13 +1,14 @@
-"""The window for a long time, with everything on: memory stays flat, and handles are given back.
+"""Endurance test of the window with everything running: memory stays flat and handles are released.
 
     python bench/soak.py [--minutes 15] [--csv build/soak.csv]
 
-The real window with a virtual robot whose camera shows, a behaviour that moves it for ever, and a person's
-restless hands: layouts, panels and topics change every two seconds, the program is stopped and run again.
-Sampled are the memory (of each process what is no file's), handles and threads of this process and all
-that it started. After a warm-up of a third a line is fitted: what it rises until the end must stay within
-6 % of the memory, or 12 MB. Handles and threads come and go with what can be seen: the most of the second
-half after the warm-up must not be above the most of the first.
+The real window has a virtual robot with a visible camera and a behaviour that moves it endlessly.
+Simulated user actions change layouts, panels and topics every two seconds, and stop and run the
+program again. Memory (without file mappings), handles and threads of this process and all its child
+processes are sampled. After a warm-up of one third of the time a line is fitted to the memory: its
+rise until the end must stay within 6 % of the memory, or 12 MB. Handles and threads vary with the
+visible panels: their maximum in the second half after the warm-up must not exceed that of the first
+half.
 """
 
 from __future__ import annotations
@@ -38,12 +39,12 @@ PEPPER = json.loads((ROOT / "resources/examples/1-greeting.nepb").read_text("utf
 
 
 def shadow(kind: str, field: str, value: object) -> dict[str, object]:
-    """A block in a hole."""
+    """Return a shadow block for a slot."""
     return {"shadow": {"type": kind, "id": f"{kind} {value}", "fields": {field: value}}}
 
 
 def behaviour() -> dict[str, object]:
-    """Turns, and says so, for ever."""
+    """Return a behaviour that turns the robot and lets it speak, in an endless loop."""
     pepper: dict[str, object] = {"ROBOT": "Pepper"}
     say = {
         "type": "robot_pepper_do_say",
@@ -71,7 +72,7 @@ def behaviour() -> dict[str, object]:
 
 @dataclass(frozen=True)
 class Sample:
-    """One moment: seconds since the beginning, memory in MB, and how many of the rest."""
+    """One sample: seconds since the start, memory in MB, the tick in ms, and counts."""
 
     at_s: float
     studio_mb: float
@@ -81,17 +82,20 @@ class Sample:
     threads: int
     window_ms: float
     sizes: Mapping[int, float] = field(default_factory=dict, repr=False)
-    """The others by process number, in MB: those that live all the time are judged."""
+    """Memory of the child processes in MB, by process ID; only those that live throughout are judged."""
 
 
 def private_mb(process: psutil.Process) -> float:
-    """Memory that is no file's: what libraries take depends on who else uses them."""
+    """Return the memory without file mappings, in MB.
+
+    How much of the mapped libraries counts for a process depends on the other processes that use them.
+    """
     memory = process.memory_info()
     return (memory.rss - getattr(memory, "shared", 0)) / 1e6
 
 
 def take(began: float, opened: Studio) -> Sample:
-    """Look at this process and all that it started."""
+    """Take a sample of this process and all its child processes."""
     own = psutil.Process()
     sizes: dict[int, float] = {}
     for other in own.children(recursive=True):
@@ -112,7 +116,7 @@ def take(began: float, opened: Studio) -> Sample:
 
 
 def hands(opened: Studio) -> Iterator[Callable[[], object]]:
-    """What a restless person does, one thing after the other, for ever."""
+    """Yield simulated user actions endlessly."""
     commands, session = opened.commands, opened.session
     panels, topics = cycle(PANELS), cycle(range(7))
 
@@ -147,7 +151,7 @@ def hands(opened: Studio) -> Iterator[Callable[[], object]]:
 
 
 def soak(opened: Studio, seconds: float) -> list[Sample]:
-    """Live so long; the samples."""
+    """Run the window for `seconds` with simulated user actions; return the samples."""
     began, doing, samples = time.monotonic(), hands(opened), []
     next_step = next_sample = began
     while (now := time.monotonic()) < began + seconds:
@@ -163,7 +167,7 @@ def soak(opened: Studio, seconds: float) -> list[Sample]:
 
 
 def begin_recording(session: Session) -> None:
-    """Record everything, pictures too, for as long as it lives."""
+    """Start a recording of all topics, including images."""
     folder = session.settings.path.parent / "Recordings"
     folder.mkdir()
     session.recordings.set_folder(folder)
@@ -172,7 +176,7 @@ def begin_recording(session: Session) -> None:
 
 
 def recorded_all(session: Session) -> bool:
-    """End the recording; whether it is whole, and has everything that came."""
+    """Stop the recording; return True if its file is complete and no message was dropped."""
     session.recordings.stop()
     until(lambda: not session.recordings.is_recording, "the recording has ended", 60.0)
     (path,) = session.recordings.folder.glob("*.mcap")
@@ -186,20 +190,20 @@ def recorded_all(session: Session) -> bool:
 
 
 def rise(samples: Sequence[Sample], values: Sequence[float]) -> float:
-    """How much a fitted line rises from the first of these samples to the last."""
+    """Return the rise of a fitted line from the first to the last sample."""
     slope = statistics.linear_regression([sample.at_s for sample in samples], values).slope
     return slope * (samples[-1].at_s - samples[0].at_s)
 
 
 def chart(values: Sequence[float], width: int = 60) -> str:
-    """The values as a line of bars, from the least to the most."""
+    """Return the values as a sparkline, scaled from minimum to maximum."""
     least, most = min(values), max(values)
     chosen = [values[n * (len(values) - 1) // max(1, width - 1)] for n in range(min(width, len(values)))]
     return "".join(BARS[round((value - least) / ((most - least) or 1) * 7)] for value in chosen)
 
 
 def judge(samples: Sequence[Sample]) -> bool:
-    """Print the table; whether everything stayed flat after the warm-up."""
+    """Print the table; return True if everything stayed flat after the warm-up."""
     warm = samples[len(samples) // 3 :]
     flat = True
     print(f"{'':>10} {'first':>8} {'warm':>8} {'last':>8} {'most':>8} {'rise':>8} {'may':>7}")
@@ -227,7 +231,7 @@ def judge(samples: Sequence[Sample]) -> bool:
 
 
 def main() -> int:
-    """Live, print a table and write the samples; 0 when everything stayed flat."""
+    """Run the test, print a table and write the samples; return 0 if everything stayed flat."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--minutes", type=float, default=15.0)
     parser.add_argument("--csv", type=Path, default=ROOT / "build" / "soak.csv")

@@ -1,9 +1,10 @@
-"""How long Stop takes until every robot has answered: three robots in processes of their own, all moving.
+"""Benchmark of Stop: the time until all of three moving robots, each in its own process, have replied.
 
-``python bench/stop.py [--stops 60] [--robots 3]``: each round lets every robot move, presses Stop as Studio
-does (`app.core.robots.stop.stopper.RobotStopper`, one stop to all), and takes the time to the last answer. It
-means that the robot stands still: its stop method has returned and all its functions have ended. The row
-"sent and echoed" is the same way over the wire with an answer that costs nothing, in the same rounds.
+``python bench/stop.py [--stops 60] [--robots 3]``: each round moves every robot, presses Stop as Studio
+does (`app.core.robots.stop.stopper.RobotStopper`, one stop for all) and takes the time to the last
+reply. A reply confirms that the robot stands still: its stop method has returned and all its functions
+have ended. The row "sent and echoed" is the same path over the wire with a reply that takes no work, in
+the same rounds.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ MOVES: Mapping[str, tuple[str, Mapping[str, object]]] = {
 
 
 class Watching:
-    """Hears the robots' answers, and knows which commands run."""
+    """Command publishers and reply subscribers of the robots."""
 
     def __init__(self, node: nep.Node, robots: Sequence[Robot]) -> None:
         self._changed = threading.Condition()
@@ -51,11 +52,11 @@ class Watching:
             self._changed.notify_all()
 
     def send(self, robot: str, **command: object) -> None:
-        """Give a command to a robot."""
+        """Send a command to a robot."""
         self._commands[robot].publish({"from": "bench", **command})
 
     def wait(self, ids: Sequence[str], states: Sequence[str], timeout_s: float) -> bool:
-        """Wait until each command has been answered with one of these states."""
+        """Wait until each command has a reply with one of these states; return False on timeout."""
 
         def so() -> bool:
             return all(set(states) & set(self._states.get(one, ())) for one in ids)
@@ -65,7 +66,7 @@ class Watching:
 
 
 def start_robots(address: str, count: int) -> list[subprocess.Popen[bytes]]:
-    """So many virtual robots, Peppers and Turtles in turn, each in its own process."""
+    """Start `count` virtual robots, alternately Pepper and Turtle, each in its own process."""
     environment = {**os.environ, "NEP_MASTER": address, "PYTHONPATH": str(ROOT)}
     made = []
     for number in range(count):
@@ -76,7 +77,7 @@ def start_robots(address: str, count: int) -> list[subprocess.Popen[bytes]]:
 
 
 def described(node: nep.Node, count: int) -> list[Robot]:
-    """The robots' own descriptions."""
+    """Wait for the robots' descriptions and return them; exit if one is missing."""
     found = []
     for number in range(count):
         topic = f"/Robot{number + 1}/description"
@@ -90,7 +91,7 @@ def described(node: nep.Node, count: int) -> list[Robot]:
 def one_round(
     number: int, robots: Sequence[Robot], watching: Watching, stopper: RobotStopper
 ) -> tuple[float, float]:
-    """Let all move, stop all; milliseconds to the last answer of the stop, and of a bare echo."""
+    """Move and stop all robots; return the milliseconds to the last reply of Stop and of an echo."""
     ids = []
     for robot in robots:
         action, given = MOVES[robot.model]
@@ -110,7 +111,7 @@ def one_round(
 
 
 def _echo(number: int, robots: Sequence[Robot], watching: Watching) -> None:
-    """A cancel of what never was: it is refused at once, and moves nothing."""
+    """Cancel a task that doesn't exist: the robot rejects it at once, without any motion."""
     ids = [f"echo-{robot.name}-{number}" for robot in robots]
     for robot, wanted in zip(robots, ids, strict=True):
         watching.send(robot.name, id=wanted, op="cancel")
@@ -124,13 +125,13 @@ def _timed(what: Callable[[], None]) -> float:
 
 
 def share(values: Sequence[float], part: float) -> float:
-    """The value below which this part of them lies."""
+    """Return the quantile `part` (0 to 1) of the values."""
     ordered = sorted(values)
     return ordered[min(len(ordered) - 1, round(part * (len(ordered) - 1)))]
 
 
 def table(rows: Mapping[str, Sequence[float]]) -> str:
-    """The figures, in milliseconds."""
+    """Format the results in milliseconds as a table."""
     lines = [f"{'ms':<28}{'median':>9}{'p95':>9}{'most':>9}"]
     for name, values in rows.items():
         figures = (statistics.median(values), share(values, 0.95), max(values))
@@ -139,7 +140,7 @@ def table(rows: Mapping[str, Sequence[float]]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure and print; 0 when the 95th per cent is within the goal."""
+    """Measure and print; return 0 if the 95th percentile is within the goal."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--stops", type=int, default=60)
     parser.add_argument("--robots", type=int, default=3)
@@ -161,7 +162,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def measure(address: str, count: int, stops: int) -> tuple[list[float], list[float]]:
-    """All rounds after one that is not counted."""
+    """Return the results of all rounds except an uncounted first one: stops and echoes, in ms."""
     with nep.node("bench", master=address) as node:
         robots = described(node, count)
         watching, stopper = Watching(node, robots), RobotStopper(node)

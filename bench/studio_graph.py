@@ -1,11 +1,12 @@
-"""A graph of 500 nodes and 2 000 lines open in the real window, its figures told once a second.
+"""Benchmark of the Graph panel with 500 nodes and 2 000 connections, updated once per second.
 
     python bench/studio_graph.py [--nodes 500] [--lines 2000] [--seconds 8]
 
-The graph is given to the session as a master would tell it. "plain" is the same window with 10 nodes, "plain
-again" tells how far to trust the rest. "closed" are the groups as they are at first with so many nodes, "all"
-all nodes in sight, "100 %" a part of them, with words, "still" the same while nothing changes. Paintings are
-those of the graph. At the end: how long the places of all took, and how late the window was meanwhile.
+The graph is posted to the session as if a master had sent it. "plain" is the same window with 10
+nodes; "plain again" is a second series, which shows the noise. "closed" has collapsed groups, the
+default for this number of nodes; "all" shows all nodes; "100 %" shows a part of them with labels;
+"still" is the same without updates. Paintings are those of the graph. At the end, the layout of all
+nodes is timed, with the delay of the window's event loop meanwhile.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ HOSTS, STAGES, FORWARD, ABROAD = 10, 5, 0.9, 0.15
 
 
 def graph(nodes: int, lines: int, revision: int, update: int) -> GraphView:
-    """Nodes on some computers, in stages as robots have them: drivers, filters, what decides, what acts."""
+    """Return a graph on several computers, in stages as in robots: drivers, filters, planning, actuators."""
     chance = random.Random(nodes)
     infos = {
         f"n{n}": NodeInfo(f"n{n}", f"node {n}", f"computer {n % HOSTS}", 100 + n, "Python", "native", n, 0.01)
@@ -60,7 +61,7 @@ def graph(nodes: int, lines: int, revision: int, update: int) -> GraphView:
 
 
 class Figures:
-    """Tells the session the figures of a graph, once a second, as long as it is `on`."""
+    """Timer that posts updated numbers of a graph to the session once per second."""
 
     def __init__(self, opened: Studio, graphs: Sequence[GraphView]) -> None:
         self._post = opened.session._mailbox.post_event  # noqa: SLF001
@@ -69,23 +70,23 @@ class Figures:
         self._timer.timeout.connect(self.tell)
 
     def tell(self) -> None:
-        """The next figures."""
+        """Post the next numbers."""
         self._turn += 1
         self._post(GraphReceived(self._graphs[self._turn % len(self._graphs)], 0.001))
 
     def go_on(self, on: bool) -> None:
-        """Tell them from now on, or no more."""
+        """Start or stop the updates."""
         (self._timer.start if on else self._timer.stop)(*((1000,) if on else ()))
 
 
 def placed(panel: GraphPanel) -> bool:
-    """Whether the newest graph has its places and is shown."""
+    """Return True once the newest graph has its layout and is shown."""
     scene = panel.canvas.scene
     return scene is not None and scene.graph == panel._asked and not panel._thread.is_busy  # noqa: SLF001
 
 
 def show(name: str, row: Row, painted: int) -> None:
-    """One line of the table."""
+    """Print a row of the table."""
     print(
         f"{name:>14} {row.process:>8.1%} {row.gui:>7.1%} {row.ticks:>7.1%} {row.panels:>7.1%} "
         f"{painted / row.seconds:>10.1f} {row.late_p99:>9.1f} {row.late_max:>6.1f} {row.memory:>7.0f}",
@@ -94,7 +95,7 @@ def show(name: str, row: Row, painted: int) -> None:
 
 
 class Runs:
-    """Measures one state of the window after the other, and prints each."""
+    """Measurement of one state of the window after another; each is printed."""
 
     def __init__(self, opened: Studio, panel: GraphPanel) -> None:
         self.meter, self.panel = Meter(opened), panel
@@ -105,7 +106,7 @@ class Runs:
         )
 
     def measure(self, name: str, figures: Figures, seconds: float, *, on: bool = True) -> None:
-        """Let it live for so long, with figures that are told or without."""
+        """Measure and print the window for `seconds`, with or without updates."""
         figures.go_on(on)
         run_for(2.0)
         before = self.panel.canvas.painted
@@ -114,7 +115,10 @@ class Runs:
         show(name, self.rows[name], self.panel.canvas.painted - before)
 
     def place_all(self) -> float:
-        """Open every group, and wait until all have their places; how late the window was, in ms."""
+        """Expand every group and wait for the layout of all nodes.
+
+        Return the longest delay of the window's event loop, in ms.
+        """
         panel, began, late = self.panel, time.monotonic(), [0.0]
         panel._layout = None  # noqa: SLF001
         scene = panel.canvas.scene
@@ -131,7 +135,7 @@ class Runs:
 
 
 def opened_graph(opened: Studio) -> GraphPanel:
-    """The window's Graph, on a network of nobody."""
+    """Return the window's Graph panel, disconnected from the master so that only posted graphs are shown."""
     until(lambda: opened.session.master.kind == "connected", "the master is there")
     opened.session.source.close()  # it would tell of an empty network in between
     opened.commands.run("panel:graph")
@@ -141,7 +145,7 @@ def opened_graph(opened: Studio) -> GraphPanel:
 
 
 def main() -> int:
-    """Measure, print a table; 0 when the goals were reached."""
+    """Measure and print a table; return 0 if the goals were reached."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--nodes", type=int, default=500)
     parser.add_argument("--lines", type=int, default=2000)

@@ -1,12 +1,12 @@
-"""What Studio takes while nobody does anything: a window that nothing changes in, and one with a robot.
+"""Benchmark of an idle Studio: a window without changes, and one with a virtual robot.
 
     python bench/studio_idle.py [--seconds 20]
 
-The real window in a robot's Behaviour layout (editor, camera at 15 pictures a second, state, sensors) and in
-the Developer layout, without a robot and with the virtual one that stands still. Measured is the processor
-time of the window's own thread and of the threads in which a graphics driver without a graphics processor
-draws (llvmpipe): both together are what a picture on the screen costs. "again" is the A/A row. On a computer
-with a graphics processor there are no such threads, and the row says 0.
+The real window shows a robot's Behaviour layout (editor, camera at 15 images per second, state,
+sensors) and the Developer layout, without a robot and with a virtual one that stands still. Measured
+is the processor time of the window's own thread and of the threads in which a graphics driver without
+a GPU renders (llvmpipe): together they are the cost of updating the screen. "again" is the A/A row.
+On a computer with a GPU there are no such threads, and the column shows 0.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from studio_window import BARE, Child, Studio, child, network, run_for, studio, 
 
 SHARE, SETTLE_S = 0.15, 5.0
 DRIVER = ("llvmpipe",)
-"""How the threads of a driver that draws by the processor are named."""
+"""Prefixes of the names of threads in which a software graphics driver renders."""
 ROBOT = "Pepper"
 
 
 class Paints(QObject):
-    """Counts how often the window is brought up to date on the screen."""
+    """Counter of the window's updates on the screen."""
 
     def __init__(self, opened: Studio) -> None:
         super().__init__()
@@ -45,7 +45,7 @@ class Paints(QObject):
 
 @dataclass(frozen=True)
 class Shares:
-    """Of one core: the window's own thread, the driver's, all others of the process; updates a second."""
+    """Shares of one core (the window's thread, the driver, all other threads), and updates per second."""
 
     window: float
     driver: float
@@ -54,12 +54,12 @@ class Shares:
 
     @property
     def drawn(self) -> float:
-        """What the goal is about."""
+        """Share of the window's thread and the driver together, which the goal limits."""
         return self.window + self.driver
 
 
 def driver_seconds() -> float:
-    """Processor time that threads of a drawing driver have taken, in seconds."""
+    """Return the processor time of the threads in which a software graphics driver renders, in seconds."""
     total = 0.0
     for thread in psutil.Process().threads():
         name = Path(f"/proc/self/task/{thread.id}/comm")
@@ -73,7 +73,7 @@ def driver_seconds() -> float:
 
 
 def measure(paints: Paints, seconds: float) -> Shares:
-    """Let the window live for so long."""
+    """Run the window for `seconds` and return its shares."""
     paints.count = 0
     began, window, process, driver = (
         time.perf_counter(),
@@ -89,7 +89,7 @@ def measure(paints: Paints, seconds: float) -> Shares:
 
 
 def show(name: str, shares: Shares) -> None:
-    """One line of the table."""
+    """Print a row of the table."""
     print(
         f"{name:>32} {shares.window:>8.1%} {shares.driver:>8.1%} {shares.drawn:>9.1%} {shares.rest:>8.1%} "
         f"{shares.updates_hz:>10.1f}",
@@ -98,7 +98,7 @@ def show(name: str, shares: Shares) -> None:
 
 
 def rows(opened: Studio, bare: Child, seconds: float) -> tuple[list[Shares], float]:
-    """The table; the Behaviour layout's rows with the robot, and how late a program was that only waits."""
+    """Print the table; return the Behaviour rows with the robot, and the delay of an idle program in ms."""
     assert threading.current_thread() is threading.main_thread()
     paints = Paints(opened)
     print(
@@ -123,7 +123,7 @@ def rows(opened: Studio, bare: Child, seconds: float) -> tuple[list[Shares], flo
 
 
 def main() -> int:
-    """Measure, print a table; 0 when the goal was reached."""
+    """Measure and print a table; return 0 if the goal was reached."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=20.0)
     seconds = parser.parse_args().seconds

@@ -1,11 +1,11 @@
-"""Picture streams into the open window: four of 1280 x 720, two of 1920 x 1080, 30 a second each.
+"""Benchmark of image streams in the open window: four of 1280 x 720, two of 1920 x 1080, 30 Hz each.
 
     python bench/studio_images.py [--seconds 8]
 
-Another process publishes JPEG pictures of a scene that moves; each stream has an Image panel of its own in
-the real window. "shown" is how many of the pictures sent were painted, "age" the time from publishing to
-painting in ms, "late" how late a timer of 10 ms was in the window's event loop, "bare" how late a program is
-that only waits.
+Another process publishes JPEG images of a moving scene. Each stream has its own Image panel in the
+real window. "shown" is the share of the sent images that were painted, "age" the time from publishing
+to painting in ms, "late" the delay of a 10 ms timer in the window's event loop, "bare" the delay of a
+program that only waits.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ for line in sys.stdin:
 
 
 class Eyes(QObject):
-    """Notes every picture that a view paints, and how old it is then."""
+    """Event filter that records the age of every image that a view paints."""
 
     def __init__(self, views: list[PictureView]) -> None:
         super().__init__()
@@ -80,7 +80,7 @@ class Eyes(QObject):
             view.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802  Qt's name
-        """Only looks."""
+        """Record the age of a newly painted image; never filter an event out."""
         if event.type() == QEvent.Type.Paint and isinstance(watched, PictureView):
             picture = watched.picture
             if picture is not None and picture is not self._seen.get(watched):
@@ -91,7 +91,7 @@ class Eyes(QObject):
 
 
 def open_views(opened: Studio, topics: list[str]) -> list[PictureView]:
-    """One Image panel for each topic, all of them to be seen, nothing beside them."""
+    """Open an Image panel for each topic, all visible, and close all other panels."""
     bench = opened.window.bench
     assert bench is not None
     for name in bench.open_names():
@@ -113,7 +113,7 @@ def open_views(opened: Studio, topics: list[str]) -> list[PictureView]:
 
 
 def case(address: str, bare: Child, shape: tuple[int, int, int], seconds: float) -> tuple[bool, float]:
-    """One line of the table; whether its goals were reached, and how late the computer was."""
+    """Measure and print a row; return whether its goals were reached, and an idle program's delay in ms."""
     count, width, height = shape
     with child(CAMERAS, [str(word) for word in (*shape, HZ)], address) as cameras, studio(address) as opened:
         cameras.answer()
@@ -147,7 +147,7 @@ def case(address: str, bare: Child, shape: tuple[int, int, int], seconds: float)
 
 
 def main() -> int:
-    """Measure, print a table; 0 when every goal was reached."""
+    """Measure and print a table; return 0 if every goal was reached."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=8.0)
     seconds: float = parser.parse_args().seconds

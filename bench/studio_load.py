@@ -1,12 +1,13 @@
-"""Messages of 1 kB JSON from other processes into the open window: 50 000 a second, and 300 000.
+"""Benchmark of 1 kB JSON messages from other processes in the open window: 50 000 and 300 000 per second.
 
     python bench/studio_load.py [--seconds 8] [--rates 50000 300000] [--publishers 2]
 
-The window is the real one: the Developer layout, the Topics panel and an Inspector on a busy topic. What the
-panels' own painting costs is measured first, with 30 messages a second on the same topics ("plain", and
-"plain again" to tell how far to trust the rest); what a row takes beyond it is the messages' own. "bare" is
-how late (p99) a program is that only waits, at the same time: of a busy computer nothing can be told. Drops
-are exact when every message that was sent is kept for the panels, or counted as dropped or lost.
+The window is the real one: the Developer layout, the Topics panel and an Inspector on a busy topic.
+The cost of the panels' own painting is measured first, with 30 messages per second on the same topics
+("plain", and "plain again", which shows the noise); what a row needs beyond it is the cost of the
+messages. "bare" is the delay (p99) of a program that only waits at the same time: results from a busy
+computer are not meaningful. Drops are exact if every sent message is kept for the panels, or counted
+as dropped or lost.
 """
 
 from __future__ import annotations
@@ -49,14 +50,14 @@ for line in sys.stdin:
 
 
 class Load:
-    """The window with publishers before it."""
+    """Window that receives the messages of several publisher processes."""
 
     def __init__(self, opened: Studio, publishers: list[Child], topics: list[str], bare: Child) -> None:
         self.opened, self.publishers, self.topics = opened, publishers, topics
         self.meter, self._bare, self.bare_ms = Meter(opened), bare, 0.0
 
     def row(self, name: str, rate: float, seconds: float, plain: Row | None = None) -> Row:
-        """Let the publishers send so many a second together; print and return what the window took."""
+        """Let the publishers send `rate` messages per second in total; print and return a row."""
         self._bare.tell(f"{seconds}")
         for publisher in self.publishers:
             publisher.tell(f"{rate / len(self.publishers)} {seconds + 0.5}")
@@ -77,13 +78,13 @@ class Load:
         return row
 
     def counted(self) -> tuple[int, int, int]:
-        """Messages kept for the panels, dropped before them, and lost on the way, of all the topics."""
+        """Return the numbers of kept, dropped and lost messages of all topics."""
         known = [self.opened.session.topics[topic] for topic in self.topics]
         kept = sum(topic.received - topic.dropped for topic in known)
         return kept, sum(topic.dropped for topic in known), sum(topic.missed for topic in known)
 
     def is_exact(self) -> bool:
-        """Whether every message that was sent is accounted for; waits for the last ones to arrive."""
+        """Wait for the last messages; return True if every sent message is kept or counted."""
         for publisher in self.publishers:
             publisher.tell("30 1.0")  # by what comes behind a burst one knows what was lost of it
         sent = sum(int(publisher.answer().split()[0]) for publisher in self.publishers)
@@ -100,7 +101,7 @@ class Load:
         return exact
 
     def measure(self, rates: list[float], seconds: float) -> bool:
-        """The table; whether all goals were reached."""
+        """Print the table; return True if all goals were reached."""
         print(
             f"{'':>12} {'sent/s':>9} {'GUI':>7} {'beyond':>7} {'tick':>7} {'panels':>7} {'process':>7} "
             f"{'late50':>6} {'p99 ms':>6} {'max':>6} {'bare':>6} {'RSS MB':>7}"
@@ -122,7 +123,7 @@ class Load:
 
 
 def main() -> int:
-    """Measure, print a table; 0 when every goal was reached."""
+    """Measure and print a table; return 0 if every goal was reached."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=8.0)
     parser.add_argument("--rates", type=float, nargs="*", default=[50_000.0, 300_000.0])

@@ -1,13 +1,14 @@
-"""What each panel costs while it shows something: alone in the real window, all of them one after the other.
+"""Benchmark of each panel while it shows data: alone in the real window, one after the other.
 
     python bench/studio_panels.py [--seconds 8] [--panels plot image ...]
 
-Another process publishes a robot's state 100 times a second, a colour picture of 640 x 480 25 times, twenty
-small topics ten times, a line of log twenty times; the virtual robot stands there. "plain" is the window with
-the Alerts panel alone, which shows nothing; "plain again" is the A/A row. Of a panel are told: what its
-`refresh` takes each time that it is asked, what the window's thread takes beyond the plain one with all
-painting, what a graphics driver without a graphics processor takes beyond it (the editor was shown before, so
-it composes the window), and how often the window is brought up to date. Shares are of one processor core.
+Another process publishes a robot's state at 100 Hz, a colour image of 640 x 480 at 25 Hz, twenty
+small topics at 10 Hz and log records at 20 Hz; a virtual robot is connected. "plain" is the window
+with the Alerts panel alone, which shows nothing; "plain again" is the A/A row. For each panel the
+table has: the time of one call of `refresh`; the time of the window's thread beyond the plain window,
+including all painting; the time of a graphics driver without a GPU beyond it (the editor was shown
+before, so the driver composes the window); and how often the window is updated. Shares are of one
+processor core.
 """
 
 from __future__ import annotations
@@ -59,12 +60,12 @@ SHOWN = {
     "plot": ("plot_field", STATE, "joints[0]"),
     "publish": ("show_topic", STATE),
 }
-"""What a panel is asked to show, where it does not choose for itself."""
+"""Method that selects what a panel shows, and its arguments, for panels without a default."""
 
 
 @dataclass
 class Cost:
-    """One row. Shares of a core; `refresh_ms` for each time."""
+    """Row of the table: shares of one core, and milliseconds per call of `refresh`."""
 
     refresh_ms: float = 0.0
     refreshes_hz: float = 0.0
@@ -74,7 +75,7 @@ class Cost:
 
 
 class Refreshes:
-    """Times the `refresh` of one dock."""
+    """Timer of the `refresh` calls of a dock."""
 
     def __init__(self, dock: Dock) -> None:
         self.count, self.took_s = 0, 0.0
@@ -89,7 +90,7 @@ class Refreshes:
 
 
 def alone(opened: Studio, name: str) -> Dock | None:
-    """Open this panel and close all others; None when this layout cannot have it."""
+    """Open this panel and close all others; return None if the layout doesn't have it."""
     bench = opened.window.bench
     if bench is None:
         return None
@@ -106,7 +107,7 @@ def alone(opened: Studio, name: str) -> Dock | None:
 
 
 def measure(paints: Paints, dock: Dock, seconds: float) -> Cost:
-    """Let the window live for so long with this panel alone."""
+    """Run the window with this panel alone for `seconds` and return its cost."""
     run_for(SETTLE_S)
     refreshes, paints.count = Refreshes(dock), 0
     began, window, driver = time.perf_counter(), time.thread_time(), driver_seconds()
@@ -124,7 +125,7 @@ def measure(paints: Paints, dock: Dock, seconds: float) -> Cost:
 
 
 def show(name: str, cost: Cost, plain: Cost) -> None:
-    """One line of the table."""
+    """Print a row of the table."""
     print(
         f"{name:>14} {cost.refresh_ms:>10.3f} {cost.refreshes_hz:>9.0f} {cost.window:>8.1%} "
         f"{cost.window - plain.window:>8.1%} {cost.driver - plain.driver:>8.1%} {cost.updates_hz:>10.1f}",
@@ -133,7 +134,7 @@ def show(name: str, cost: Cost, plain: Cost) -> None:
 
 
 def rows(opened: Studio, bare: Child, names: list[str], seconds: float) -> tuple[bool, float]:
-    """The table; whether the plain window was the same again, and how late a program was that only waits."""
+    """Print the table; return whether both plain rows agree, and the delay of an idle program in ms."""
     paints = Paints(opened)
     print(
         f"{'':>14} {'refresh ms':>10} {'times/s':>9} {'window':>8} {'beyond':>8} {'driver':>8} "
@@ -158,7 +159,7 @@ def rows(opened: Studio, bare: Child, names: list[str], seconds: float) -> tuple
 
 
 def main() -> int:
-    """Measure, print a table; 0 when the run counts."""
+    """Measure and print a table; return 0 if the run counts."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=8.0)
     parser.add_argument("--panels", nargs="*", help="all of them when none is named")

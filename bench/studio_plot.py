@@ -1,12 +1,12 @@
-"""What a plot costs in the real window: ten curves at 1 kHz over a minute, and a million points.
+"""Benchmark of plots in the real window: ten curves at 1 kHz over a minute, and a million points.
 
     python bench/studio_plot.py [--seconds 6]
 
-Another process publishes ten topics at 1 kHz each (10 000 messages a second), or one topic with ten numbers
-at 1 kHz; the Plot panel draws ten curves of them, whose last minute was put there before. Measured is the
-processor time of the whole process beyond that of the window whose plot is empty ("plain"; "plain again" is
-the A/A row), and how long a drawing takes. At last one curve has a million points and gets a thousand more
-each second.
+Another process publishes ten topics at 1 kHz each (10 000 messages per second), or one topic with ten
+numbers at 1 kHz. The Plot panel draws ten curves of them, whose last minute is filled in before.
+Measured is the processor time of the whole process beyond that of the window with an empty plot
+("plain"; "plain again" is the A/A row), and the time of one drawing. In the last row one curve has a
+million points and gets a thousand more each second.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ for line in sys.stdin:
 
 
 class Drawings:
-    """How long each drawing of a plot took, in ms."""
+    """Durations of the drawings of a plot, in ms."""
 
     def __init__(self, plot: PlotPanel) -> None:
         self.took_ms: list[float] = []
@@ -65,7 +65,7 @@ class Drawings:
 
 
 def opened_plot(opened: Studio) -> PlotPanel:
-    """The plot, as wide as the window leaves it."""
+    """Open the Plot panel and return it."""
     dock = opened.window.open_panel("plot")
     assert dock is not None
     dock.panel.resize(dock.panel.size())
@@ -74,7 +74,7 @@ def opened_plot(opened: Studio) -> PlotPanel:
 
 
 def fill(plot: PlotPanel, points: int) -> None:
-    """Give each curve so many points before now, 1 ms apart, as if they had come."""
+    """Append `points` past samples to each curve, 1 ms apart, up to the current time."""
     now_s = plot.session.series.now_s()
     times = now_s - np.arange(points, 0, -1) / HZ
     for number, shown in enumerate(plot.shown):
@@ -83,7 +83,7 @@ def fill(plot: PlotPanel, points: int) -> None:
 
 
 def replot(plot: PlotPanel, fields: Sequence[str]) -> None:
-    """Draw these fields and nothing else."""
+    """Plot these fields and remove all others."""
     for shown in list(plot.shown):
         plot.remove(shown.name)
     for field in fields:
@@ -92,7 +92,7 @@ def replot(plot: PlotPanel, fields: Sequence[str]) -> None:
 
 
 def show(name: str, row: Row, plain: float, drawings: Drawings) -> float:
-    """One line of the table; what it took beyond the plain window."""
+    """Print a row of the table; return the process's share beyond the plain window."""
     took = drawings.took_ms
     each = f"{statistics.median(took):>8.1f}" if took else f"{'':>8}"
     print(
@@ -105,7 +105,7 @@ def show(name: str, row: Row, plain: float, drawings: Drawings) -> float:
 
 
 def main() -> int:
-    """Measure, print a table; 0 when the goal was reached."""
+    """Measure and print a table; return 0 if the goal was reached."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=6.0)
     seconds = parser.parse_args().seconds

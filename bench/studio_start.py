@@ -1,13 +1,13 @@
-"""How long Studio takes to start: to a window that can be used, and to the block editor.
+"""Benchmark of Studio's start: the time to a usable window, and to the block editor.
 
     python bench/studio_start.py [--times 7] [--imports]
 
-Each start is a process of its own, on a home of its own, and its times are counted from the moment the
-process was asked for; "own work" is the processor time of the process itself, which other programs stretch
-less. "window" is the first paint of the window, "usable" the first turn of its event loop
-after it (a click is answered from then on), "master" the first answer of a master that Studio started itself,
-"editor" the block editor's page, up with its blocks. "plain" is a Qt window with one label, and "plain again"
-tells how far to trust the rest. --imports lists what takes longest to import.
+Each start is a separate process with its own home folder. Its times are counted from the creation of
+the process; "own work" is the processor time of the process, which depends less on other programs.
+"window" is the first paint of the window, "usable" the first iteration of the event loop after it
+(from then on clicks are handled), "master" the first reply of a master that Studio started, "editor"
+the block editor's page with its blocks. "plain" is a Qt window with one label; "plain again" is a
+second series, which shows the noise. --imports lists the modules that take longest to import.
 """
 
 from __future__ import annotations
@@ -102,7 +102,10 @@ app.exec()
 
 
 def environ_with(compiled: str) -> dict[str, str]:
-    """The environment of a start: modules are compiled once, as on a person's computer, into this folder."""
+    """Return the environment of a start, in which compiled modules are cached in the folder `compiled`.
+
+    Thus modules are compiled only once, as on a user's computer.
+    """
     environ = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
     environ.update(PYTHONPATH=str(ROOT), PYTHONPYCACHEPREFIX=compiled)
     if hasattr(os, "geteuid") and os.geteuid() == 0:
@@ -111,7 +114,7 @@ def environ_with(compiled: str) -> dict[str, str]:
 
 
 def once(compiled: str, program: str, *arguments: str) -> Stages:
-    """One start: for each stage the seconds after the process was asked for, and those it worked itself."""
+    """Start once; return for each stage the seconds since process creation and the processor time."""
     with socket.socket() as probe, tempfile.TemporaryDirectory(prefix="nep-start-") as home:
         probe.bind(("127.0.0.1", 0))
         environ = {
@@ -138,7 +141,7 @@ def once(compiled: str, program: str, *arguments: str) -> Stages:
 
 
 def medians(starts: list[Stages], which: int) -> dict[str, float]:
-    """The median of each stage: of the seconds that passed (0), or of those of work (1)."""
+    """Return the median of each stage: of the elapsed seconds (0) or of the processor time (1)."""
     return {stage: statistics.median(each[stage][which] for each in starts) for stage in starts[0]}
 
 
@@ -168,7 +171,7 @@ def imports() -> None:
 
 
 def main() -> int:
-    """Measure, print a table; 0 when the goals were reached and the run counts."""
+    """Measure and print a table; return 0 if the goals were reached and the run counts."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--times", type=int, default=7)
     parser.add_argument("--imports", action="store_true")

@@ -1,10 +1,10 @@
-"""How soon another behaviour shows after a click on its tab, in the real window.
+"""Benchmark of switching to another behaviour by a click on its tab, in the real window.
 
     python3 dev.py bench studio_tabs -- --rounds 15
 
-From the press of the mouse until the picture with the other blocks is there. "2 blocks" is the same with
-next to nothing on the page, "30 blocks again" tells how far to trust the rest. "worked" is when the page has
-turned to it, "shown" when the picture is there.
+Measured is the time from the mouse press until the other blocks are painted. "2 blocks" is the same
+with an almost empty page; "30 blocks again" is a second series, which shows the noise. "worked" is
+the time until the page has switched, "shown" the time until it is painted.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ WATCH = """(() => {
 
 
 class Bench:
-    """The window with its tabs, and a person in a hurry."""
+    """Window with open tabs, in which clicks are simulated and timed."""
 
     def __init__(self, window: Studio, folder: Path) -> None:
         """Open two behaviours of each size."""
@@ -91,7 +91,7 @@ class Bench:
         return view
 
     def ask(self, script: str) -> object:
-        """What a script in the page says."""
+        """Run a script in the page and return its result."""
         web = self.web.web
         assert web is not None
         said: list[object] = []
@@ -106,7 +106,7 @@ class Bench:
         return json.loads(str(said[0])) if said[0] else None
 
     def switch(self, path: Path) -> tuple[float, float]:
-        """Press on a tab. Milliseconds until the page has done its work, and until the picture is there."""
+        """Click a tab; return the milliseconds until the page has switched, and until it is painted."""
         document = self.window.session.documents.find_by_path(path)
         assert document is not None
         (tab,) = (
@@ -123,12 +123,12 @@ class Bench:
 
 
 def press(tab: QWidget) -> None:
-    """Press where the name stands."""
+    """Click the name on a tab."""
     QTest.mouseClick(tab, Qt.MouseButton.LeftButton, pos=QPoint(14, tab.height() // 2))
 
 
 def main() -> int:
-    """Print the table; 1 when the run does not count or a goal was missed."""
+    """Print the table; return 1 if the run does not count or a goal was missed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

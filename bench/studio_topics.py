@@ -1,11 +1,11 @@
-"""10 000 topics, 20 updates a second of their figures, the list open in the real window.
+"""Benchmark of the Topics panel with 10 000 topics, updated 20 times per second.
 
     python bench/studio_topics.py [--topics 10000] [--seconds 8]
 
-The graph is given to the session 20 times a second with new figures for every topic, as a master would tell
-them, and the Topics panel shows it; every message seems to have come within the last tenth of a second, so
-that ages change as well. Measured is the processor time of the whole process. "plain" is the same window with
-10 topics.
+A graph with new numbers for every topic is posted to the session 20 times per second, as if a master
+had sent it, and the Topics panel shows it. Each topic's last message appears to be at most a tenth of
+a second old, so that ages change as well. Measured is the processor time of the whole process.
+"plain" is the same window with 10 topics.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NODES = 50
 
 
 def graph(topics: int, update: int) -> GraphView:
-    """A graph as a master tells it; figures change with every update."""
+    """Return a graph as a master sends it; its numbers change with every update."""
     nodes = {
         f"n{n}": NodeInfo(f"n{n}", f"driver {n}", "here", 100 + n, "python", "native", 0)
         for n in range(NODES)
@@ -49,7 +49,10 @@ def graph(topics: int, update: int) -> GraphView:
 
 
 def fed(opened: Studio, meter: Meter, topics: int, seconds: float) -> Row:
-    """Give the session new figures 20 times a second; their graphs are made before."""
+    """Measure the window while the session gets new numbers 20 times per second.
+
+    The graphs are created beforehand.
+    """
     graphs = [graph(topics, update) for update in range(1, 5)]
     post, turn = opened.session._mailbox.post_event, [0]  # noqa: SLF001
 
@@ -67,7 +70,7 @@ def fed(opened: Studio, meter: Meter, topics: int, seconds: float) -> Row:
 
 
 def show(name: str, row: Row) -> None:
-    """One line of the table."""
+    """Print a row of the table."""
     print(
         f"{name:>14} {row.process:>8.1%} {row.gui:>7.1%} {row.ticks:>7.1%} {row.panels:>7.1%} "
         f"{row.late_p99:>9.1f} {row.late_max:>6.1f} {row.memory:>7.0f}",
@@ -76,7 +79,7 @@ def show(name: str, row: Row) -> None:
 
 
 def main() -> int:
-    """Measure, print a table; 0 when the goal was reached."""
+    """Measure and print a table; return 0 if the goal was reached."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--topics", type=int, default=10_000)
     parser.add_argument("--seconds", type=float, default=8.0)

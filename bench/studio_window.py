@@ -1,4 +1,4 @@
-"""What the benchmarks of the window share: the real window in this process, publishers in others, meters."""
+"""Helpers of the window's benchmarks: the real window in this process, publishers in others, and meters."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ TRUSTED_MS = 5.0
 
 @dataclass
 class Studio:
-    """The window that is measured, and what it is made of."""
+    """The measured window, its commands and its session."""
 
     window: MainWindow
     commands: Commands
@@ -58,7 +58,7 @@ class Studio:
 
 @contextmanager
 def network() -> Iterator[str]:
-    """A master in a process of its own, as Studio starts one, and our QApplication; the master's address."""
+    """Start a master in its own process, as Studio does, and the QApplication; yield the master's address."""
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         os.environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium refuses root otherwise
     os.environ["NEP_GATEWAY"] = "0"  # its ports exist once on a computer
@@ -81,7 +81,7 @@ def network() -> Iterator[str]:
 
 @contextmanager
 def studio(address: str, layout: str = "developer") -> Iterator[Studio]:
-    """The real window at its real size, on a home of its own; it joins the master at `address`."""
+    """Open the real window at its real size with its own home folder; it joins the master at `address`."""
     with tempfile.TemporaryDirectory(prefix="nep-bench-") as home:
         os.environ["NEP_STUDIO_HOME"] = home
         session = Session(
@@ -99,7 +99,7 @@ def studio(address: str, layout: str = "developer") -> Iterator[Studio]:
 
 
 def run_for(seconds: float) -> None:
-    """Let the window live for so long."""
+    """Run the event loop for `seconds`."""
     loop, timer = QEventLoop(), QTimer()
     timer.setTimerType(Qt.TimerType.PreciseTimer)
     timer.setSingleShot(True)
@@ -109,7 +109,7 @@ def run_for(seconds: float) -> None:
 
 
 def until(true: Callable[[], object], what: str, within_s: float = 20.0) -> None:
-    """Let the window live until it is true; ends the program with `what` when it never is."""
+    """Run the event loop until the condition is true; exit with `what` on timeout."""
     end = time.monotonic() + within_s
     while not true():
         if time.monotonic() > end:
@@ -118,7 +118,7 @@ def until(true: Callable[[], object], what: str, within_s: float = 20.0) -> None
 
 
 class Child:
-    """Another process of ours: one line asks, one line answers, while the window lives."""
+    """Child process that replies to each line with a line; the event loop runs while waiting for a reply."""
 
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
         self.process = process
@@ -127,13 +127,13 @@ class Child:
         os.set_blocking(process.stdout.fileno(), False)
 
     def tell(self, line: str) -> None:
-        """Ask; the answer may be read later."""
+        """Send a line; its reply can be read later."""
         assert self.process.stdin is not None
         self.process.stdin.write(line.encode() + b"\n")
         self.process.stdin.flush()
 
     def answer(self, within_s: float = 60.0) -> str:
-        """The next line that it says; the window lives meanwhile."""
+        """Run the event loop until the next line arrives, and return it."""
         until(self._has_line, "another process answers", within_s)
         line, _, self._buffer = self._buffer.partition(b"\n")
         return line.decode()
@@ -149,7 +149,7 @@ class Child:
 
 @contextmanager
 def child(program: str, arguments: Sequence[str], master: str) -> Iterator[Child]:
-    """A Python process that runs `program`; killed at the end."""
+    """Start a Python process that runs `program`; kill it at the end of the block."""
     environment = {**os.environ, "NEP_MASTER": master, "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(
         [sys.executable, "-c", program, *arguments],
@@ -165,7 +165,7 @@ def child(program: str, arguments: Sequence[str], master: str) -> Iterator[Child
 
 
 def percentile(values: Sequence[float], percent: float) -> float:
-    """The value below which so many percent of them are; 0.0 of none."""
+    """Return the value below which `percent` of the values lie; 0.0 without values."""
     if not values:
         return 0.0
     ordered = sorted(values)
@@ -174,7 +174,7 @@ def percentile(values: Sequence[float], percent: float) -> float:
 
 @dataclass
 class Row:
-    """What was measured over a while. Shares are of one core, times in ms, memory in MB."""
+    """Results of one measurement: shares of one core, times in ms, memory in MB."""
 
     seconds: float
     gui: float
@@ -189,10 +189,10 @@ class Row:
 
 @dataclass
 class Meter:
-    """Measures the window while it lives: processor time of the thread that paints, and how late a timer is.
+    """Meter of the running window: processor time of the GUI thread, and the delay of a timer.
 
-    `ticks` is the session's part of the tick, `panels` the panels' `refresh`; both are part of `gui`, which
-    also has the painting.
+    `ticks` is the session's part of the tick, `panels` the panels' `refresh`. Both are part of `gui`,
+    which also includes painting.
     """
 
     studio: Studio
@@ -215,7 +215,7 @@ class Meter:
         return timed
 
     def measure(self, seconds: float) -> Row:
-        """Let the window live for so long; what it took."""
+        """Run the event loop for `seconds` and return what was measured."""
         gc.collect()
         self.late.clear()
         self._parts = dict.fromkeys(self._parts, 0.0)
@@ -261,11 +261,11 @@ for line in sys.stdin:
     late.sort()
     print(late[int(len(late) * 0.99)] if late else 0.0, flush=True)
 """
-"""A program that does nothing but wait 10 ms again and again: how late the computer itself is."""
+"""Program that repeatedly waits 10 ms and prints its delay (p99, in ms): the load of the computer itself."""
 
 
 def verdict(reached: bool, bare_ms: float) -> int:
-    """Say whether the run counts and whether every goal was reached; the exit code is 0 only for both."""
+    """Print whether the run counts and every goal was reached; return the exit code, 0 only for both."""
     counts = bare_ms <= TRUSTED_MS
     print(
         f"a program that only waits was late by {bare_ms:.1f} ms (p99): "

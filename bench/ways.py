@@ -1,12 +1,11 @@
-"""Through how many functions of ours a message, an edit, a Run, a Stop and `nep topic list` pass.
+"""Count of the functions of nep and app that a message, an edit, Run, Stop and `nep topic list` call.
 
     python3 dev.py bench ways -- --list
 
-Counted are the distinct functions of nep and app that ran in Studio's process between the cause and its
-effect, and did not run in the seconds before, when nothing happened: what every tick does is not part of the
-way. Python's own profile hook counts, in the window's thread and in all others; the command `nep topic list`
-is counted from its first to its last function. Nearly without noise, also on a busy computer: some functions
-more or less.
+Counted are the distinct functions of nep and app that ran in Studio's process between a cause and its
+effect, without those that ran in the idle seconds before, such as those of every tick. Python's
+profile hook counts them, in the window's thread and in all others. For the command `nep topic list`,
+all functions of the process are counted. The noise is a few functions, even on a busy computer.
 """
 
 from __future__ import annotations
@@ -63,10 +62,13 @@ print("WAY", *names, sep="\\n")
 
 
 class Heard:
-    """Which functions of ours run while it records; `sys.setprofile` in each thread, before it begins."""
+    """Recorder of the functions of nep and app that run, with `sys.setprofile` in each thread.
+
+    Create it before the threads whose functions it records.
+    """
 
     def __init__(self) -> None:
-        """Hear this thread and all that begin later."""
+        """Install the profile hook in this thread and all threads that start later."""
         self._now: set[CodeType] | None = None
         threading.setprofile(self._called)
         sys.setprofile(self._called)
@@ -78,7 +80,7 @@ class Heard:
 
     @contextmanager
     def recording(self) -> Iterator[set[CodeType]]:
-        """What runs meanwhile."""
+        """Yield the set to which the functions that run in the block are added."""
         self._now = found = set[CodeType]()
         try:
             yield found
@@ -86,7 +88,7 @@ class Heard:
             self._now = None
 
     def way(self, cause: Callable[[], object], effect: Callable[[], object], what: str) -> list[str]:
-        """The functions between a cause and its effect that do not run anyway."""
+        """Return the functions that run between a cause and its effect, but not when idle."""
         with self.recording() as idle:
             run_for(IDLE_S)
         with self.recording() as found:
@@ -103,7 +105,7 @@ def _named(code: CodeType) -> str:
 
 
 def press(widget: QWidget) -> None:
-    """Press a button as a mouse does."""
+    """Send a mouse press and release to a button."""
     at = QPointF(widget.rect().center())
     left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
     for kind in (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonRelease):
@@ -112,7 +114,7 @@ def press(widget: QWidget) -> None:
 
 
 def button(studio: Studio, name: str) -> QWidget:
-    """The shown button of that class name."""
+    """Return the visible button of this class name."""
     found = [
         each
         for each in studio.window.findChildren(QWidget)
@@ -123,7 +125,7 @@ def button(studio: Studio, name: str) -> QWidget:
 
 
 def message(heard: Heard, studio: Studio, address: str) -> list[str]:
-    """From a message of another process to the tree of the Inspector."""
+    """Return the functions from a message of another process to the tree of the Inspector."""
     with child(PUBLISHER, [], address) as other:
         other.tell("first")
         other.answer()
@@ -150,7 +152,7 @@ def message(heard: Heard, studio: Studio, address: str) -> list[str]:
 
 
 def run_and_stop(heard: Heard, studio: Studio, address: str) -> tuple[list[str], list[str]]:
-    """From Run to the first block that glows, and from Stop to the robot's own answer."""
+    """Return the functions from Run to the first highlighted block, and from Stop to the robot's reply."""
     robot = "import runpy, sys; sys.argv = ['simulated', '--name', 'Pepper']\n"
     robot += "runpy.run_module('app.robots.simulated', run_name='__main__')"
     with child(robot, [], address):
@@ -164,7 +166,7 @@ def run_and_stop(heard: Heard, studio: Studio, address: str) -> tuple[list[str],
 
 
 def edit(heard: Heard, studio: Studio) -> list[str]:
-    """From a block dropped elsewhere to the journal."""
+    """Return the functions from dropping a block at another place to writing the journal."""
     view = next(each for each in studio.window.findChildren(QWidget) if type(each).__name__ == "BlocklyView")
     bench = object.__new__(Bench)
     bench.view = view  # type: ignore[assignment]
@@ -182,7 +184,7 @@ def edit(heard: Heard, studio: Studio) -> list[str]:
 
 
 def topic_list(address: str) -> list[str]:
-    """`nep topic list`, in a process of its own."""
+    """Return the functions of `nep topic list` in its own process."""
     done = subprocess.run(
         [sys.executable, "-c", COMMAND, str(ROOT / "nep")],
         env={**os.environ, "NEP_MASTER": address, "PYTHONPATH": str(ROOT)},
@@ -194,7 +196,7 @@ def topic_list(address: str) -> list[str]:
 
 
 def behaviour(folder: Path) -> Path:
-    """A file with some blocks, of which the first waits long."""
+    """Write a behaviour of some blocks, the first of which waits for a long time; return its path."""
     blocks = program(20)
     path = folder / "ways.nepb"
     path.write_text(json.dumps({**HEAD, "name": "ways", "workspace": blocks}))
@@ -202,7 +204,7 @@ def behaviour(folder: Path) -> Path:
 
 
 def main() -> int:
-    """Print the figures; with `--list` the functions too."""
+    """Print the counts; with `--list`, also the functions."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--list", action="store_true", help="name the functions")
     options = parser.parse_args()

@@ -20,7 +20,7 @@ FEATURES = [
 
 
 class Adapter:
-    """Carries out requests. Events are written by the node's thread, replies by the main thread."""
+    """Executor of the tester's requests. The node's thread writes events, the main thread replies."""
 
     def __init__(self):
         self.node = None

@@ -1,8 +1,8 @@
-"""A robot for RIZE and for blocks, on the original nep: ``pip install nep==0.5.3.5 tornado simplejson``.
+"""Robot driver for RIZE and blocks with the original nep: ``pip install nep==0.5.3.5 tornado simplejson``.
 
     python rize_driver.py Turtle
 
-It hears ``robot_action``, does what it is named for, and answers on ``action_state``.
+Receives commands on ``robot_action``, executes those for its robot, and replies on ``action_state``.
 """
 
 import sys

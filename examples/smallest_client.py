@@ -101,7 +101,7 @@ class Node:
 
 
 class Publisher:
-    """Publish JSON on a topic."""
+    """Publisher of JSON on a topic."""
 
     def __init__(self, node, topic):
         self.topic, self.seq = topic, 0
@@ -130,7 +130,7 @@ class Publisher:
 
 
 class Subscriber:
-    """Receive JSON of a topic."""
+    """Subscriber to JSON on a topic."""
 
     def __init__(self, node, topic):
         self.topic, self.node = topic, node

@@ -1,4 +1,4 @@
-"""What all tests share: a master, the order of files, and the guard against what is left behind."""
+"""Fixtures and hooks of all tests: the master, the order of files, and the check for leaked resources."""
 
 from __future__ import annotations
 
@@ -94,13 +94,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Name the skipped groups of long tests, and how to run them."""
+    """Print the skipped groups of long tests, and how to run them."""
     if line := long_groups.report(*_selected(config)):
         terminalreporter.write_line(line)
 
 
 def pytest_collection_finish() -> None:
-    """What stands now, modules and tests, stands to the end: no collection of garbage looks at it again."""
+    """Exclude modules and tests from garbage collection, because they exist until the end of the process."""
     gc.collect()
     gc.freeze()
     gc.enable()
@@ -113,7 +113,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> FileSch
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """What a test logged may have halves of letters, which pytest-xdist can't carry to its first process."""
+    """Escape lone surrogates in captured output, which pytest-xdist can't send to its main process."""
     report = yield
     report.sections = [(title, escaped(text, lines=True)) for title, text in report.sections]
     return report
@@ -121,7 +121,7 @@ def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.Tes
 
 @pytest.fixture(autouse=True)
 def _nothing_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Fail a test that leaves a thread, a socket, a pipe or a file open (0.4 ms per test)."""
+    """Fail a test that leaves a thread, socket, pipe or file open; the check takes 0.4 ms per test."""
     threads, open_before = leftovers.threads(), leftovers.descriptors()
     yield
     deadline = time.monotonic() + _grace.seconds(request.path)
@@ -140,8 +140,8 @@ def _nothing_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
 def _end_if_stuck(item: pytest.Item) -> None:
     """Dump all stacks and end this process if `item` runs long beyond its timeout.
 
-    pytest-timeout raises an exception in the main thread, which does not reach a test that waits in C++, and
-    which Qt discards when it is raised in a slot. pytest-xdist then names the test and goes on without it.
+    pytest-timeout raises an exception in the main thread. It does not reach a test that waits in C++,
+    and Qt discards it when it is raised in a slot. pytest-xdist reports the test and continues.
     """
     marker = item.get_closest_marker("timeout")
     timeout_s = float(marker.args[0] if marker else item.config.getini("timeout"))
@@ -168,7 +168,10 @@ def pytest_runtest_logfinish() -> None:
 
 @pytest.fixture(autouse=True)
 def _crashes_are_told(pytestconfig: pytest.Config) -> Iterator[None]:
-    """What Studio does of its own crashes takes pytest's away: a worker would die without a word."""
+    """Restore pytest's fault handler, which Studio's own crash handler replaces.
+
+    Without it, a worker that crashes would leave no message.
+    """
     yield
     told_to = pytestconfig.stash.get(fault_handler_stderr_fd_key, None)  # pytest keeps it from its capturing
     if told_to is not None:
@@ -177,16 +180,16 @@ def _crashes_are_told(pytestconfig: pytest.Config) -> Iterator[None]:
 
 @pytest.fixture
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nodes of this process wait long for greetings: however busy the computer is, they come in time.
+    """Extend the handshake timeout of nodes in this process, so that a busy computer doesn't exceed it.
 
-    Whoever had to give up waiting needs this long.
+    A test that waits for a handshake to time out needs this time.
     """
     monkeypatch.setattr("nep.backends.zeromq.transport.HANDSHAKE_TIMEOUT_S", GREETINGS_S)
 
 
 @pytest.fixture
 def pseudo(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is marked for translators is said in the pseudo-language (`tests.pseudo` finds what is not)."""
+    """Install the pseudo-language as translation; `tests.pseudo` finds text that isn't translated."""
     from tests.pseudo import words
 
     monkeypatch.setattr("nep.i18n._current", words())
@@ -194,7 +197,7 @@ def pseudo(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[Master]:
-    """A running native master on a free port of loopback; NEP_MASTER names it."""
+    """Running native master on a free port of the loopback interface; `NEP_MASTER` is set to its address."""
     with Master("127.0.0.1:0", learn_s=0.0) as running:
         monkeypatch.setenv("NEP_MASTER", running.address)
         yield running

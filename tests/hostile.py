@@ -1,6 +1,6 @@
-"""Values that a stranger may send to every receiver: one shared set for the tests of robots, Studio and nep.
+"""Hostile values for the tests of every receiver of external data, in robots, Studio and nep.
 
-All are bytes or fragments of JSON, because some can't be made by an encoder.
+All are bytes or fragments of JSON, because an encoder can't produce some of them.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ VALUES: Mapping[str, str] = {
     "many names": json.dumps({f"text{number}": 1 for number in range(2_000)}),
     "long list": json.dumps(list(range(5_000))),
 }
-"""Fragments of JSON by what they are."""
+"""Fragments of JSON by description."""
 
 WHOLES: tuple[bytes, ...] = (
     *(each.encode() for each in VALUES.values()),
@@ -54,13 +54,13 @@ WHOLES: tuple[bytes, ...] = (
     json.dumps("n" * LONG_NAME_BYTES).encode(),
     json.dumps({"n" * LONG_NAME_BYTES: 1}).encode(),
 )
-"""Whole payloads that are no message of any receiver."""
+"""Complete payloads that are not a valid message for any receiver."""
 
 
 def in_every_field(message: Message, share: int = 1) -> Iterator[bytes]:
-    """Yield a well-formed message as JSON with hostile values in each of its fields, also nested ones.
+    """Yield a valid message as JSON with hostile values in each of its fields, including nested ones.
 
-    Each field gets all values, or every `share`-th of them, other ones than the field before.
+    Each field gets all values, or every `share`-th value, starting at a different one in each field.
     """
     hole = json.dumps(_PLACEHOLDER)
     for number, place in enumerate(_places(message)):
@@ -70,13 +70,13 @@ def in_every_field(message: Message, share: int = 1) -> Iterator[bytes]:
 
 
 def with_long_name(message: Mapping[str, object]) -> Iterator[bytes]:
-    """Yield a well-formed message with a text of 5 MB in each of its fields."""
+    """Yield a valid message with a text of 5 MB in each of its fields."""
     for name in message:
         yield json.dumps({**message, name: "n" * LONG_NAME_BYTES}).encode()
 
 
 def payloads(*messages: Message, share: int = 1) -> Iterator[bytes]:
-    """Yield every hostile payload for a receiver of these messages; `share` as for `in_every_field`."""
+    """Yield every hostile payload for a receiver of these messages. `share` as in `in_every_field`."""
     yield from WHOLES
     for message in messages:
         yield from in_every_field(message, share)

@@ -1,4 +1,4 @@
-"""What a test leaves behind in its process: threads, and open descriptors by kind and target."""
+"""Detection of resources that a test leaks: threads, and open descriptors by kind and target."""
 
 from __future__ import annotations
 
@@ -18,20 +18,25 @@ from typing import Any
 import psutil
 
 FOREIGN = "Dummy-"
-"""How Python calls threads that others have started: Qt's, libzmq's."""
+"""Name prefix that Python gives to threads started by other libraries, such as Qt and libzmq."""
 LIBRARIES = ("zmq.", "execnet.", "xdist.", "pytest_timeout", "hypothesis.")
-"""Modules whose threads live as long as the process."""
+"""Prefixes of modules whose threads live as long as the process."""
 KEPT = re.compile(
     r"/usr/|/proc/|/dev/(null|u?random|tty|dri/)|/dev/shm/|/memfd:|"
     + "|".join(re.escape(prefix) for prefix in {sys.prefix, sys.base_prefix})
 )
-"""Files that libraries keep open: their own, the system's, and memory that processes share."""
+"""Paths that libraries keep open: files of Python and of the system, and shared memory."""
 FIRST_USES = {"anon_inode:": 8, "unnamed socket": 3, "pipe:": 2}
-"""What libraries keep from a first use without a name (libzmq's context, Qt's file dialog, its network): so
-many tests of a process may end with more of it than they began with, and not one more."""
+"""Maximum number of unnamed descriptors per kind that libraries keep open after their first use.
+
+Examples are libzmq's context, and Qt's file dialog and network. The limit is for the whole process.
+"""
 POOLED = "Thread (pooled)"
-"""How the system calls a thread of Qt's pools, which come with large pictures and go when they idle for long:
-each has one descriptor, again and again, and no test can end it."""
+"""System name of the threads in Qt's thread pools.
+
+They start with large images and end after an idle time. Each has one descriptor, and no test can end
+it.
+"""
 _OF_POOLED = "anon_inode:[eventfd]"
 PAGE = "QtWebEngineProcess"
 _FD = "/proc/self/fd"
@@ -40,7 +45,7 @@ _TRIES = 20
 
 
 def threads() -> set[threading.Thread]:
-    """Every thread that Python has started, by whomever, and that has not ended."""
+    """Return the running threads that were started by Python, without those of test libraries."""
     return {
         each
         for each in threading.enumerate()
@@ -49,9 +54,9 @@ def threads() -> set[threading.Thread]:
 
 
 def descriptors() -> dict[int, str]:
-    """What each open descriptor of this process is (``socket:[4711]``, ``/tmp/x``), by its number.
+    """Return the target of each open descriptor (``socket:[4711]``, ``/tmp/x``) by its number.
 
-    Where the system does not tell (there is no /proc), only what listens is known.
+    Systems without /proc report only listening sockets.
     """
     if not sys.platform.startswith("linux"):
         listening = [each for each in _connections() if each.status == psutil.CONN_LISTEN]
@@ -66,7 +71,10 @@ def descriptors() -> dict[int, str]:
 
 
 def _connections() -> list[Any]:
-    """This process's; asked again where Windows' table grew between its length and its content."""
+    """Return this process's connections.
+
+    Retries, because psutil raises when Windows' table grows during the query.
+    """
     for _ in range(_TRIES):
         try:
             return psutil.Process().net_connections(kind="inet")
@@ -76,7 +84,7 @@ def _connections() -> list[Any]:
 
 
 def told(number: int, target: str) -> str:
-    """One descriptor in words: a socket with its address, a file with its path; "" if it is closed by now."""
+    """Return a description of a descriptor (socket address or file path), or "" when it is closed."""
     if not target.startswith("socket:"):
         return target
     try:
@@ -91,15 +99,16 @@ def told(number: int, target: str) -> str:
 
 
 def _is_unnamed(family: str, address: object) -> bool:
-    """Whether nobody gave a socket its address: one of a pair, of the kernel, or named by the system."""
+    """Return whether a socket has no explicit address: one of a pair, of the kernel, or autobound."""
     chosen = isinstance(address, bytes) and re.fullmatch(rb"\0[0-9a-f]{5}", address)
     return family == "AF_NETLINK" or (family == "AF_UNIX" and (not address or bool(chosen)))
 
 
 class Grace:
-    """Time for threads to end and descriptors to close after a test: short once a test of the file leaked.
+    """Time for threads to end and descriptors to close after a test.
 
-    A leak costs the whole grace, and one mistake often makes all tests of a file leak.
+    It is shorter once a test of the file leaked: a leak takes the whole time, and one mistake often
+    makes all tests of a file leak.
     """
 
     def __init__(self, first_s: float, later_s: float) -> None:
@@ -108,25 +117,25 @@ class Grace:
         self._leaky: set[Path] = set()
 
     def seconds(self, file: Path) -> float:
-        """Return the grace for the next test of a file."""
+        """Return the time in seconds for the next test of a file."""
         return self._later_s if file in self._leaky else self._first_s
 
     def add_leak(self, file: Path) -> None:
-        """Note that a test of the file leaked."""
+        """Record that a test of the file leaked."""
         self._leaky.add(file)
 
 
 class Allowances:
-    """What may be there after a test that was not before it. One for each process of tests."""
+    """Descriptors that may stay open after a test. One object for each test process."""
 
     def __init__(self) -> None:
         self._left = Counter(FIRST_USES)
 
     def refused(self, before: dict[int, str], deadline: float) -> list[str]:
-        """In words what was opened since ``before``, is not closed soon and may not be left behind.
+        """Return descriptions of the descriptors that were opened since ``before`` and must not stay open.
 
-        libzmq and Qt close in threads of their own, which a busy computer lets wait: until ``deadline``
-        (monotonic seconds) for what has a name.
+        libzmq and Qt close descriptors in their own threads, which is slow on a busy computer: wait
+        until ``deadline`` (monotonic seconds) for descriptors with a name.
         """
         if not _opened(before):
             return []
@@ -153,7 +162,7 @@ def _wait(done: Callable[[], bool], deadline: float) -> None:
 
 
 def _opened(before: dict[int, str]) -> list[str]:
-    """In words what was opened since, but for what libraries keep by its name."""
+    """Return descriptions of the descriptors opened since, without those that libraries keep open."""
     opened = [
         told(number, target) for number, target in descriptors().items() if before.get(number) != target
     ]
@@ -166,7 +175,7 @@ def _opened(before: dict[int, str]) -> list[str]:
 
 
 def _pooled_threads() -> int:
-    """How many threads of Qt's pools there are; 0 where the system does not tell."""
+    """Return the number of threads in Qt's pools; 0 on systems without /proc."""
     found = 0
     for name in Path("/proc/self/task").glob("*/comm"):
         with suppress(OSError):  # it has just ended
@@ -179,12 +188,12 @@ def _named(before: dict[int, str]) -> list[str]:
 
 
 def _unnamed(before: dict[int, str]) -> set[str]:
-    """The kinds of what has no name."""
+    """Return the kinds of open descriptors without a name."""
     return {kind for kind in FIRST_USES for each in _opened(before) if each.startswith(kind)}
 
 
 def _has_page() -> bool:
-    """Whether a web page lives on between tests: Chromium opens and closes what it likes."""
+    """Return whether a web page is open; Chromium opens and closes descriptors at any time."""
     try:
         return any(PAGE in each.name() for each in psutil.Process().children(recursive=True))
     except psutil.Error:

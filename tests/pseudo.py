@@ -1,12 +1,12 @@
-"""The pseudo-language, made on the fly from the sources of now: what nobody translates stays plain English.
+"""Pseudo-language generated from the current sources: text that is not translatable stays plain English.
 
     def test_every_word_is_translated(pseudo) -> None:
-        shown = told_to_people()                     # "[Ƥéƥƥéř đíđ ñóť áñšŵéř ~~~~]"
-        assert untranslated(shown, "Pepper") == []   # data is named: it is never translated
+        shown = visible_text()                       # "[Ƥéƥƥéř đíđ ñóť áñšŵéř ~~~~]"
+        assert untranslated(shown, "Pepper") == []   # data is passed by name: it is never translated
 
 The fixture ``pseudo`` is in tests/conftest.py. A sentence that is not marked (by `_`, `lazy`, `plazy`,
-`ngettext`, `pgettext`, as words of a block or of an example) stays English, even where it is given to `_`.
-For a widget and all that is in it: `untranslated_in`. Neither Babel nor the compiled words are needed.
+`ngettext`, `pgettext`, as text of a block or of an example) stays English, even if it is passed to `_`.
+Use `untranslated_in` for a widget and its children. Neither Babel nor compiled catalogues are needed.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[1]
 MARKS = {"_": 1, "gettext": 1, "lazy": 1, "ngettext": 2, "pgettext": 2, "plazy": 2}
-"""How many strings each takes."""
+"""Functions that mark sentences, and how many string arguments each has."""
 UNITS = frozenset({
     "GB", "Hz", "KB", "MB", "TB", "cm", "deg", "fps", "kB", "kHz", "km", "mW", "min", "mm", "ms", "ns", "px",
     "rad",
@@ -38,7 +38,7 @@ NAMES = frozenset({
     "OpenCV", "PNG", "Pepper", "PySide6", "Python", "Qt", "RIZE", "ROS", "Return", "Shift", "Space", "Studio",
     "TCP", "Tab", "UDP", "Windows", "ZeroMQ", "macOS", "nep",
 })  # fmt: skip
-"""Names of things and of keys, the same in every language."""
+"""Proper names and names of keys, which are the same in every language."""
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z']+")
 _TAG = re.compile(r"<[^<>]*>|&[a-z]+;")
@@ -52,7 +52,7 @@ _FACTS: Mapping[str, object] = {
 
 
 class _Pseudo(NullTranslations):
-    """What is marked in the sources, in the pseudo-language."""
+    """Translations of the marked sentences into the pseudo-language."""
 
     def gettext(self, message: str) -> str:
         return pseudo(message) if (None, message) in marked() else message
@@ -66,13 +66,13 @@ class _Pseudo(NullTranslations):
 
 
 def words() -> object:
-    """What `nep.i18n` holds while this language is in use."""
+    """Return the catalogue that `nep.i18n` holds while the pseudo-language is active."""
     return i18n._Catalogue(i18n.PSEUDO_LANGUAGE, _Pseudo(), _FACTS)
 
 
 @lru_cache(maxsize=1)
 def marked() -> frozenset[tuple[str | None, str]]:
-    """(context, sentence) of all that is marked; of `ngettext` (singular, plural)."""
+    """Return (context, sentence) of every marked sentence; for `ngettext`, (singular, plural)."""
     told = (*sentences_of_blocks(), *sentences_of_examples())
     found: set[tuple[str | None, str]] = {(context, english) for context, english, _place in told}
     for folder in ("nep", "app"):
@@ -96,7 +96,7 @@ def _marked_in(source: str) -> Iterator[tuple[str | None, str]]:
 
 
 def untranslated(text: str, *data: str) -> list[str]:
-    """The words of a text that are in no language but English: none of `data`, of markup, units and names."""
+    """Return the English words of a text, without `data`, markup, units and names."""
     plain = MARKUP.sub(" ", _TAG.sub(" ", text))
     for each in sorted(filter(None, data), key=len, reverse=True):
         plain = re.sub(rf"(?<![A-Za-z]){re.escape(each)}(?![A-Za-z])", " ", plain)
@@ -104,9 +104,9 @@ def untranslated(text: str, *data: str) -> list[str]:
 
 
 def untranslated_in(widget: QWidget, *data: str, hidden: bool = True) -> list[str]:
-    """ "QLabel#name.text: Stop now", for each text of a widget, and of all that is in it, with such words.
+    """Return the untranslated texts of a widget and its children, such as "QLabel#name.text: Stop now".
 
-    With ``hidden=False`` only what is shown now counts.
+    With ``hidden=False`` only visible widgets count.
     """
     return [
         f"{place}: {text}" for place, text in texts_of(widget, hidden=hidden) if untranslated(text, *data)
@@ -114,7 +114,7 @@ def untranslated_in(widget: QWidget, *data: str, hidden: bool = True) -> list[st
 
 
 def texts_of(widget: QWidget, *, hidden: bool = True) -> Iterator[tuple[str, str]]:
-    """(where, text) of all that a widget, and all that is in it, says: also tips, heads, accessible names."""
+    """Yield place and text of all that a widget and its children show, with tool tips, accessible names."""
     from PySide6.QtWidgets import QWidget
 
     for each in (widget, *widget.findChildren(QWidget)):

@@ -24,7 +24,7 @@ from xdist.workermanage import WorkerController
 _FIXED_PORTS = "fixed ports"
 WITH_FIXED_PORTS = ("tests/interop/", "tests/e2e/test_rize.py")
 MOSTLY_WAITING = ("tests/nep/", "tests/clients/", "tests/core/", "tests/robots/", "tests/blocks/")
-"""Tests that open no windows and wait for timeouts and processes for two thirds of their time or more."""
+"""Directories whose tests open no windows and spend at least two thirds of their time waiting."""
 USUAL_S, USUAL_OF_STUDIO_S = 0.2, 12.0
 """Duration of a test, and of one that starts Studio."""
 LONG_S = {
@@ -36,21 +36,21 @@ LONG_S = {
     "tests/e2e/test_soak.py": 65.0,
     "tests/core/robots/test_stop_model.py": 60.0,
 }
-"""Durations of files that take much longer. Files below 60 s change the simulated total by less than 1 %."""
+"""Durations in seconds of long files. Files below 60 s change the simulated total by less than 1 %."""
 
 
 def may_take(worker: str, workers: int, processors: int, scope: str) -> bool:
     """Return True if a worker may run the tests of a file or group.
 
-    With two workers more than processors (`tools.check.side_by_side`), the last one only gets tests that are
-    `MOSTLY_WAITING`: it uses the time in which others wait, and no more windows are open at a time.
+    With two workers more than processors (`tools.check.side_by_side`), the last one only gets tests of
+    `MOSTLY_WAITING`: it uses the time in which other workers wait, without more windows open at once.
     """
     is_last = workers > processors + 1 and worker == f"gw{workers - 1}"
     return not is_last or scope.startswith(MOSTLY_WAITING)
 
 
 class FileScheduling(LoadScopeScheduling):
-    """Keeps tests of a file in one worker, and so all tests that bind fixed ports. Long files start first."""
+    """Scheduler that keeps the tests of a file, and all with fixed ports, in one worker; long files first."""
 
     def _split_scope(self, nodeid: str) -> str:
         return _FIXED_PORTS if nodeid.startswith(WITH_FIXED_PORTS) else nodeid.partition("::")[0]
@@ -75,7 +75,7 @@ class FileScheduling(LoadScopeScheduling):
             super()._reschedule(node)  # assigns a file, or shuts the worker down when none is left
 
     def remove_node(self, node: WorkerController) -> str | None:
-        """Give the unfinished files of a crashed worker to the others, except the test that crashed it."""
+        """Reassign the unfinished files of a crashed worker, except the test that crashed it."""
         files = self.assigned_work.pop(node)
         pending = [(scope, test) for scope, tests in files.items() for test in tests if not tests[test]]
         if not pending:

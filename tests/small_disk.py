@@ -1,4 +1,4 @@
-"""A disk of 256 kB of a test's own: it fills up, and it can be made one that can't be written."""
+"""Temporary file system of 256 kB for a test, which can become full or read-only."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ TIMEOUT_S = 100
 
 
 class SmallDisk:
-    """A folder that is a small disk for the program that `run` starts, and for nobody else."""
+    """Folder with a small file system mounted on it, visible only to the program started by `run`."""
 
     def __init__(self, folder: Path) -> None:
-        """Skips the test where a computer does not permit it."""
+        """Skip the test on systems that do not permit mounting."""
         unshare = shutil.which("unshare")
         if unshare is None:
             pytest.skip("a disk of one's own needs Linux with unshare")
@@ -31,9 +31,9 @@ class SmallDisk:
             pytest.skip("this computer does not permit disks of one's own (unshare -rm)")
 
     def run(self, code: str, before: str = "true") -> dict[str, object]:
-        """What a Python program prints as JSON; it gets the folder as argument.
+        """Run a Python program with the folder as its argument; return the object that it prints as JSON.
 
-        ``before`` is a command of the shell that comes first, with the disk there.
+        ``before`` is a shell command that runs first, after the file system is mounted.
         """
         shell = f'{self._mount} && {before} && exec "$@"'
         done = subprocess.run(

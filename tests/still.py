@@ -1,4 +1,4 @@
-"""Where an element of a page stands, told by the page itself: what moves cannot be hit."""
+"""JavaScript that determines the position of an element once it has stopped moving and can be clicked."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ LOOK = """selector => {
     window.nepLook = look;
     requestAnimationFrame(look);
 }"""
-"""Notes where an element is, once nothing moves it and it is there in two pictures of the page.
+"""Function that stores the rectangle of an element when two consecutive frames show it unmoved.
 
-Between two questions of ours there may be no picture, on a busy computer; what just begins to move stands.
+The page checks this itself: between two queries from Python a busy computer may render no frame, so an
+element whose animation is about to start would seem to be at rest.
 """

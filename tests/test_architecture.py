@@ -1,7 +1,7 @@
-"""What holds everywhere: layers, Qt only in app.ui, nobody sleeps, plug-ins apart, an honest distribution.
+"""Tests of rules for the whole code base: layers, Qt only in app.ui, no sleep, plug-ins, requirements.
 
-lint-imports (tools/check.py) decides the layers by the import graph; here the sources themselves are read, so
-that a plain ``pytest`` notices too, also imports inside functions and under TYPE_CHECKING.
+lint-imports (tools/check.py) checks the layers in the import graph. These tests read the sources, so
+that a plain ``pytest`` also detects violations, including imports in functions and under TYPE_CHECKING.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ LAYERS = (
 PLUG_INS = {"PANEL", "CATEGORY", "ROBOT", "BACKEND"}
 QT = {"PySide6", "shiboken6", "PyQt6", "PyQt5"}
 NAMED_BY_ROS = {"nep.geometry", "nep.sensor"}
-"""Their classes have the names that ROS gives them: `Header`, `Range`."""
+"""Modules whose classes have the names of ROS messages, such as `Header` and `Range`."""
 
 
 class Import(NamedTuple):
-    """One import statement's target, and where it stands."""
+    """Imported name and its line."""
 
     target: str
     line: int
@@ -48,7 +48,7 @@ class Import(NamedTuple):
 
 
 class Module(NamedTuple):
-    """One source file of the product."""
+    """Source file of the product."""
 
     name: str
     path: Path
@@ -57,7 +57,7 @@ class Module(NamedTuple):
 
 @cache
 def modules() -> tuple[Module, ...]:
-    """Every module of nep and app."""
+    """Return every module of nep and app."""
     found = []
     for path in sorted([*ROOT.glob("nep/**/*.py"), *ROOT.glob("app/**/*.py")]):
         if "node_modules" in path.parts:
@@ -69,7 +69,7 @@ def modules() -> tuple[Module, ...]:
 
 
 def imports(tree: ast.AST, in_function: bool = False) -> Iterator[Import]:
-    """Every import below a node, as dotted names; ``from a import b`` gives ``a.b``."""
+    """Yield every import below a node with its dotted name; ``from a import b`` gives ``a.b``."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -82,7 +82,7 @@ def imports(tree: ast.AST, in_function: bool = False) -> Iterator[Import]:
 
 
 def layer(name: str) -> int | None:
-    """The layer of a dotted name, 0 on top; None for what is not ours."""
+    """Return the layer of a dotted name, 0 for the top layer; None for names of other packages."""
     for number, prefixes in enumerate(LAYERS):
         if any(name == prefix or name.startswith(f"{prefix}.") for prefix in prefixes):
             return number
@@ -90,7 +90,7 @@ def layer(name: str) -> int | None:
 
 
 def faults_of_layers(module: Module) -> list[str]:
-    """The imports of a module that point up."""
+    """Return the imports of a module from a higher layer."""
     own = layer(module.name)
     assert own is not None
     found = []
@@ -102,7 +102,7 @@ def faults_of_layers(module: Module) -> list[str]:
 
 
 def sleeps(tree: ast.AST) -> list[int]:
-    """The lines in which something sleeps: ``x.sleep()``, ``sleep()``, ``msleep``."""
+    """Return the lines that call ``x.sleep()``, ``sleep()``, ``msleep`` or ``usleep``."""
     names = {"sleep", "msleep", "usleep"}
     return [
         node.lineno
@@ -116,7 +116,7 @@ def sleeps(tree: ast.AST) -> list[int]:
 
 
 def bound_plug_ins(tree: ast.Module) -> set[str]:
-    """Which of the plug-in names a module binds."""
+    """Return the plug-in names that a module binds."""
     targets = [
         target
         for node in tree.body
@@ -194,7 +194,7 @@ def test_plug_ins_do_not_import_each_other() -> None:
 
 
 def classes_with_two_meanings(found: Iterable[Module]) -> dict[str, list[str]]:
-    """Names of classes in more than one place, and where; a private one is seen in its module only."""
+    """Return the public class names that are defined more than once, with their places."""
     places: dict[str, list[str]] = {}
     for module in found:
         for node in ast.walk(module.tree):
@@ -235,7 +235,7 @@ def test_sleep_call_is_detected(source: str) -> None:
 
 
 def processes_with_a_console(tree: ast.Module) -> list[int]:
-    """The lines that start a process, but for those that tell Windows not to open a console for it."""
+    """Return the lines that start a process without ``creationflags``; Windows opens a console for it."""
     starts = {"Popen", "run", "call", "check_call", "check_output"}
     return [
         node.lineno
@@ -256,7 +256,7 @@ def test_no_process_opens_a_console_window_on_windows() -> None:
 
 
 def places_that_replace_files(tree: ast.AST) -> list[int]:
-    """Lines that put a file in the place of another by themselves: text is replaced with two arguments."""
+    """Return the lines that replace or rename a file; ``replace`` with two arguments is a method of `str`."""
     return [
         node.lineno
         for node in ast.walk(tree)
@@ -276,7 +276,7 @@ def test_files_are_replaced_only_by_the_helper_that_retries_on_windows() -> None
 
 
 def test_qt_calls_do_not_change_the_reference_count_of_none() -> None:
-    """PySide6 6.12.0 for Linux loses one at every void call; Python 3.10 and 3.11 then abort."""
+    """PySide6 6.12.0 for Linux loses one reference per void call; Python 3.10 and 3.11 then abort."""
     program = (
         "import sys\n"
         "from PySide6.QtWidgets import QApplication, QLabel\n"
@@ -308,7 +308,7 @@ def test_nep_loads_without_qt_numpy_and_opencv() -> None:
 
 
 def requirements(extra: str = "") -> list[Requirement]:
-    """What the installed distribution asks for, with an extra or without."""
+    """Return the requirements of the installed distribution, with an extra or without."""
     found = [Requirement(text) for text in distribution("nep-studio").requires or []]
     return [item for item in found if item.marker is None or item.marker.evaluate({"extra": extra})]
 
@@ -337,7 +337,7 @@ def test_entry_points_of_the_distribution_exist() -> None:
 
 
 def pinned() -> dict[str, list[Requirement]]:
-    """What is installed for us by normalised name; each is one version with its files' hashes."""
+    """Return the pinned requirements by normalised name; each has one version and the hashes of its files."""
     found: dict[str, list[Requirement]] = {}
     text = (ROOT / "requirements" / "dev.txt").read_text(encoding="utf-8")
     for line in text.replace("\\\n", " ").splitlines():

@@ -1,4 +1,4 @@
-"""tools/check.py: the order of the checks, and that a failure is never lost."""
+"""Tests of tools/check.py: the order of the checks and the report of failures."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_last_surplus_test_worker_receives_no_window_tests() -> None:
 def test_crashed_test_worker_fails_one_test_and_the_others_complete(
     tmp_path: Path,
 ) -> None:
-    """Each process had done some files by then, and the one that comes for it gets files of one test."""
+    """Both workers have finished some files before the crash; the new worker gets files of one test."""
     harmless = "".join(f"def test_{number}() -> None: ...\n" for number in range(3))
     for number in range(6):
         (tmp_path / f"test_first_{number}.py").write_text(harmless, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""dev.py: what it finds missing, what it would run, and that nothing is left behind."""
+"""Tests of dev.py: the packages it finds missing, the commands it runs and the files it removes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PACKAGES = [name.split("|")[-1] for name in system_packages.QT_LIBRARIES]
 
 @dataclass
 class FakeSystem:
-    """A Debian of which we say what is installed and what its servers have."""
+    """Fake Debian whose installed and available packages a test chooses."""
 
     installed: set[str] = field(default_factory=set)
     listed: set[str] = field(default_factory=set)
@@ -175,7 +175,7 @@ def test_unsupported_python_version_is_rejected_with_the_range() -> None:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A checkout with an environment in it."""
+    """Checkout with a virtual environment."""
     (tmp_path / "requirements").mkdir()
     for name in ("pyproject.toml", "requirements/studio.txt", "requirements/dev.txt"):
         (tmp_path / name).write_text(name, encoding="utf-8")
@@ -185,7 +185,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def fake_pip(system: FakeSystem) -> dev.Computer:
-    """A computer with a virtual environment whose pip works."""
+    """Return a computer with a virtual environment in which pip works."""
     return replace(system.computer(), ask=lambda command: "26.0\n")
 
 

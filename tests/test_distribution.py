@@ -1,4 +1,4 @@
-"""`python -m build`: what is in the distributions, the same bytes each time, and that nep works from them."""
+"""Tests of `python -m build`: reproducibility, contents of the distributions, nep in a new environment."""
 
 from __future__ import annotations
 
@@ -31,35 +31,35 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 ROOT = Path(__file__).parents[1]
 EDITOR = "app/blocks/editor/"
 A_TIME = "1700000000"
-"""What SOURCE_DATE_EPOCH says while we build."""
+"""Value of SOURCE_DATE_EPOCH during a build."""
 
 
 class Built(NamedTuple):
-    """What one run of `python -m build` made, and out of which files."""
+    """Distributions of one run of `python -m build`, and the files they were built from."""
 
     sdist: Path
     wheel: Path
     sources: frozenset[str]
 
     def in_wheel(self) -> set[str]:
-        """The names in the wheel, those about itself left out."""
+        """Return the names in the wheel, except its metadata."""
         with zipfile.ZipFile(self.wheel) as archive:
             return {name for name in archive.namelist() if ".dist-info/" not in name}
 
     def in_sdist(self) -> set[str]:
-        """The names in the source distribution, without its folder."""
+        """Return the names in the source distribution, without its top folder."""
         with tarfile.open(self.sdist) as archive:
             return {each.name.partition("/")[2] for each in archive.getmembers() if not each.isdir()}
 
     def metadata(self) -> Metadata:
-        """What the package index reads."""
+        """Return the metadata that the package index reads."""
         with zipfile.ZipFile(self.wheel) as archive:
             text = archive.read(f"nep_studio-{__version__}.dist-info/METADATA")
         return Metadata.from_email(text, validate=True)
 
 
 def sources() -> list[str]:
-    """The files that git knows, as they are now."""
+    """Return the files tracked by git that exist; skip the test without git or a checkout."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
     names = [name for name in listed.stdout.split("\0") if name and (ROOT / name).is_file()]
     if not names:
@@ -68,7 +68,7 @@ def sources() -> list[str]:
 
 
 def build(folder: Path, *arguments: str) -> Built:
-    """Build from a copy: what a build compiles must not change under other tests."""
+    """Build from a copy of the sources, because a build compiles files that other tests use."""
     names = sources()
     tree, made = folder / "tree", folder / "dist"
     for name in names:
@@ -88,7 +88,7 @@ def build(folder: Path, *arguments: str) -> Built:
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
-    """The source distribution, and the wheel that was built out of that."""
+    """Source distribution, and the wheel that was built from it."""
     return build(tmp_path_factory.mktemp("built"))
 
 
@@ -156,7 +156,7 @@ def test_long_description_renders_without_links_to_local_files(built: Built) -> 
 
 
 def needed(asked_for: Iterable[Requirement]) -> Iterable[metadata.Distribution]:
-    """What is asked for on this computer without any extra, what that asks for, and so on; as it is here."""
+    """Return the installed distributions of these requirements and, recursively, of theirs; no extras."""
     found: dict[str, metadata.Distribution] = {}
     left = list(asked_for)
     while left:
@@ -168,7 +168,7 @@ def needed(asked_for: Iterable[Requirement]) -> Iterable[metadata.Distribution]:
 
 
 def fresh_environment(folder: Path, asked_for: Iterable[Requirement]) -> Path:
-    """The interpreter of a new environment that has what is asked for, copied from this one, and no more."""
+    """Return the interpreter of a new environment with only these requirements, copied from this one."""
     venv.create(folder, symlinks=os.name != "nt")
     scheme = {"base": str(folder), "platbase": str(folder)}
     layout = "venv" if "venv" in sysconfig.get_scheme_names() else sysconfig.get_default_scheme()

@@ -1,4 +1,4 @@
-"""dev.py fuzz: how the time is shared, what is told of findings, and what cannot be done. Without atheris."""
+"""Tests of ``dev.py fuzz``, without atheris: division of the time, reports of findings, invalid requests."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tools.fuzz import HARNESS, findings_in, fuzz, seconds_each
 
 @dataclass
 class Fuzzing:
-    """A computer whose harness knows some targets, and finds what we say."""
+    """Fake computer whose fuzz targets and findings a test chooses."""
 
     folder: Path
     weights: Mapping[str, int] = field(default_factory=lambda: {"quick": 1, "slow": 8})

@@ -1,4 +1,4 @@
-"""The pieces that make a double click on a .nepb file open Studio are well formed and agree."""
+"""Tests of the files that make a double click on a .nepb file open Studio: desktop, MIME type, registry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The guard of all tests: whatever one leaves behind fails it, and what libraries keep does not."""
+"""Tests of the guard in tests/conftest.py that fails a test which leaks resources."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="on
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """What pytest says about the inner tests, run with our own net and configuration."""
+    """Return the output of pytest for the inner tests, run with this project's guard and configuration."""
     folder = tmp_path_factory.mktemp("inner")
     (folder / "test_inner.py").write_text(INNER, encoding="utf-8")
     guard = (ROOT / "tests" / "conftest.py").read_text("utf-8").replace("_GRACE_S = 20.0", "_GRACE_S = 0.2")

@@ -1,4 +1,4 @@
-"""Groups of long tests: skipped while their files are unchanged, and run as soon as one of them changes."""
+"""Tests of the groups of long tests, which are skipped while their files are unchanged."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def commit(folder: Path, name: str) -> None:
 
 @pytest.fixture
 def repository(tmp_path: Path) -> Path:
-    """A repository with three commits, each of which adds a file."""
+    """Repository with three commits, each of which adds a file."""
     folder = tmp_path / "repository"
     git(tmp_path, "init", "--quiet", "--initial-branch=main", str(folder))
     for name in ("first", "second", "third"):

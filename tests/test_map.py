@@ -1,4 +1,4 @@
-"""docs/map.md and CONTRIBUTING.md agree with the code; no package has too many entries."""
+"""Tests that docs/map.md and CONTRIBUTING.md agree with the code, and of the size of packages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tools import map as package_map
 
 ROOT = Path(__file__).parents[1]
 MAX_ENTRIES = 18
-"""Entries of a package, except lists of plug-ins and commands."""
+"""Maximum number of entries in a package; lists of plug-ins and commands are exempt."""
 LISTS = {"app/ui/panels", "nep/cli"}
 FILE = re.compile(r"`((?:nep|app)/[\w/]+\.(?:py|ts))`")
 

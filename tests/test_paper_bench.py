@@ -1,4 +1,4 @@
-"""The paper's figures: what counts, what is written, the link's delay and rate, and a small run of it all."""
+"""Tests of the benchmark for the paper's figures: validity, report, simulated link, and a short run."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def fan(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
 
 
 def imported(name: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    """A benchmark as a module; it finds the others beside it."""
+    """Yield a benchmark as a module; it can import its neighbours."""
     monkeypatch.syspath_prepend(str(BENCH))
     before = set(sys.modules)
     yield __import__(name)
@@ -77,7 +77,7 @@ def imported(name: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]
 
 
 def found(again: float = 1.0, nep: float = 0.4, sizes: list[int] = SIZES) -> dict:
-    """A run in which plain takes 1 ms a MB, and the others as many times as long."""
+    """Return results in which plain pyzmq takes 1 ms per MB, and the others a multiple of it."""
     rows = {"plain pyzmq": 1.0, "plain again": again, "nep": nep}
     cells = []
     for row, times in rows.items():
@@ -189,7 +189,7 @@ def test_cost_per_endpoint_grows_at_most_by_a_factor_of_1_2_from_10_to_50_endpoi
 
 
 def in_a_network(program: str, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
-    """A program beside the benchmarks, in a network of its own."""
+    """Run a program in the directory of the benchmarks, in its own network namespace."""
     command = ["unshare", "-rn", sys.executable, "-c", program]
     return subprocess.run(command, cwd=BENCH, env=environment, capture_output=True, text=True, check=False)
 

@@ -1,4 +1,4 @@
-"""Adding one of each kind is adding one file: a temporary plug-in works with no other edit."""
+"""Tests that a plug-in of each kind is added by adding one file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Write = Callable[[str, str, str], ModuleType]
 
 @pytest.fixture
 def write(tmp_path: Path) -> Iterator[Write]:
-    """Put one file into a package, as if it had been written there."""
+    """Yield a function that adds a module to a package; the module is removed after the test."""
     added: list[tuple[ModuleType, str]] = []
 
     def write_one(package: str, name: str, source: str) -> ModuleType:

@@ -1,4 +1,4 @@
-"""The pseudo-language of tests shows what was forgotten."""
+"""Tests of the pseudo-language, which makes untranslated texts visible in tests."""
 
 from __future__ import annotations
 

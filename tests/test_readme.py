@@ -1,4 +1,4 @@
-"""Commands and programs of README.md and docs/first-programs.md run in order, print, and never busy-wait."""
+"""Tests that the commands and programs of README.md and docs/first-programs.md run and don't busy-wait."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.e2e.waiting import until
 PAGES = ("README.md", "docs/first-programs.md")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 RUNS_UNTIL = "Ctrl+C ends it"
-"""The comment behind a command that does not end by itself."""
+"""Comment after a command that runs until it is interrupted."""
 MAX_CPU_SHARE = 0.2
 
 pytestmark = [
@@ -34,7 +34,7 @@ pytestmark = [
 
 
 class Reader:
-    """Types the commands of the pages and starts their programs, which run until the end."""
+    """Runner for the commands and programs of a page; programs run until the end of the test."""
 
     def __init__(self, stack: ExitStack) -> None:
         self._stack = stack
@@ -43,7 +43,7 @@ class Reader:
         self.behaviours: list[Program] = []
 
     def start(self, arguments: Sequence[str], environment: dict[str, str] | None = None) -> Program:
-        """Start a program of ours and wait for its first line."""
+        """Start a Python program, wait for its first line and return it."""
         program = self._stack.enter_context(Program(*arguments, environment=environment))
         until(lambda: program.lines or program.process.poll() is not None, f"{arguments} prints", 40)
         assert program.process.poll() in (None, 0), (arguments, program.lines)
@@ -51,7 +51,7 @@ class Reader:
         return program
 
     def type(self, line: str) -> None:
-        """Run a shell command; one that can't be run here is looked up instead."""
+        """Run a shell command; check a command that can't run here with `is_known` instead."""
         words, is_endless = shlex.split(line, comments=True), RUNS_UNTIL in line
         match words:
             case ["nep", "master"]:
@@ -72,12 +72,12 @@ class Reader:
         assert program.wait(60) == (130 if is_endless else 0), (line, program.lines)
 
     def run(self, source: str) -> None:
-        """Start a program of a page."""
+        """Start a program listed on a page."""
         self.programs.append(self.start(["-c", source]))
 
 
 def is_known(words: Sequence[str]) -> bool:
-    """Return True for a command that would change this computer, if what it names exists."""
+    """Return whether what a command names exists, for commands that would change this computer."""
     match words:
         case ["python3", "dev.py", command]:
             return command in {"demo", *dev.SCRIPTS}
@@ -90,7 +90,7 @@ def is_known(words: Sequence[str]) -> bool:
 
 
 def measured(programs: Sequence[Program]) -> tuple[list[float], float]:
-    """Return the CPU seconds of each program, and the seconds, while the last one prints two lines more."""
+    """Return the CPU seconds of each program and the elapsed seconds for two lines of the last program."""
 
     def cpu_s() -> list[float]:
         return [sum(psutil.Process(each.process.pid).cpu_times()[:2]) for each in programs]

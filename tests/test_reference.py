@@ -1,4 +1,4 @@
-"""The reference is what the docstrings say, and they say something of every public name."""
+"""Tests of the reference pages generated from docstrings: complete, current, without internal names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tools import reference
 INTERNAL = re.compile(
     r"\bnep\.(nodes|backends|system|patterns|protocol|masters|messages|programs|cli)\b|\b_[a-z]\w+|ParameterHost"
 )
-"""Rooms and names that programs never see; two words are joined by one stroke within a name only."""
+"""Pattern of internal packages and names that must not be in the reference."""
 
 
 @pytest.fixture(scope="module")

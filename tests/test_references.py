@@ -1,4 +1,4 @@
-"""Files, modules, classes, decisions and links that a document, docstring or comment names are there."""
+"""Tests that files, modules, classes, decisions and links named in documents and sources exist."""
 
 from __future__ import annotations
 
@@ -36,7 +36,6 @@ _FILE_NAME = re.compile(r".*\.(?:md|json|csv|dll|nepb)")
 
 @cache
 def _texts() -> dict[str, str]:
-    """Every source and document by its path from the root."""
     found = [ROOT / name for name in FILES]
     for home in HOMES:
         found += [
@@ -59,7 +58,7 @@ def _module(name: str) -> Path | None:
 
 @cache
 def _names_in(module: Path) -> frozenset[str]:
-    """What a module binds, and the members of its classes."""
+    """Return the names that a module binds, and the members of its classes."""
     tree = ast.parse(module.read_text(encoding="utf-8"))
     names: set[str] = set()
     for node in ast.walk(tree):
@@ -75,7 +74,7 @@ def _names_in(module: Path) -> frozenset[str]:
 
 
 def _is_there(dotted: str) -> bool:
-    """A package, a module, what a module binds, or a public name of nep."""
+    """Return whether a dotted name is a package, a module, a name in a module or a public name of nep."""
     parts = dotted.split(".")
     for length in range(len(parts), 0, -1):
         module = _module(".".join(parts[:length]))
@@ -90,7 +89,7 @@ def _is_there(dotted: str) -> bool:
 
 @cache
 def _words() -> frozenset[str]:
-    """Every word of the sources that stands outside of quotation by backticks."""
+    """Return the words of the sources outside of backticks."""
     texts = [text for place, text in _texts().items() if not place.endswith(".md")]
     csharp = (
         path for folder in ("src", "unity") for path in (ROOT / "clients" / "csharp" / folder).rglob("*.cs")
@@ -100,7 +99,7 @@ def _words() -> frozenset[str]:
 
 
 def _quoted() -> Iterator[tuple[str, str]]:
-    """What stands in backticks, with the file that it stands in."""
+    """Yield the file and the text of each quotation in backticks."""
     for place, text in _texts().items():
         if not place.endswith((".ts", ".mjs")):  # there they quote texts
             for quoted in _QUOTED.findall(text):
@@ -175,7 +174,7 @@ def test_every_anchor_of_a_link_is_a_heading() -> None:
 
 @cache
 def _trees() -> dict[str, ast.Module]:
-    """Every module of nep, app and tools by its path."""
+    """Return the parsed modules of nep, app and tools by path."""
     return {
         place: ast.parse(text)
         for place, text in _texts().items()
@@ -254,7 +253,6 @@ def test_missing_references_are_detected() -> None:
 
 @pytest.mark.parametrize("name", ["compare-blocks", "compare-monitors"])
 def test_each_supported_row_of_a_comparison_names_existing_tests(name: str) -> None:
-    """Every row in which Studio has a Y names tests that are there."""
     rows = [
         line for line in (ROOT / "docs" / f"{name}.md").read_text("utf-8").splitlines()
         if line.startswith("| ") and not line.startswith(("| habit", "| feature"))

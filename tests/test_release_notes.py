@@ -1,4 +1,4 @@
-"""tools/release_notes.py: the section of one version, and no notes for what is no release."""
+"""Tests of tools/release_notes.py: the section of a version in the changelog, and invalid versions."""
 
 from __future__ import annotations
 

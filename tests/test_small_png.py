@@ -1,4 +1,4 @@
-"""Pictures of windows made small: flat colours stay exact, the rest stays near."""
+"""Tests of the reduction of window images: flat colours stay exact, other colours are approximated."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tools.small_png import shrink
 
 @pytest.fixture
 def picture(tmp_path: Path) -> Path:
-    """A red surface beside a gradient of many colours."""
+    """Image of a red area next to a gradient with many colours."""
     made = np.zeros((80, 320, 3), np.uint8)
     made[:, :60] = (0x2D, 0x28, 0xC8)
     across = np.linspace(0, 255, 260, dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""dev.py versions: which Pythons it finds, what it runs in each, and that a failure is never lost."""
+"""Tests of ``dev.py versions``: the Pythons it finds, the commands it runs in each, and failed steps."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ QT = {"pyside6", "pyside6-essentials", "pyside6-addons", "shiboken6", "pytest-qt
 
 @dataclass
 class Pythons:
-    """A computer of which we say what its interpreters answer; venv makes folders, and steps can fail."""
+    """Fake computer with chosen interpreters; venv creates empty folders, and a chosen step fails."""
 
     answers: Mapping[str, str]
     path: Mapping[str, str] = field(default_factory=dict)
@@ -198,7 +198,7 @@ def test_requirements_of_the_versions_environments_exclude_qt(name: str) -> None
 
 
 def pinned(name: str) -> dict[str, set[str]]:
-    """The versions of each package in a file of requirements: one, or one more for older Pythons."""
+    """Return the pinned versions of each package in a requirements file; older Pythons may have their own."""
     text = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
     made: dict[str, set[str]] = {}
     for package, version in re.findall(r"^([\w.-]+)==(\S+)", text, re.MULTILINE):

@@ -1,4 +1,4 @@
-"""Every word can be translated, and no translation can break anything."""
+"""Tests of translations: all texts can be translated, and invalid translations fall back to English."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ msgstr "récord"
 
 @pytest.fixture
 def words() -> ModuleType:
-    """The tool; it needs Babel, which only developers have."""
+    """Module tools.words, imported late because it needs Babel, a dependency of developers only."""
     from tools import words as tool
 
     return tool
@@ -87,7 +87,7 @@ def _english_again() -> Iterator[None]:
 
 @pytest.fixture
 def spanish(words, tmp_path) -> None:
-    """A folder with Spanish as a hasty translator wrote it."""
+    """Folder with a Spanish translation that contains mistakes; the language is set to Spanish."""
     file = words.po_file(tmp_path, "es")
     file.parent.mkdir(parents=True)
     file.write_text(PO, encoding="utf-8")
@@ -98,7 +98,7 @@ def spanish(words, tmp_path) -> None:
 
 @pytest.fixture(scope="module")
 def pseudo_folder(tmp_path_factory) -> Path:
-    """The pseudo-language, made from the sources of now."""
+    """Folder with the pseudo-language, generated from the current sources."""
     from tools import words as tool
 
     folder = tmp_path_factory.mktemp("pseudo")
@@ -117,7 +117,7 @@ def is_pseudo(text: str) -> bool:
 
 
 def test_translation_template_is_up_to_date(words) -> None:
-    """In short: run ``python tools/words.py update`` after a sentence changed."""
+    """If it fails, run ``python tools/words.py update``."""
     assert words.check() == []
 
 
@@ -316,14 +316,14 @@ def test_every_help_page_of_the_command_line_is_translated(pseudo) -> None:
 
 
 def test_nep_import_does_not_load_gettext_in_english() -> None:
-    """In English neither gettext's file nor the list of languages is read."""
+    """English needs neither the module gettext nor the list of languages."""
     code = "import sys, nep, nep.errors; from nep.i18n import _; _('x'); print('gettext' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 
 
 def test_every_marked_text_is_in_the_template(words) -> None:
-    """Babel reads no call inside an f-string, which Python's own parser does."""
+    """Babel does not find calls inside f-strings; Python's parser does."""
     ids = [(entry.context or None, words._ids(entry.id)) for entry in words.template()]
     found = {each if len(each) == 2 else (context, *each) for context, each in ids}
     assert [each for each in marked() if each not in found] == []
@@ -369,7 +369,7 @@ TWO_WORDS = {
     r"\bShift\b": "Mayús",
     r"\b[Uu]sted|\b[Hh]aga clic": "tú: the words are for whoever sits there",
 }
-"""What was said in two ways once, and the word that stayed."""
+"""Patterns of rejected Spanish words, and the word to use instead."""
 
 
 def test_spanish_terms_are_consistent() -> None:

@@ -1,4 +1,4 @@
-"""What the core, robots and nep say to people is translated: nothing is plain in the pseudo-language."""
+"""Tests that texts of the core, robots and nep are translated; the pseudo-language shows plain texts."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ pytestmark = pytest.mark.usefixtures("pseudo")
 
 
 def said(*texts: object, data: tuple[str, ...] = ()) -> None:
-    """Fails when one of them has English words that are no data."""
+    """Fail if a text contains English words that are not data."""
     forgotten = {text: words for text in map(str, texts) if (words := untranslated(text, *DATA, *data))}
     assert forgotten == {}
 

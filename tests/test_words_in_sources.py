@@ -1,4 +1,4 @@
-"""How the sources call `_`: each sentence gets what its holes need, and no import translates anything."""
+"""Tests of the calls of `_` in the sources: placeholders are filled, and imports translate nothing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CALLS = ("_", "ngettext", "pgettext")
 
 @lru_cache(maxsize=1)
 def sources() -> dict[str, ast.Module]:
-    """The modules that have words, by path."""
+    """Return the modules with translatable texts by path."""
     found = {}
     for folder in ("nep", "app"):
         for path in sorted((ROOT / folder).rglob("*.py")):
@@ -37,7 +37,7 @@ def holes(call: ast.Call) -> set[str]:
 
 
 def at_import(node: ast.AST) -> Iterator[ast.AST]:
-    """What runs while a module is imported: no bodies of functions, but their defaults and decorators."""
+    """Yield the nodes that run during import: functions only with their defaults and decorators."""
     if isinstance(node, ast.Lambda):
         return
     yield node
@@ -64,7 +64,7 @@ def test_every_translated_text_is_formatted_with_all_its_placeholders() -> None:
 
 
 def test_no_text_is_translated_at_import() -> None:
-    """But for the command line, whose modules are imported when it is."""
+    """The command line is exempt: its modules are imported when a command runs."""
     early = [
         f"{path}:{node.lineno}"
         for path, module in sources().items()

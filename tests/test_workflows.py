@@ -1,4 +1,4 @@
-"""The workflows of .github: a checker finds nothing, and their shell steps do what they say."""
+"""Tests of the workflows in .github with a linter, and of the results of their shell steps."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def workflow(name: str) -> dict[str, Any]:
 
 
 def checked(*arguments: str | Path, given: str | None = None) -> subprocess.CompletedProcess[str]:
-    """What the checker says, which asks shellcheck about the scripts; both come with the environment."""
+    """Run the workflow linter, which calls shellcheck for scripts; both are in the environment."""
     program = shutil.which("jactionlint", path=PROGRAMS)
     if program is None:
         pytest.skip("needs jactionlint (the extra dev)")
@@ -101,7 +101,7 @@ def test_nightly_job_runs_all_tests() -> None:
 
 
 def run(folder: Path, script: str, environ: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
-    """Run a step as a runner does; a program of `folder`/bin is found first."""
+    """Run a step like a GitHub runner; programs in `folder`/bin take precedence."""
     return subprocess.run(
         ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", script],
         cwd=folder,
@@ -113,7 +113,7 @@ def run(folder: Path, script: str, environ: Mapping[str, str]) -> subprocess.Com
 
 
 def steps(job: str, *names: str) -> list[dict[str, Any]]:
-    """The steps of a job of release.yml that run a script; those with these names, or all."""
+    """Return the steps of a job of release.yml that run a script; those with these names, or all."""
     found = [step for step in workflow("release")["jobs"][job]["steps"] if "run" in step]
     return [step for step in found if step["name"] in names] if names else found
 
@@ -135,7 +135,7 @@ def with_sums(folder: Path, files: Mapping[str, bytes], newline: str = "\n") -> 
 
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
-    """What a runner has: the sources that the steps need, and packages of which Windows made one list."""
+    """Working directory of a runner: the sources that the steps need, and packages with checksum lists."""
     if sys.platform != "linux":
         pytest.skip("these steps run on Linux alone")
     for name in ("tools/__init__.py", "tools/release_notes.py", "nep/__init__.py", "nep/version.py"):
@@ -151,7 +151,7 @@ def place(tmp_path: Path) -> Path:
 
 
 def drafted(place: Path) -> int:
-    """Run all steps of the jobs "notes" and "draft" in turn; the exit code of the first that fails."""
+    """Run all steps of the jobs "notes" and "draft"; return the exit code of the first failure, or 0."""
     runner = {
         "GITHUB_REF_NAME": TAG,
         "GITHUB_SERVER_URL": "https://example.org",
@@ -247,7 +247,7 @@ REMOVE = """#!/usr/bin/env bash
 
 @pytest.fixture
 def runner(tmp_path: Path, request: pytest.FixtureRequest) -> tuple[Path, str]:
-    """A folder as a fresh computer of a system has it, with the packages, and the system's name."""
+    """Directory of a new computer with the packages, and the name of its system."""
     system: str = request.param
     if sys.platform != "linux":
         pytest.skip("bash, with programs of other systems in its way")
@@ -275,7 +275,7 @@ def runner(tmp_path: Path, request: pytest.FixtureRequest) -> tuple[Path, str]:
 
 
 def tried(place: Path, system: str) -> str:
-    """Run the steps of the job "try" for a system; the name of the one that failed, or ""."""
+    """Run the steps of the job "try" for a system; return the name of the failed step, or "" for none."""
     temporary = place / "temporary"
     temporary.mkdir()
     known = {"HOME": str(place), "LOCALAPPDATA": str(place / "Ñandú"), "RUNNER_TEMP": str(temporary)}

@@ -1,4 +1,4 @@
-"""A link without a network, and a way to run a program in this process."""
+"""Fake link without a network, and helpers that run a program in this process."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ LONG_S = 30.0
 
 
 class FakeLink:
-    """Robots that obey at once, unless a test holds them back; sensors and topics that a test sets."""
+    """Fake link whose robots execute commands immediately, unless a test holds them back.
+
+    Tests set the values of sensors and topics.
+    """
 
     def __init__(self) -> None:
         self.invoked: list[tuple[str, str, dict[str, object]]] = []
@@ -74,14 +77,14 @@ class FakeLink:
         self.told.setdefault(topic, []).append(callback)
 
     def happen(self, where: object, data: object) -> None:
-        """An event, a sensor's value or a message arrives."""
+        """Simulate the arrival of an event, a sensor value or a message."""
         for told in self.told.get(where, ()):
             told(data)
         self.poke()
 
 
 class Play:
-    """A program that runs in this process."""
+    """Program that runs in this process."""
 
     def __init__(
         self,
@@ -118,13 +121,13 @@ class Play:
 
 
 def play(workspace: Mapping[str, object], link: FakeLink | None = None) -> Play:
-    """Compile and run to the end, with one Pepper."""
+    """Compile a behaviour and run it to its end with one robot, Pepper."""
     pepper = robot()
     return Play(compile_behaviour(workspace, [pepper]), (pepper,), link).start().end()
 
 
 def until(ready: Callable[[], bool], timeout_s: float = LONG_S) -> None:
-    """Wait until something is so, without sleeping."""
+    """Wait until a condition holds; fail after `timeout_s` seconds."""
     import threading
     import time
 

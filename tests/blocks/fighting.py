@@ -1,4 +1,4 @@
-"""A robot whose actions use its parts, as Pepper's do, and blocks that use them."""
+"""Robot whose actions use parts of it, as Pepper's do, and blocks that call these actions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ REPLACING = {"turn", "go-home", "look"}
 
 
 def fighter(name: str = "Pepper") -> Robot:
-    """Turns and goes home with its base, looks with its face: the next one replaces. Speech queues."""
+    """Return a robot whose actions use its parts.
+
+    A new motion of the base or the face replaces the running one; speech is queued.
+    """
     made = robot(name)
     actions = tuple(
         replace(
@@ -27,16 +30,16 @@ def fighter(name: str = "Pepper") -> Robot:
 
 
 def turn(id: str, name: str = "Pepper", *, again: bool = False) -> dict[str, object]:
-    """Turn; ``again``: for ever."""
+    """Return a block that turns the robot, inside a *forever* loop if `again` is true."""
     made = block("robot_pepper_do_turn", id, ROBOT=name, DIRECTION="left", ANGLE=number(30))
     return block("control_forever", f"{id} again", BODY=[made]) if again else made
 
 
 def home(id: str, name: str = "Pepper") -> dict[str, object]:
-    """Go home."""
+    """Return a block that sends the robot home."""
     return block("robot_pepper_do_go_home", id, ROBOT=name, WITH_SONG=boolean(False))
 
 
 def look(id: str, name: str = "Pepper") -> dict[str, object]:
-    """Look happy."""
+    """Return a block that makes the robot look happy."""
     return block("robot_pepper_do_look", id, ROBOT=name, EMOTION="happy", SECONDS=number(2))

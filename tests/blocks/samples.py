@@ -1,4 +1,4 @@
-"""A robot for tests, described as a driver would announce it, and short ways to write workspaces."""
+"""Sample robots, described as by a driver, and functions that build workspaces."""
 
 from __future__ import annotations
 
@@ -166,12 +166,12 @@ MODEL: dict[str, object] = {
 
 
 def robot(name: str = "Pepper", **changes: object) -> Robot:
-    """A connected robot of that name."""
+    """Return a connected robot with this name."""
     return parse(thing_description(MODEL | changes, name))
 
 
 def nao(name: str = "NAO") -> Robot:
-    """A robot of another model, which can wave."""
+    """Return a robot of another model, whose only actions are *wave* and *stop*."""
     wave = _action(
         {"title": "wave"} | _block("Movement", "hand", "%robot wave %hand hand"),
         ["hand"],
@@ -187,7 +187,10 @@ _ids = itertools.count(1)
 def block(
     block_type: str, id: str | None = None, *, below: object = None, **parts: object
 ) -> dict[str, object]:
-    """A block as Blockly saves it. Blocks and lists of blocks become inputs, the rest fields."""
+    """Return a block in Blockly's JSON format.
+
+    Blocks and lists of blocks become inputs; all other parts become fields.
+    """
     saved: dict[str, object] = {"type": block_type, "id": id or f"b{next_id()}"}
     for name, value in parts.items():
         if isinstance(value, Mapping) and "type" in value:
@@ -212,7 +215,7 @@ def _part(saved: dict[str, object], name: str) -> dict[str, object]:
 
 
 def stack(*blocks: dict[str, object]) -> dict[str, object]:
-    """Blocks under one another."""
+    """Connect blocks from top to bottom and return the first."""
     for above, below in itertools.pairwise(blocks):
         above["next"] = {"block": below}
     return blocks[0]
@@ -241,7 +244,10 @@ def say(value: object, name: str = "Pepper") -> dict[str, object]:
 def define(
     id: str, name: str, inputs: tuple[str, ...], *body: dict[str, object], result: object = None
 ) -> dict[str, object]:
-    """A function; an input's id is its name with "i " before."""
+    """Return the definition of a function.
+
+    The ID of an input is ``i`` followed by a space and its name.
+    """
     made = block(
         "functions_define" if result is None else "functions_define_result", id, NAME=name, BODY=list(body)
     )
@@ -254,7 +260,7 @@ def define(
 def call(
     function: str, *, value: bool = False, id: str | None = None, **given: dict[str, object]
 ) -> dict[str, object]:
-    """The use of a function as a statement or as a value."""
+    """Return a call of a function, as a statement or, if `value` is true, as a value block."""
     made = block("functions_result" if value else "functions_call", id)
     inputs = [{"id": f"i {each}", "name": each} for each in given]
     made["extraState"] = {"function": function, "name": function, "inputs": inputs}
@@ -263,7 +269,7 @@ def call(
 
 
 def given(name: str) -> dict[str, object]:
-    """An input, inside its function."""
+    """Return the block for an input inside its function."""
     return block("functions_input", INPUT=f"i {name}")
 
 
@@ -281,7 +287,7 @@ def started(*blocks: dict[str, object]) -> dict[str, object]:
 
 
 def workspace(*tops: Mapping[str, object], variables: tuple[str, ...] = ()) -> dict[str, object]:
-    """A workspace of these scripts; a variable's id is its name."""
+    """Return a workspace with these scripts; the ID of a variable is its name."""
     return {
         "blocks": {"languageVersion": 0, "blocks": list(tops)},
         "variables": [{"id": name, "name": name} for name in variables],

@@ -1,4 +1,4 @@
-"""Every block compiles, and its Python runs; every description is sound."""
+"""Tests that every block compiles, that its Python code runs, and that every description is valid."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ALL = sorted(CATALOGUE.blocks.values(), key=lambda each: each.type)
 
 
 def made_by_hand(described) -> dict[str, object] | None:
-    """A workspace for a block that needs a function around it or behind it."""
+    """Return the workspace of a block that needs a function, or None for all other blocks."""
     greet = define("greet", "greet", ("who",), write(given("who")))
     double = define("double", "double", ("number",), result=given("number"))
     end = block("control_stop_program")
@@ -68,7 +68,7 @@ def made_by_hand(described) -> dict[str, object] | None:
 
 
 def filled(described) -> dict[str, object]:
-    """A block with something in each gap."""
+    """Return the block with a value in each slot."""
     parts: dict[str, object] = {}
     for argument in described.arguments:
         if isinstance(argument, ValueInput):
@@ -90,7 +90,7 @@ def filled(described) -> dict[str, object]:
 
 
 def own(described) -> dict[str, object]:
-    """What some blocks want."""
+    """Return the field values that some blocks require."""
     parts: dict[str, object] = {}
     if described.argument("ROBOT"):
         parts["ROBOT"] = "Pepper"
@@ -106,7 +106,7 @@ def own(described) -> dict[str, object]:
 
 
 def around(described) -> dict[str, object]:
-    """A workspace with this block in it, in a script that ends by itself."""
+    """Return a workspace with the block in a script that ends without intervention."""
     by_hand = made_by_hand(described)
     if by_hand is not None:
         return by_hand
@@ -137,7 +137,7 @@ def link() -> FakeLink:
 
 
 def yes(question: ProgramQuestion | None) -> None:
-    """Answer whatever is asked."""
+    """Answer every question with yes."""
     if question is not None:
         question.answer = "yes"
 

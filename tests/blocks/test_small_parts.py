@@ -1,4 +1,4 @@
-"""Names, fields, values, hats, sentences: the pure parts, each by itself."""
+"""Unit tests of the pure parts: names, fields, values, event blocks and error messages."""
 
 from __future__ import annotations
 

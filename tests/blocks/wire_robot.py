@@ -1,4 +1,4 @@
-"""Robots for tests on a real network: one that obeys, is slow, refuses or is silent, as a test says."""
+"""Robots on a real network whose replies a test controls: immediate, delayed, rejecting or none."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.blocks.samples import robot
 
 
 class WireRobot:
-    """A robot by the contract of ROBOTS: description, command, answer, and what it heard."""
+    """Robot with the description, command and reply topics of the protocol, and a log of commands."""
 
     def __init__(self, master: str, name: str = "Pepper") -> None:
         self.described: Robot = robot(name)
@@ -33,7 +33,7 @@ class WireRobot:
         self._node.new_sub(topics.command, "robot/command", sink=self._receive)
 
     def tell(self, name: str, value: object) -> None:
-        """Publish a sensor's value or an event."""
+        """Publish a sensor value or an event."""
         self._sensors[name].publish(value)
 
     def heard(self, op: str) -> list[Mapping[str, object]]:
@@ -70,7 +70,7 @@ class WireRobot:
 
 
 class RizeRobot:
-    """A driver of RIZE: it acts on commands for its name and answers with the same object."""
+    """Driver of the RIZE protocol: executes commands for its name and replies with the same object."""
 
     def __init__(self, master: str, name: str = "Rosie") -> None:
         self.described = rize.robot(name)

@@ -1,4 +1,4 @@
-"""Programs in JavaScript that use nep-js: the conformance adapter, and whole scripts."""
+"""Helpers that run JavaScript programs with nep-js: the conformance adapter, and complete scripts."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def run_script(script: str, folder: Path, **environment: str) -> subprocess.Comp
 
 @contextmanager
 def running_script(script: str, folder: Path, *arguments: str, **environment: str) -> Iterator[None]:
-    """Run such a program in the background, and kill it at the end."""
+    """Run a CommonJS program in the background, and kill it at the end."""
     command = [*prepared(script, folder), *arguments]
     process = subprocess.Popen(command, cwd=folder, env={**os.environ, **environment})
     try:

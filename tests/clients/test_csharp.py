@@ -1,4 +1,4 @@
-"""Exchange between programs in C# and Python."""
+"""Tests of the exchange between programs in C# and Python."""
 
 from __future__ import annotations
 
@@ -276,7 +276,7 @@ def test_master_restart_under_traffic_loses_nothing(monkeypatch: pytest.MonkeyPa
 
 
 def test_foreign_program_at_master_address_is_named_and_master_is_found_later(tmp_path: Path) -> None:
-    """In the exception, and once in the log until a master has answered."""
+    """The exception names the program each time; the log names it once until a master has replied."""
     with Master("127.0.0.1:0") as free:
         address = free.address
     adapter_program = program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")
@@ -414,7 +414,7 @@ FAR_MASTER = """
 
 
 def test_latency_is_corrected_for_the_clock_of_another_computer() -> None:
-    """The clock of the other computer, on which the master and the publisher run, is a day late."""
+    """The master and the publisher run with a clock that is a day late, as on another computer."""
     adapter_program = program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")
     with programs.running(FAR_MASTER) as far, running(adapter_program, NEP_MASTER=far.line()) as started:
         adapter = Adapter(started)

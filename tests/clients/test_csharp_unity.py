@@ -1,4 +1,4 @@
-"""The Unity package: what it contains, that it compiles against Unity's names, and its conversions."""
+"""Tests of the Unity package: its contents, compilation against stubs of Unity's API, and conversions."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def rotated(quaternion: Numbers, vector: Numbers) -> list[float]:
 
 
 def converted(program: MonoProgram, kind: str, numbers: Numbers) -> tuple[list[float], list[float]]:
-    """Return the numbers in Unity's coordinates, and those converted back."""
+    """Return the numbers converted to Unity's coordinates, and the result converted back."""
     answer = [float(word) for word in program.ask(f"{kind} {' '.join(map(str, numbers))}").split()]
     half = len(answer) // 2
     return answer[:half], answer[half:]

@@ -1,4 +1,4 @@
-"""The C# client against the vectors that all implementations of the wire share."""
+"""Tests of the C# client with the test vectors that all implementations of the wire share."""
 
 from __future__ import annotations
 
@@ -188,7 +188,7 @@ def test_losses_are_counted_as_in_python(wire: MonoProgram) -> None:
 
 
 def clock_in_python(steps: list[tuple[str, int, int]]) -> list[object]:
-    """Apply steps to samples of a clock; return whether each sample was of use, and each known offset."""
+    """Apply steps to clock samples; return whether each sample was used, and each known offset."""
     wall = steady = 0
     samples = ClockSamples(lambda: wall, lambda: steady, 1e-9)
     sent = samples.now()

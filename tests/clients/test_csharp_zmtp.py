@@ -1,4 +1,4 @@
-"""The C# client's own ZMTP sockets against libzmq."""
+"""Tests of the C# client's own ZMTP sockets against libzmq."""
 
 from __future__ import annotations
 
@@ -244,7 +244,7 @@ def test_mutated_peers_do_not_stop_the_socket(context, stack: ExitStack) -> None
 
 
 class ForeignServer:
-    """Program at a port that is no peer: sends fixed bytes on each connection, then waits or closes it."""
+    """Server that is no ZMTP peer: sends fixed bytes on each connection, then waits or closes it."""
 
     def __init__(self, port: int, answer: bytes, *, waits: bool) -> None:
         self._answer = answer
@@ -275,7 +275,7 @@ class ForeignServer:
 
 
 class ForeignSocket:
-    """Socket of libzmq at a port that is no peer."""
+    """Socket of libzmq with a type or security mechanism that the client can't connect to."""
 
     def __init__(self, port: int, kind: int, mechanism: str = "NULL") -> None:
         self._context: Context = zmq.Context()
@@ -292,7 +292,7 @@ class ForeignSocket:
 
 
 def foreign_programs(own: str) -> Iterator[tuple[str, Callable[[int], ForeignServer | ForeignSocket]]]:
-    """Yield what a client says about each program that is no peer, and a function that starts it."""
+    """Yield the client's error message for each kind of foreign program, and a function that starts it."""
     kinds = {"dealer": ("PUB", "PULL", "PAIR"), "sub": ("REP", "PULL", "ROUTER")}[own]
     for kind in kinds:
         yield (

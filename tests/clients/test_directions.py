@@ -1,4 +1,7 @@
-"""Exchange between Python, JavaScript and C# in all nine directions, with the calls of the listings."""
+"""Tests of the exchange between Python, JavaScript and C# in all nine directions.
+
+The programs use the calls of the listings in the paper.
+"""
 
 from __future__ import annotations
 

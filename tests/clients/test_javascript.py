@@ -1,4 +1,7 @@
-"""nep-js: its own tests, the listings of the paper, and exchange with Python, also under failures."""
+"""Tests of nep-js: its own tests, the listings of the paper, and the exchange with Python.
+
+The exchange is tested under failures, too.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +62,7 @@ SLOW_RULES = {
     "malformed-named", "next-s", "other-socket-at-publisher", "renew", "renewed-topics",
     "restart", "statistics", "unknown-answers",
 }  # fmt: skip
-"""Rules that wait for renewals; only `nep wire check` without --rule runs them."""
+"""Conformance rules that wait for renewals; run only by `nep wire check` without ``--rule``."""
 ALL_TYPES = """\
 const { Robot } = require("nep-js/robot");
 
@@ -117,7 +120,7 @@ def _package() -> None:
 
 @pytest.fixture
 def program(master: Master) -> Iterator[Adapter]:
-    """JavaScript program that carries out requests with a node named `js`."""
+    """JavaScript program that executes requests with a node named `js`."""
     running = Adapter(master.address)
     running.do("node", name="js")
     yield running

@@ -1,4 +1,4 @@
-"""Latency between a program in JavaScript and one in Python whose computers have different clocks."""
+"""Tests of the latency between JavaScript and Python programs on computers with different clocks."""
 
 from __future__ import annotations
 

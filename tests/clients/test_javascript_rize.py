@@ -1,4 +1,7 @@
-"""RIZE's dialect, the world and shared topics of robots in JavaScript, with the cases of the Python kit."""
+"""Tests of RIZE's dialect, the world and shared topics of robots in JavaScript.
+
+They use the cases of the Python kit.
+"""
 
 from __future__ import annotations
 
@@ -106,7 +109,7 @@ robot.main();
 
 
 class Turtle:
-    """The running program, with ears on it."""
+    """Running robot program, and subscribers to its topics."""
 
     def __init__(self, node: nep.node, name: str) -> None:
         self.ears = Ears(node, name)
@@ -117,17 +120,17 @@ class Turtle:
         self._ask = node.new_pub("/room")
 
     def change(self, **world: object) -> None:
-        """Act on its world."""
+        """Publish a change of the robot's world."""
         self._world.publish(world)
 
     def let(self, *, go_on: bool) -> None:
-        """Let actions end by themselves, or not."""
+        """Set whether actions end without a command, and wait until the robot has applied it."""
         self.room.clear()
         self.change(go_on=go_on)
         eventually(lambda: {"from": "turtle", "go_on": go_on} in self.room)
 
     def done(self) -> list[object]:
-        """Return what it has done."""
+        """Query the robot for its log of executed actions and return it sorted."""
         self.room.clear()
         self._ask.publish({"ask": True})
         found: list[object] = []

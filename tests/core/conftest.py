@@ -1,4 +1,4 @@
-"""What tests of the core share."""
+"""Fixtures of the tests of the core."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nep.masters.master import Master
 
 @pytest.fixture(scope="module", autouse=True)
 def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """What a test makes without saying where is not kept among the work of whoever runs the tests."""
+    """Set Studio's home to a temporary folder, so that tests don't write to the developer's own."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("NEP_STUDIO_HOME", str(tmp_path_factory.mktemp("home")))
         yield
@@ -22,9 +22,9 @@ def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture
 def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
-    """A session on the test's own master, with everything that it keeps in the test's folder.
+    """Session on the test's own master, with all its files in the test's folder.
 
-    Robots have longer than a second to answer a stop: on a busy computer they may need it.
+    Robots get three seconds to confirm a stop, because a busy computer may need more than the default.
     """
     monkeypatch.setattr("app.core.robots.stop.stopper.STOP_TIMEOUT_S", 3.0)
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))

@@ -1,4 +1,4 @@
-"""A network of one's own for bad days: nothing there but the loopback, up or down (Linux)."""
+"""Helper that runs Python in a network namespace with nothing but the loopback, up or down (Linux)."""
 
 from __future__ import annotations
 
@@ -16,9 +16,15 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 def alone(
     *arguments: str, up: bool, timeout_s: float, silent: str = "", **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run this Python with the arguments there. Skips when this computer does not permit that.
+    """Run Python with these arguments in a new network namespace; skip the test where it isn't permitted.
 
-    `silent`: an address of that network (10.9.9.1/24) whose neighbours never answer, as behind a firewall.
+    Args:
+        arguments: Arguments of the Python interpreter.
+        up: Whether the loopback interface is up.
+        timeout_s: Time limit of the process in seconds.
+        silent: Address with prefix length (10.9.9.1/24) of an extra interface that drops all packets,
+            as a firewall does; "" for none.
+        environment: Additional environment variables.
     """
     unshare = shutil.which("unshare")
     if unshare is None or shutil.which("ip") is None:

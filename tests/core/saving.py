@@ -1,8 +1,8 @@
-"""A process that saves a behaviour again and again and is killed in the middle, for `test_bad_files`.
+"""Process that saves a behaviour repeatedly and is killed while it saves, for `test_bad_files`.
 
-Reads one line for each life: how often it saves, and how many milliseconds it lasts from then on. A child of
-it saves in a loop until it is killed with signal 9; then one line tells what is in the file: "whole N", or
-what is wrong with it.
+Each line of the input is one run: the number of saves, and the milliseconds from then to the kill. A
+child process saves in a loop until it is killed with signal 9. Then one line is printed about the
+content of the file: "whole N", or the error.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from app.errors import DocumentError
 
 
 def blocks(number: int) -> dict[str, object]:
-    """A behaviour whose length changes, so that a part of one is no whole of another."""
+    """Return a behaviour whose size depends on ``number``, so that a truncated file is never a valid one."""
     tops = [{"type": "events_started", "id": f"{number}-{each}"} for each in range(1 + number * 37 % 400)]
     return {"blocks": {"languageVersion": 0, "blocks": tops}}
 

@@ -1,4 +1,4 @@
-"""Alarms of a session: alerts, what is carried out on a real network, and their file."""
+"""Tests of a session's alarms: their alerts, their actions on a real network and their file."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_alarm_moves_a_real_robot_only_after_confirmation(session: Session, mast
         permission = session.fleet.permission
 
         def come_on() -> list[str]:
-            """The alarm comes on anew; what became of its message so far."""
+            """Trigger the alarm again and return the results of its actions."""
             publisher.publish({"range": 0.1})
             tick_until(session, lambda: session.alarms.active)
             return [deed.text for deed in session.alarms.history.records[0].action_results]
@@ -120,7 +120,7 @@ def test_alarm_without_banner_is_shown_only_in_the_alert_list(session: Session) 
 
 
 def at_rest(folder: Path) -> Session:
-    """A session that has not joined any network."""
+    """Return a session that has joined no network."""
     return Session(Settings(folder), address="127.0.0.1:1", start_processes=False)
 
 

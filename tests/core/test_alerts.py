@@ -1,4 +1,4 @@
-"""Alerts: present problems, worst first, gone when cured."""
+"""Tests of alerts: sorted by severity, removed when resolved."""
 
 from __future__ import annotations
 

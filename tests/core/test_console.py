@@ -1,4 +1,4 @@
-"""The console keeps the newest records."""
+"""Tests of the console, which keeps the newest records."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_clear_removes_all_records() -> None:
 
 
 class Sent(Message):
-    """A message that knows how often it was decoded."""
+    """Message that counts how often it is decoded."""
 
     reads = 0
 

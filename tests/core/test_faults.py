@@ -1,4 +1,4 @@
-"""A fault of Studio is heard, said once with a count, and what comes after it still arrives."""
+"""Tests of the log of Studio's internal errors: logged once with a count, without blocking later ones."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ADDRESS = "127.0.0.1:1"
 
 @pytest.fixture
 def log(tmp_path: Path) -> Iterator[logging.Logger]:
-    """A logger of its own that writes into ``log/studio.log``."""
+    """Separate logger that writes to ``log/studio.log``."""
     logger = logging.getLogger("studio.of-this-test")
     logger.propagate = False
     handler = LogFile(tmp_path / "log")
@@ -124,7 +124,7 @@ def test_failure_to_create_the_log_folder_is_ignored(tmp_path: Path) -> None:
 
 @pytest.fixture
 def heard(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> pytest.LogCaptureFixture:
-    """Everything is heard, until the test ends."""
+    """Log capture with the exception hooks of Studio installed during the test."""
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
     monkeypatch.setattr(threading, "excepthook", threading.excepthook)
@@ -174,7 +174,7 @@ def test_exception_is_formatted_on_one_line() -> None:
 
 @pytest.fixture
 def session(tmp_path: Path) -> Session:
-    """Never started: it has no threads and no sockets."""
+    """Return a session that is never started and has no threads and no sockets."""
     return Session(Settings(tmp_path), address=ADDRESS, journal_folder=tmp_path / "j", start_processes=False)
 
 
@@ -304,7 +304,7 @@ def test_close_releases_every_part_even_if_some_raise(
 
 
 def test_source_thread_survives_exceptions_in_jobs_and_sinks(master: Master) -> None:
-    """A thread that ended would leave Studio deaf, and the robots without Stop."""
+    """Without this thread Studio receives no messages, and the robots no Stop."""
     events: list[object] = []
     came = threading.Event()
 
@@ -369,7 +369,7 @@ class Unsayable:
 def test_log_call_that_cannot_be_formatted_does_not_raise_and_keeps_its_text(
     tmp_path: Path, text: object, value: object, said: str
 ) -> None:
-    """Any library may do so; Python's own handlers survive it, too."""
+    """Any library can log such a record; Python's own handlers don't raise either."""
     logger = logging.Logger("a library")  # noqa: LOG001 - without the handlers of pytest, which raise
     handler = LogFile(tmp_path)
     logger.addHandler(handler)

@@ -1,4 +1,4 @@
-"""Whatever strangers publish, a session goes on: Console, fleet, alarms and watched topics still answer."""
+"""Tests of hostile messages: the console, the fleet, the alarms and watched topics still work after them."""
 
 from __future__ import annotations
 

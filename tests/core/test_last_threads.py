@@ -1,4 +1,4 @@
-"""A thread that never ends does not keep a Studio without a window."""
+"""Tests of the exit of a process whose threads don't end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the log files are on each system, and that settings, state and logs have places of their own."""
+"""Tests of the folders of settings, state and logs on each platform."""
 
 from __future__ import annotations
 

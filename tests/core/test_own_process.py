@@ -1,4 +1,4 @@
-"""Studio open while its package is updated or removed: noticed, and said in a sentence."""
+"""Tests of an open Studio whose package is updated or removed: detected and shown as an alert."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The session on a real network: a master, a virtual robot, original topics, a program, a stop."""
+"""Tests of the session on a real network with a master, a virtual robot, original topics and a program."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EXAMPLES = Path(__file__).parents[2] / "resources" / "examples"
 
 
 class Lamp:
-    """A robot with one action."""
+    """Robot with one action."""
 
     made: ClassVar[list[Lamp]] = []
 
@@ -34,11 +34,11 @@ class Lamp:
 
     @action("blink", category="Looks", icon="lightbulb", timeout_s=30)
     def blink(self, call: Call) -> None:
-        """Blinks at once."""
+        """Blink at once."""
 
     @safe_stop(watchdog_s=0.5)
     def stop(self) -> None:
-        """Stands still at once."""
+        """Stop at once."""
         self.stops += 1
 
 

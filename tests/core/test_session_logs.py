@@ -1,4 +1,7 @@
-"""What programs log reaches the session's console, once and bounded; alerts lead to the doctor."""
+"""Tests of program logs in the session's console and of the alerts' link to the doctor.
+
+Each record is shown once, and their number is bounded.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ def told(session: Session, origin: str) -> list[str]:
 
 
 def listening(session: Session, node: nep.Node) -> None:
-    """Until Studio has subscribed the log records, which it does before anybody publishes any."""
+    """Wait until Studio has subscribed to the log topic, so that no record is published before."""
 
     def subscribed() -> bool:
         topic = node.graph().topics.get("/nep/log")

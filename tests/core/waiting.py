@@ -1,4 +1,4 @@
-"""Ticking a session until something is true."""
+"""Helper that ticks a session until a condition is true."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from app.core.session import Session
 
 
 def tick_until(session: Session, true: Callable[[], object], timeout_s: float = 60.0) -> None:
-    """Tick 30 times a second, as the window does; fails when it never comes true."""
+    """Tick the session until ``true()`` is truthy; fail after ``timeout_s`` seconds."""
     pause = threading.Event()
     end = time.monotonic() + timeout_s
     session.tick()

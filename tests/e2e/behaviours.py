@@ -1,4 +1,4 @@
-"""Behaviour files for the tests."""
+"""Behaviour files for the end-to-end tests."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ PEPPER = json.loads((EXAMPLES / "1-greeting.nepb").read_text("utf-8"))["robots"]
 
 
 def block(kind: str, *, below: Block | None = None, fields: Block | None = None, **inputs: Block) -> Block:
-    """A block; its id is its type's last word. `inputs` are named as in the file, in capitals."""
+    """Return a block whose id is the last word of its type.
+
+    ``inputs`` have the upper-case names of the file.
+    """
     made: Block = {"type": kind, "id": kind.rpartition("_")[2], "fields": fields or {}, "inputs": inputs}
     return {**made, "next": {"block": below}} if below else made
 
@@ -43,7 +46,7 @@ def forever(first: Block) -> Block:
 
 
 def write(path: Path, *scripts: Block, robots: dict[str, object] = PEPPER) -> Path:
-    """The scripts as a file, which describes its robots as files saved by Studio do."""
+    """Write scripts to a behaviour file with the descriptions of its robots, as Studio does."""
     content = {
         "format": "nep-behaviour",
         "version": 1,

@@ -1,4 +1,4 @@
-"""The end-to-end tests: real processes, and a screen of their own so that nobody's mouse is taken."""
+"""Fixtures of the end-to-end tests: real processes on a virtual screen, separate from the user's mouse."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HERE = Path(__file__).parent
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Everything here is end to end, and needs Xvfb."""
+    """Mark every test in this folder as ``e2e`` and skip it without Xvfb."""
     missing = pytest.mark.skip(reason="needs Xvfb (the package xvfb): a screen that is nobody's")
     for item in items:
         if HERE in item.path.parents:
@@ -29,7 +29,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Keeps what was on the screen when a test failed, before anything is closed."""
+    """Save a picture of the screen when a test fails, before its fixtures are closed."""
     report = yield
     screen = getattr(item, "funcargs", {}).get("screen")
     folder = getattr(item, "funcargs", {}).get("tmp_path")
@@ -42,7 +42,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 @pytest.fixture(scope="session")
 def screen() -> Iterator[Screen]:
-    """A virtual screen of 1600 x 1000 that nobody else uses."""
+    """Virtual screen of 1600 x 1000 pixels for this test alone."""
     with virtual_screen() as number:
         screen = Screen(f":{number}")
         yield screen
@@ -51,7 +51,7 @@ def screen() -> Iterator[Screen]:
 
 @pytest.fixture
 def address(monkeypatch: pytest.MonkeyPatch) -> str:
-    """Where this test's master is, or will be when somebody starts one."""
+    """Address of this test's master, which may not be running yet."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
@@ -61,7 +61,7 @@ def address(monkeypatch: pytest.MonkeyPatch) -> str:
 
 @pytest.fixture
 def start(screen: Screen, address: str, tmp_path: Path) -> Iterator[Callable[..., Studio]]:
-    """Starts Studio, with the same settings each time; whatever is left is ended after the test."""
+    """Function that starts Studio, always with the same settings; all are closed after the test."""
     started: list[Studio] = []
 
     def start(*arguments: str, **environment: str) -> Studio:

@@ -1,7 +1,8 @@
-"""A film of a person's path: a numbered picture with a caption for each step, and hands with one tool only.
+"""Film of a user's path: a numbered picture with a caption for each step, with the mouse or keys alone.
 
-The pictures go to the folder that the environment variable NEP_FILM names, in a folder for each film, else to
-the test's own folder. When a step fails, its picture is kept too, with what was missing.
+The pictures are written to the folder that the environment variable NEP_FILM names, in a folder for
+each film, else to the test's own folder. When a step fails, its picture is saved too, with the error as
+its caption.
 """
 
 from __future__ import annotations
@@ -28,13 +29,13 @@ STILL_LOOKS, STILL_S = 4, 0.12  # how often, and how far apart, it is looked whe
 
 
 class MouseOnly(Screen):
-    """A person's hand on the mouse; there is no keyboard."""
+    """Screen on which only the mouse can be used; a key press fails the test."""
 
     def _key(self, name: str, *, down: bool) -> None:
         raise AssertionError(f"{name} is pressed on a path for the mouse alone")
 
     def wheel(self, x: float, y: float, turns: int) -> None:
-        """Turn the wheel there: up when positive."""
+        """Turn the wheel at a position, in pixels; positive turns are up."""
         self.move(x, y)
         for _ in range(abs(turns)):
             self.press(WHEEL_UP if turns > 0 else WHEEL_DOWN)
@@ -42,7 +43,7 @@ class MouseOnly(Screen):
 
 
 class KeysOnly(Screen):
-    """A person's hands on the keyboard; there is no mouse."""
+    """Screen on which only the keyboard can be used; mouse input fails the test."""
 
     def move(self, x: float, y: float) -> None:
         raise AssertionError("the mouse moves on a path for the keyboard alone")
@@ -52,10 +53,10 @@ class KeysOnly(Screen):
 
 
 class Film:
-    """Keeps what a person sees, step by step."""
+    """Series of captioned pictures of the window, one for each step."""
 
     def __init__(self, studio: Person, title: str, folder: Path) -> None:
-        """``folder`` is used when NEP_FILM says nothing."""
+        """Create the film's folder in NEP_FILM, or in ``folder`` if that variable is empty or not set."""
         self._studio = studio
         self.folder = Path(os.environ.get("NEP_FILM") or folder / "film") / title
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -65,12 +66,12 @@ class Film:
         self.slowest: dict[str, Reaction] = {}
 
     def follow(self, studio: Person) -> None:
-        """Go on with another window."""
+        """Continue with another window."""
         self._studio = studio
 
     @contextmanager
     def step(self, caption: str) -> Iterator[None]:
-        """One step: what is done and what must be seen stands in the block; then its picture is taken."""
+        """Run one step, with its actions and checks in the ``with`` block, and take a picture after it."""
         try:
             yield
         except BaseException as error:
@@ -81,7 +82,7 @@ class Film:
         self._measure(caption)
 
     def _measure(self, caption: str) -> None:
-        """Keeps the slowest answer of a step in ``reactions.json``; `bench` judges it, no test does."""
+        """Save the slowest reaction of a step to ``reactions.json``, which only `bench` evaluates."""
         seen = self._studio.reactions()
         if seen:
             self.slowest[caption] = max(seen, key=lambda each: each.took_ms)
@@ -94,7 +95,7 @@ class Film:
         return max(left, 0), max(top, 0), right - max(left, 0), bottom - max(top, 0)
 
     def _wait_still(self) -> None:
-        """Let what moves arrive; a robot or a camera never does, so not for long."""
+        """Wait until two pictures are equal, with a limit because a robot or a camera image keeps moving."""
         pause = threading.Event()
         before: Picture | None = None
         for _ in range(STILL_LOOKS):
@@ -114,7 +115,7 @@ class Film:
 
 
 def with_caption(picture: Picture, words: str) -> Picture:
-    """The picture (red, green, blue) with a strip below that says the words; as blue, green, red."""
+    """Return an RGB picture with a caption below it, as BGR."""
     strip = np.full((STRIP, picture.shape[1], 3), PAPER, np.uint8)
     scale = TEXT_PX / cv2.getTextSize("Xg", cv2.FONT_HERSHEY_DUPLEX, 1.0, 1)[0][1] * 0.75
     plain = words.translate(PLAIN).encode("ascii", "replace").decode()
@@ -127,5 +128,5 @@ def with_caption(picture: Picture, words: str) -> Picture:
 
 
 def topic(studio: Person, name: str) -> tuple[float, float]:
-    """Where the row of a topic is."""
+    """Return the position of a topic's row in pixels."""
     return middle(studio.row("Topics", name)["rect"])

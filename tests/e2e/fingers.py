@@ -1,4 +1,4 @@
-"""A person who only has keys: fingers that press them, and eyes on what has the keyboard."""
+"""User without a mouse: presses keys and checks which widget or block has the focus."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FIELD = "Find a command, panel, topic, robot or file"
 
 
 class Fingers:
-    """Presses keys, and finds with them what is on the screen."""
+    """Keyboard of a user who presses keys and finds widgets and blocks by their focus."""
 
     def __init__(self, studio: Person) -> None:
         self.studio = studio
@@ -30,13 +30,13 @@ class Fingers:
     # -- keys -----------------------------------------------------------------------------------------
 
     def press(self, *names: str, held: Sequence[str] = ()) -> None:
-        """Keys one after the other, at the pace of a quick person."""
+        """Press keys one after the other at the speed of a fast user."""
         for name in names:
             self.studio.screen.key(name, held)
             self._pause.wait(PACE_S)
 
     def until_on(self, key: str, held: Sequence[str] = (), **wanted: object) -> None:
-        """Press a key until such a widget has the keyboard."""
+        """Press a key until a widget with these attributes has the focus."""
         for _ in range(MANY):
             if self.studio.all(focus=True, **wanted):
                 return
@@ -45,17 +45,17 @@ class Fingers:
         raise AssertionError(f"{key} does not lead to {wanted}; the keyboard is on {now}")
 
     def write(self, words: str) -> None:
-        """Write into the field that has the keyboard, in the place of what it says."""
+        """Replace the text of the focused field."""
         self.press("a", held=["Ctrl"])
         self.studio.screen.type(words)
 
     def do(self, words: str, command: str) -> None:
-        """Ctrl+K, a few letters, Enter: a command or a panel."""
+        """Run a command or open a panel with Ctrl+K, a few letters and Enter."""
         self.palette(words, command)
         self.press("Return")
 
     def palette(self, words: str, entry: str) -> None:
-        """Ctrl+K and a few letters: what is meant stands first."""
+        """Press Ctrl+K, type a few letters and wait until the entry is the first match."""
         self.press("k", held=["Ctrl"])
         self.studio.find(FIELD, focus=True)
         self.studio.screen.type(words)
@@ -67,26 +67,26 @@ class Fingers:
     # -- in the block editor --------------------------------------------------------------------------
 
     def to_page(self) -> None:
-        """Ctrl+1: the block editor has the keyboard."""
+        """Focus the block editor with Ctrl+1."""
         self.press("1", held=["Ctrl"])
         until(lambda: self.studio.page("document.hasFocus()"), "the page has the keyboard")
 
     def to_canvas(self) -> None:
-        """The canvas has the keyboard, none of its blocks."""
+        """Focus the canvas, without a block."""
         self.to_page()
         self.press("b", held=["Ctrl", "Shift"])
         self.page_says("stack")
 
     def focused(self) -> str:
-        """What has the focus in the page."""
+        """Return a description of the focused element of the page."""
         return str(self.studio.page(FOCUSED)).replace("\u00a0", " ")
 
     def page_says(self, words: str) -> None:
-        """Wait until what has the focus in the page says these words."""
+        """Wait until the description of the focused element contains these words."""
         until(lambda: words in self.focused(), lambda: f"{words}: {self.focused()}")
 
     def until_in_page(self, key: str, words: str, held: Sequence[str] = ()) -> None:
-        """Press a key in the block editor until what has the focus says these words."""
+        """Press a key in the block editor until the focused element's description contains ``words``."""
         for _ in range(MANY):
             if words in self.focused():
                 return
@@ -94,7 +94,7 @@ class Fingers:
         raise AssertionError(f"{key} does not lead to {words!r} but to {self.focused()}")
 
     def put_down(self, kind: str) -> str:
-        """Take the block that has the focus in the toolbox, and put it where the keys were; its id."""
+        """Insert the focused block of the toolbox at the canvas cursor and return its id."""
         before = set(kind_of(self.studio, kind))
         self.press("Return")
         until(lambda: self.studio.page(DRAGGING), "the block is taken")
@@ -105,7 +105,7 @@ class Fingers:
         return str(made.pop())
 
     def find_block(self, words: str, kind: str) -> str:
-        """Find a block by its words and put it where the keys were; its id."""
+        """Search for a block by its words, insert it at the canvas cursor and return its id."""
         self.press("f", held=["Ctrl", "Shift"])
         self.page_says("Find a block")
         self.write(words)
@@ -117,7 +117,7 @@ class Fingers:
         return self.put_down(kind)
 
     def go_to(self, block: str) -> None:
-        """Down until this block has the keys."""
+        """Press Down until this block has the focus."""
         node = f"document.querySelector(\"{CANVAS} [data-id='{block}'] > .blocklyPath\")"
         for _ in range(MANY):
             if self.studio.page(f"document.activeElement === {node}"):
@@ -126,7 +126,7 @@ class Fingers:
         raise AssertionError(f"Down does not lead to {block} but to {self.focused()}")
 
     def reword(self, says: str, words: str) -> None:
-        """Right to the gap that says this, Enter, and other words in it."""
+        """Press Right until the slot with this text has the focus, and replace its text."""
         self.until_in_page("Right", f"| {says}")
         self.press("Return")
         self.page_says("blocklyHtmlInput")

@@ -1,8 +1,8 @@
 # ruff: noqa: T201
-"""A program of somebody else, for the tests: ``python peer.py publish|hear TOPIC``.
+"""Program outside Studio for the end-to-end tests: ``python peer.py publish|hear TOPIC``.
 
-`publish` sends {"n": 0}, {"n": 1}, … a hundred times a second until its input ends, then says how many.
-`hear` writes each number that it receives as a line, until it is ended.
+`publish` sends {"n": 0}, {"n": 1}, … a hundred times per second until its input is closed, then prints
+their number. `hear` prints each received number as a line until it is killed.
 """
 
 from __future__ import annotations

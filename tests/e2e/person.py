@@ -1,4 +1,4 @@
-"""A person in front of one window: what they see of it, and their hands on mouse and keyboard."""
+"""User of one window: finds its widgets and operates them with mouse and keyboard."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Seen = Mapping[str, object]
 
 
 class Reaction(NamedTuple):
-    """One press, and when its answer was on the screen; ``work_ms`` the window's thread was at it."""
+    """Time from one input event to its result on the screen; ``work_ms`` is the time of the GUI thread."""
 
     where: str
     what: str
@@ -30,7 +30,7 @@ def middle(rect: Sequence[float]) -> tuple[float, float]:
 
 
 class Person:
-    """Looks at one window of Studio and uses mouse and keyboard, as X events, on it."""
+    """User of one window of Studio; mouse and keyboard are X events."""
 
     def __init__(self, screen: Screen, ask: Callable[..., object]) -> None:
         self.screen, self._ask = screen, ask
@@ -38,17 +38,17 @@ class Person:
     # -- looking ----------------------------------------------------------------------------------
 
     def look(self, **wanted: str | bool) -> list[Seen]:
-        """Every widget that can be seen now; nothing while the window is not up.
+        """Return the visible widgets; none while the window is not shown.
 
-        ``wanted``: those that are ``named`` so (name or text), of a ``kind``, that say words (``says``: in
-        name, text or description) or that are menus (``is_menu``). Asking for few disturbs the window least.
+        ``wanted`` filters them: ``named`` (name or text), ``kind``, ``says`` (words in name, text or
+        description), ``is_menu``. A narrow filter costs the window least time.
         """
         seen = self._ask("look", wanted=wanted)
         assert not isinstance(seen, dict), seen
         return seen or []
 
     def all(self, name: str = "", **wanted: object) -> list[Seen]:
-        """Those with this accessible name or text, and these other properties."""
+        """Return the visible widgets with this accessible name or text and these other properties."""
         return [
             each
             for each in self.look(named=name, kind=wanted.get("kind", ""))
@@ -56,11 +56,11 @@ class Person:
         ]
 
     def find(self, name: str = "", within_s: float = STEP_S, **wanted: object) -> Seen:
-        """The first such widget, once it is there."""
+        """Wait until such a widget is visible and return the first one."""
         return until(lambda: self.all(name, **wanted), f"no {name} {wanted}", within_s)[0]
 
     def says(self, words: str, within_s: float = STEP_S) -> str:
-        """Wait until something in the window says these words; all that it says."""
+        """Wait until a text in the window contains these words and return the whole text."""
 
         def found() -> str:
             seen = self.look(says=words)
@@ -70,11 +70,11 @@ class Person:
         return until(found, f"nothing says {words!r}", within_s)
 
     def rows(self, table: str) -> list[Seen]:
-        """The rows of a table or tree by its accessible name."""
+        """Return the rows of a table or tree by its accessible name."""
         return [row for each in self.all(table) for row in each.get("rows", [])]
 
     def row(self, table: str, first: str, within_s: float = STEP_S) -> Seen:
-        """The row whose first cell says this, once it is there."""
+        """Wait until a row with this first cell exists and return it."""
         return until(
             lambda: next((row for row in self.rows(table) if row["texts"][0] == first), None),
             f"no row {first!r} in {table}",
@@ -82,17 +82,17 @@ class Person:
         )
 
     def values(self, tree: str) -> dict[str, str]:
-        """The rows of a tree as words: what is told to a screen reader."""
+        """Return the rows of a tree as text, by their first cell, as a screen reader announces them."""
         return {row["texts"][0]: row["spoken"].partition(", ")[2] for row in self.rows(tree)}
 
     def picture(self, seen: Seen) -> Picture:
-        """The pixels of a widget, from the screen."""
+        """Return the pixels of a widget on the screen."""
         return self.screen.picture(seen["rect"])
 
     # -- doing ------------------------------------------------------------------------------------
 
     def click(self, name: str = "", **wanted: object) -> Seen:
-        """Click on a widget when it can be clicked and stands still: keys and mouse overtake a layout."""
+        """Wait until a widget is enabled and its layout is stable, then click it."""
         before: list[object] = []
 
         def resting() -> Seen | None:
@@ -105,14 +105,14 @@ class Person:
         return seen
 
     def _alike(self, name: str) -> str:
-        """What a failure says of the widgets of this name: which there are, and whether they can be used."""
+        """Return kind, state and position of the widgets of this name, for the message of a failed test."""
         found = [(each["kind"], each["enabled"], each["rect"]) for each in self.all(name)] if name else []
         return f"of this name (kind, enabled, place): {found}"
 
     def choose(self, menu: str, entry: str) -> None:
-        """Choose an entry of a menu of the menu bar, once the menu before it has closed.
+        """Choose an entry of a menu of the menu bar, once the previous menu has closed.
 
-        One that the window closes, as it does when the blocks come to show after the start, is opened again.
+        The menu is opened again if the window closes it, as it does when the block editor appears.
         """
         until(lambda: not self.menus("popup"), "the menu before it closes")
         self._entry("bar", menu)
@@ -124,11 +124,11 @@ class Person:
             self._entry("popup", entry)
 
     def pick(self, entry: str) -> None:
-        """Choose an entry of the menu that is open."""
+        """Choose an entry of the open menu."""
         self._entry("popup", entry)
 
     def menus(self, kind: str) -> list[Seen]:
-        """The menus that can be seen: of the "bar", or what has opened, "popup"."""
+        """Return the visible menus of the menu "bar" or the open "popup" menus."""
         return [each for each in self.look(is_menu=True) if each["menu"] == kind]
 
     def _entry(self, kind: str, text: str, within_s: float = STEP_S) -> None:
@@ -141,14 +141,14 @@ class Person:
     # -- in the web view --------------------------------------------------------------------------
 
     def page(self, script: str) -> object:
-        """What a script that only reads finds in the page of the block editor."""
+        """Return the result of a read-only script in the page of the block editor."""
         found = self._ask("script", script=script)
         return json.loads(found) if isinstance(found, str) and found else None
 
     def reactions(self) -> list[Reaction]:
-        """How long each press took until its answer was on the screen, since the last time this was asked.
+        """Return the reactions to input events since the last call.
 
-        Of the page only what took 16 ms or more: it tells no others.
+        The browser reports only events in the page that took 16 ms or more.
         """
         watch = (
             "(w => { if (!w.nepReactions) { w.nepReactions = [];"
@@ -160,7 +160,7 @@ class Person:
         return [Reaction(*each) for each in (*(self._ask("reactions") or []), *page)]
 
     def spot(self, selector: str) -> list[float]:
-        """Where an element of the page is on the screen, once it stands still."""
+        """Return the position of an element of the page on the screen, once it no longer moves."""
         look = f"({LOOK})({json.dumps(selector)})"
         self.page(look)
         again = f"window.nepStill === undefined ? {look} : window.nepStill"  # the page may come anew
@@ -174,7 +174,10 @@ class Person:
         self.screen.click(rect[0] + dx, rect[1] + dy)
 
     def open_category(self, name: str, place: int = 0) -> None:
-        """Open a category of the toolbox and wait for its blocks; ``place`` among those of this name."""
+        """Open a category of the toolbox and wait for its blocks.
+
+        ``place`` is the index of the category among those of this name.
+        """
         self.find(kind="QWebEngineView")
         shown = "document.querySelector('.nepTab:not([hidden]) .blocklyToolbox')"
         labels = f"[...({shown}?.querySelectorAll('.blocklyToolboxCategoryLabel') ?? [])]"
@@ -184,7 +187,7 @@ class Person:
         before: list[object] = []
 
         def in_sight() -> list[float] | None:
-            """Where the category is, once the wheel has brought it into the toolbox and it stands still."""
+            """Scroll the category into view and return its rectangle once it no longer moves."""
             rect, box = self.page(
                 f"[{named}[{place}].closest('.blocklyToolboxCategory'), {shown}]"
                 ".map(e => (r => [r.left, r.top, r.width, r.height])(e.getBoundingClientRect()))"
@@ -204,7 +207,7 @@ class Person:
         self.spot(".nepTab:not([hidden]) .blocklyFlyout .blocklyDraggable")
 
     def drag(self, selector: str, x: float, y: float) -> None:
-        """Drag a block by its left edge; the place under the mouse ends at (x, y)."""
+        """Drag a block by its left edge; the grabbed point ends at (x, y)."""
         left, top, _, _ = self.spot(selector)
         self.screen.move(left + 12, top + 18)
         self.screen.press()
@@ -213,18 +216,18 @@ class Person:
         self.screen.release()
 
     def blocks(self, selector: str = "") -> list[str]:
-        """The ids of the blocks in the workspace, or of those of them that match."""
+        """Return the ids of the blocks in the workspace that match ``selector``."""
         where = ".blocklyBlockCanvas [data-id]" + selector
         inside = "e => !e.closest('.blocklyFlyout') && !e.classList.contains('blocklyInsertionMarker')"
         ids = f"[...document.querySelectorAll({json.dumps(where)})].filter({inside}).map(e => e.dataset.id)"
         return self.page(ids) or []
 
     def outlined(self, state: str) -> list[str]:
-        """The ids of the blocks outlined as "running", "stopped" or "error"."""
+        """Return the ids of the blocks outlined as "running", "stopped" or "error"."""
         marks = f"[...document.querySelectorAll('.nepState-{state}')]"
         return self.page(f"{marks}.map(e => e.parentElement.dataset.id)") or []
 
 
 def amber(picture: Picture) -> int:
-    """How many pixels have the colour of what runs now."""
+    """Return the number of pixels in the colour of the running block."""
     return int((abs(picture.astype(int) - RUNNING).max(axis=2) < 12).sum())

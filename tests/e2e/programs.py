@@ -1,4 +1,4 @@
-"""Processes beside Studio: what they say, line by line, and their end."""
+"""Processes that run next to Studio, with their output by lines and their exit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ END_S = 30.0
 
 
 class Program:
-    """A Python program of ours as a process; a context manager that ends it."""
+    """Python process of this repository. Usable as a context manager that ends it."""
 
     def __init__(self, *arguments: str, environment: Mapping[str, str] | None = None) -> None:
         self._lines: list[str] = []
@@ -42,12 +42,12 @@ class Program:
 
     @property
     def lines(self) -> Sequence[str]:
-        """Everything that it said."""
+        """Lines of output so far."""
         with self._news:
             return tuple(self._lines)
 
     def says(self, words: str, within_s: float = 20.0) -> str:
-        """Wait for a line with these words."""
+        """Wait for a line of output with these words and return it."""
         return until(
             lambda: next((line for line in self.lines if words in line), ""),
             lambda: f"{self.process.args} says {words!r}: {self.lines[-5:]}",
@@ -55,20 +55,20 @@ class Program:
         )
 
     def end_input(self) -> None:
-        """Nothing more comes: the program may end."""
+        """Close the program's standard input, which lets it end."""
         self.process.stdin.close()
 
     def kill(self) -> None:
-        """`kill -9`."""
+        """Kill the process with SIGKILL."""
         self.process.send_signal(signal.SIGKILL)
         self.process.wait(END_S)
 
     def interrupt(self) -> None:
-        """Ctrl+C."""
+        """Send SIGINT, as Ctrl+C does."""
         self.process.send_signal(signal.SIGINT)
 
     def wait(self, within_s: float) -> int:
-        """Its exit code, when it has ended and everything that it said is read."""
+        """Wait until the process has ended and its output is read; return its exit code."""
         code = self.process.wait(within_s)
         self._reader.join(END_S)
         return code

@@ -1,4 +1,4 @@
-"""The real Studio in a process of its own, and the processes and the network that it is on."""
+"""Real Studio in a process of its own, with the processes of its network."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ START_S, END_S = 60.0, 30.0
 
 
 class Studio(Person):
-    """`python -m app` as a process, with everything that it has to do with in one folder."""
+    """Process of ``python -m app`` with all its files in one folder."""
 
     def __init__(self, screen: Screen, home: Path, master: str, *arguments: str, **environment: str) -> None:
         super().__init__(screen, self._request)
@@ -98,18 +98,18 @@ class Studio(Person):
 
     @property
     def log(self) -> str:
-        """The end of what it printed."""
+        """Last 3000 characters of its output."""
         return (self.home / "studio.log").read_text("utf-8", "replace")[-3000:]
 
     # -- its processes ----------------------------------------------------------------------------
 
     def wait_up(self) -> Studio:
-        """Wait until its window can be seen and is painted."""
+        """Wait until the window is visible and painted."""
         self.find(kind="MainWindow", within_s=START_S)
         return self
 
     def children(self, *words: str) -> list[psutil.Process]:
-        """The processes that run for this Studio's network and have these words in their command."""
+        """Return the processes in this Studio's network whose command line contains these words."""
         found = []
         for process in psutil.process_iter(["cmdline", "status"]):
             line = " ".join(process.info["cmdline"] or [])
@@ -123,17 +123,17 @@ class Studio(Person):
         return found
 
     def kill(self) -> None:
-        """`kill -9`: it can't do anything more."""
+        """Kill the process with SIGKILL, without any cleanup by Studio."""
         self.process.send_signal(signal.SIGKILL)
         self.process.wait(END_S)
 
     def quit(self) -> int:
-        """Quit by the menu; the exit code."""
+        """Quit by the menu and return the exit code."""
         self.choose("File", "Quit")
         return self.process.wait(END_S)
 
     def close(self) -> None:
-        """Give everything back, whatever state it is in."""
+        """End the process in any state and close its files."""
         if self.process.poll() is None:
             self.process.terminate()
             try:
@@ -147,13 +147,13 @@ class Studio(Person):
 
 
 def save_picture(screen: Screen, path: Path) -> None:
-    """Keep the whole screen in a file, for the person who reads a failed test."""
+    """Save the whole screen as a picture, to investigate a failed test."""
     picture = screen.picture((0, 0, 1600, 1000))
     cv2.imwrite(str(path), picture[:, :, ::-1])
 
 
 def terminate_all(processes: Sequence[psutil.Process]) -> None:
-    """End processes that a test left, whoever started them."""
+    """Kill processes that a test left running."""
     for process in processes:
         try:
             process.kill()

@@ -1,4 +1,4 @@
-"""The hour of a teacher: what is looked for in every film of it, and hands with a mouse on the blocks."""
+"""Checks and mouse operations for the films of a teacher's lesson of one hour."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Place = tuple[float, float]
 
 
 def words_of(studio: Person, block: str) -> str:
-    """All words on a block, and on those in it and below it."""
+    """Return the text of a block and of the blocks inside and below it."""
     return str(studio.page(f"{_first(of(block))}?.textContent") or "").replace("\u00a0", " ")
 
 
@@ -41,12 +41,12 @@ def _all(selector: str) -> str:
 
 
 def of(block: str) -> str:
-    """The selector of a block of the behaviour that shows."""
+    """Return the selector of a block in the visible behaviour."""
     return f"{CANVAS} [data-id='{block}']"
 
 
 def holds(studio: Person, outer: str, inner: str) -> bool:
-    """Whether a block stands in or below another one."""
+    """Return whether a block is inside or below another one."""
     inside = f"[data-id='{inner}']"
     return bool(
         studio.page(f"!!document.querySelector({json.dumps(of(outer))})?.querySelector({json.dumps(inside)})")
@@ -54,38 +54,38 @@ def holds(studio: Person, outer: str, inner: str) -> bool:
 
 
 def kind_of(studio: Person, kind: str) -> list[str]:
-    """The ids of the blocks of this type in the behaviour that shows."""
+    """Return the ids of the blocks of this type in the visible behaviour."""
     found = _all(f"{CANVAS} .{kind}:not(.blocklyInsertionMarker)")
     return studio.page(f"{found}.map(e => e.dataset.id)") or []
 
 
 def blocks_of(studio: Person) -> set[str]:
-    """The ids of all blocks of the behaviour that shows."""
+    """Return the ids of all blocks in the visible behaviour."""
     return set(kind_of(studio, "blocklyDraggable"))
 
 
 def problems(studio: Person) -> list[str]:
-    """The sentences of the panel Problems."""
+    """Return the texts of the Problems panel."""
     return [str(each["name"]) for each in studio.all(kind="ProblemRow")]
 
 
 def has_problem(studio: Person, words: str) -> None:
-    """Wait until Problems says so."""
+    """Wait until a problem contains these words."""
     until(lambda: any(words in each for each in problems(studio)), lambda: f"{words}: {problems(studio)}")
 
 
 def has_no_problem(studio: Person, words: str = "") -> None:
-    """Wait until Problems no longer says so; without words, until it says nothing."""
+    """Wait until no problem contains these words; "" waits until there is no problem."""
     until(lambda: not any(words in each for each in problems(studio)), lambda: f"{problems(studio)}")
 
 
 def warnings(studio: Person) -> list[str]:
-    """What stands beside blocks as a warning."""
+    """Return the texts of the warning bubbles of the blocks."""
     return studio.page(f"{_all(f'{TAB} .nepBubble-warning')}.map(e => e.textContent)") or []
 
 
 def value_of(studio: Person, variable: str) -> str:
-    """What the panel Variables says of it."""
+    """Return the value of a variable in the Variables panel, or "" if it is not listed."""
     rows = {row["texts"][0]: row["texts"][1] for row in studio.rows("Variables")}
     return str(rows.get(variable, ""))
 
@@ -94,7 +94,7 @@ def value_of(studio: Person, variable: str) -> str:
 
 
 class Counted(Screen):
-    """The mouse of a hand that counts: presses that stay where they are, and those that pull something."""
+    """Screen that counts clicks and drags of the mouse."""
 
     clicks = drags = 0
     _pressed_at: Place | None = None
@@ -112,7 +112,7 @@ class Counted(Screen):
 
 
 class Hands:
-    """What hands with a mouse do with blocks."""
+    """Mouse of a user who works with blocks."""
 
     def __init__(self, studio: Person) -> None:
         self.studio = studio
@@ -120,17 +120,20 @@ class Hands:
     # -- places -------------------------------------------------------------------------------------
 
     def rect(self, block: str) -> Sequence[float]:
-        """Where a block's own shape is on the screen."""
+        """Return the rectangle of a block's own shape on the screen."""
         return self.studio.spot(f"{of(block)} > .blocklyPath")
 
     def free(self, dx: float, dy: float) -> Place:
-        """A place of the page, from the corner beside the toolbox."""
+        """Return a position on the canvas, in pixels from its corner next to the toolbox."""
         left, top, _, _ = self.studio.spot(f"{TAB} .blocklyToolbox")
         wide = self.studio.spot(f"{TAB} .blocklyToolbox")[2]
         return left + wide + dx, top + dy
 
     def gap(self, block: str, number: int = 0) -> Place:
-        """The corner of a gap of a block that has nothing in it yet, or a grey value."""
+        """Return the corner of a block's slot that is empty or has a shadow block.
+
+        ``number`` is the index among such slots, from left to right.
+        """
         kinds = ":is(.blocklyOutlinePath, .blocklyShadow)"
         found = (
             f"{_all(f'{of(block)} > {kinds}')}.map(e => {PLACE})"
@@ -143,9 +146,9 @@ class Hands:
     # -- blocks out of the toolbox --------------------------------------------------------------------
 
     def take(self, category: str, kind: str, corner: Place, place: int = 0) -> str:
-        """Drag a block out of the toolbox until its corner is there; its id.
+        """Drag a block out of the toolbox until its corner is at ``corner``; return its id.
 
-        ``place`` is that of the category among those of this name: each robot has its own.
+        ``place`` is the index of the category among those of this name, because each robot has its own.
         """
         before = set(kind_of(self.studio, kind))
         offered = f"{FLYOUT} .blocklyDraggable.{kind}"
@@ -158,7 +161,7 @@ class Hands:
         return str(made)
 
     def _bring_into_sight(self, offered: str) -> None:
-        """Turn the wheel over the open category until a block of it can be taken."""
+        """Scroll the open category until a block of it can be grabbed."""
 
         script = f"[{_first(FLYOUT)}, {_first(offered)}].map(e => e && {PLACE})"
         before: list[object] = []
@@ -184,28 +187,28 @@ class Hands:
         return bool(self.studio.page("!!document.querySelector('.blocklyDragging')"))
 
     def put(self, category: str, kind: str, dx: float, dy: float, place: int = 0) -> str:
-        """Drag a block onto a free place of the page; its id."""
+        """Drag a block from the toolbox to a free position on the canvas; return its id."""
         return self.take(category, kind, self.free(dx, dy), place)
 
     def below(self, above: str, category: str, kind: str, place: int = 0) -> str:
-        """Drag a block out of the toolbox to below another one; its id."""
+        """Drag a block from the toolbox to below another one; return its id."""
         return self._into(above, category, kind, self.end(above), place)
 
     def end(self, above: str) -> Place:
-        """Where the block below another one has its corner."""
+        """Return the corner of a block connected below another one."""
         left, top, _, height = self.rect(above)
         return left, top + height
 
     def inside(self, outer: str, category: str, kind: str) -> str:
-        """Drag a block out of the toolbox into the empty mouth of another one; its id."""
+        """Drag a block from the toolbox into the empty statement slot of another one; return its id."""
         return self._into(outer, category, kind, self.mouth(outer))
 
     def fill(self, outer: str, category: str, kind: str, number: int = 0) -> str:
-        """Drag a value out of the toolbox into a gap of a block; its id."""
+        """Drag a value from the toolbox into a slot of a block; return its id."""
         return self._into(outer, category, kind, self.gap(outer, number))
 
     def mouth(self, outer: str) -> Place:
-        """Where the first block in another one has its corner."""
+        """Return the corner of the first block inside another one."""
         left, top, _, height = self.rect(outer)
         return left + INDENT, top + max(height / 2 - 12, 40)
 
@@ -217,7 +220,7 @@ class Hands:
     # -- blocks of the page ---------------------------------------------------------------------------
 
     def carry(self, block: str, x: float, y: float) -> None:
-        """Hold a block of the page at a place of the screen; `drop` lets it go."""
+        """Drag a block to a position on the screen without releasing it; `drop` releases it."""
         left, top, _, _ = self.rect(block)
         self.studio.screen.move(left + GRIP[0], top + GRIP[1])
         self.studio.screen.press()
@@ -226,24 +229,24 @@ class Hands:
         until(self._dragging, "the page has seen that it is held")
 
     def drop(self) -> None:
-        """Let go what is held."""
+        """Release the dragged block."""
         self.studio.screen.release()
         until(lambda: not self._dragging(), "it is let go")
 
     def move(self, block: str, corner: Place) -> None:
-        """Drag a block, with what hangs below it, until its corner is there."""
+        """Drag a block, with the blocks below it, until its corner is at ``corner``."""
         self.carry(block, corner[0] + GRIP[0], corner[1] + GRIP[1])
         self.drop()
 
     def delete(self, block: str) -> None:
-        """Drag a block, with what hangs below it, onto the toolbox."""
+        """Drag a block, with the blocks below it, onto the toolbox."""
         left, top, wide, height = self.studio.spot(f"{TAB} .blocklyToolbox")
         self.carry(block, left + wide / 2, top + height / 2)
         self.drop()
         until(lambda: block not in blocks_of(self.studio), f"{block} is deleted")
 
     def choose(self, block: str, shows: str, wanted: str) -> None:
-        """Choose from the drop-down of a block that shows these words."""
+        """Choose an entry of the drop-down of a block that shows ``shows``."""
         fields = f"[...document.querySelectorAll({json.dumps(f'{of(block)} .blocklyDropdownField')})]"
         self._press(
             f"{fields}.find(e => e.textContent.replaceAll('\\u00a0', ' ').includes({json.dumps(shows)}))"
@@ -251,7 +254,7 @@ class Hands:
         self.pick(wanted)
 
     def pick(self, wanted: str) -> None:
-        """Choose from the drop-down that is open."""
+        """Choose an entry of the open drop-down."""
         words = f"e => e.textContent.includes({json.dumps(wanted)})"
         self._press(f"{_all('.blocklyMenuItem')}.find({words})")
 
@@ -262,13 +265,13 @@ class Hands:
         self._press(f"{_all(f'{FLYOUT} .blocklyFlyoutButton')}.find({same})")
 
     def menu(self, block: str, entry: str) -> None:
-        """Choose from the menu of a block."""
+        """Choose an entry of a block's context menu."""
         left, top, _, _ = self.rect(block)
         self.studio.screen.click(left + GRIP[0], top + GRIP[1], RIGHT)
         self.pick(entry)
 
     def _press(self, element: str) -> None:
-        """Press an element of the page in its middle, when it stands still."""
+        """Click the centre of an element of the page once it no longer moves."""
         before: list[object] = []
 
         def still() -> Sequence[float] | None:
@@ -284,16 +287,16 @@ class Hands:
     # -- the bin, and the backpack --------------------------------------------------------------------
 
     def open_bin(self) -> None:
-        """Show what was deleted."""
+        """Open the bin of deleted blocks."""
         self.studio.point(".nepBin", 12, 12)
         self.studio.spot(BIN)
 
     def open_backpack(self) -> None:
-        """Show what is kept for other behaviours."""
+        """Open the backpack."""
         self.studio.point(".nepBackpack", 12, 12)
         self.studio.spot(BACKPACK)
 
     def pack(self, block: str) -> None:
-        """Drag a block, with what hangs below it, onto the backpack: it keeps a copy."""
+        """Drag a block, with the blocks below it, onto the backpack to copy it."""
         self.carry(block, *middle(self.studio.spot(".nepBackpack")))
         self.drop()

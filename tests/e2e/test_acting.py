@@ -1,4 +1,4 @@
-"""Publishing and calling by hand in the real window, heard by real programs; Stop ends it."""
+"""Tests of publishing and calling by hand in the real window with real programs, and of their end by Stop."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.long, pytest.mark.timeout(240)]
 
 @dataclass
 class Lamp:
-    """What a program with a lamp heard."""
+    """Messages and requests received by a program with a lamp."""
 
     heard: list[object] = field(default_factory=list)
     asked: list[object] = field(default_factory=list)
@@ -28,7 +28,7 @@ class Lamp:
 
 @contextmanager
 def lamp(address: str) -> Iterator[Lamp]:
-    """Listens to /lamp and serves `colour_of`."""
+    """Program that subscribes to /lamp and serves `colour_of`."""
     made = Lamp()
 
     def answer(request: dict[str, object]) -> dict[str, object]:
@@ -48,7 +48,7 @@ def lamp(address: str) -> Iterator[Lamp]:
 
 
 def write(studio: Studio, fingers: Fingers, name: str, words: str, **wanted: object) -> None:
-    """Click a field of the form, write into it, and see that it stands there: keys take their time."""
+    """Click a field of the form, replace its text and wait until the text is shown."""
     studio.screen.click(*middle(studio.find(name, enabled=True, **wanted)["rect"]))
     studio.find(name, focus=True, **wanted)
     fingers.write(words)
@@ -59,7 +59,7 @@ def write(studio: Studio, fingers: Fingers, name: str, words: str, **wanted: obj
 
 
 def said(studio: Studio) -> str:
-    """What the window has to say of what is sent and called, for who reads a failure."""
+    """Return the buttons and the Console lines, for the message of a failed test."""
     kinds = ("Switch", "Button", "LinkButton")
     buttons = [
         (each["name"] or each["text"], each["enabled"]) for each in studio.look() if each["kind"] in kinds

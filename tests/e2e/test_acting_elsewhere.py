@@ -1,4 +1,7 @@
-"""A click in a picture, and a recording, send in the real window, to real programs: only what is armed."""
+"""Tests of publishing by a click in an image and by a replay: only armed topics are sent.
+
+The window and the programs are real.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,10 @@ LAMP, WHEELS = "/lamp", "/base/cmd_vel"
 
 @contextmanager
 def program(address: str, *topics: str, camera: str = "") -> Iterator[dict[str, list[object]]]:
-    """Listens to these topics, and shows a grey picture ten times a second where it has a camera."""
+    """Start a program that subscribes to topics and may publish a grey image ten times per second.
+
+    ``camera`` is the topic of the images; "" means no camera.
+    """
     heard: dict[str, list[object]] = {topic: [] for topic in topics}
     with nep.node("program", master=address) as node:
         for topic in topics:
@@ -46,7 +52,7 @@ def program(address: str, *topics: str, camera: str = "") -> Iterator[dict[str, 
 
 
 def texts(studio: Studio) -> list[str]:
-    """What the window says, for who reads a failure."""
+    """Return the texts in the window, for the message of a failed test."""
     return [each["text"] for each in studio.look() if each["text"]]
 
 
@@ -86,7 +92,7 @@ def test_click_in_a_image_publishes_its_pixel_once_armed(studio: Studio, address
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """Light and wheels by turns, a tenth of a second apart."""
+    """Recording with alternating messages of the lamp and the wheels, 0.1 s apart."""
     path = tmp_path / "Tour.mcap"
     with RecordingWriter(path, clock=TestClock(START_NS, 100_000_000), limits=limits()) as writer:
         for seq in range(120):

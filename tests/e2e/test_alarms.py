@@ -1,4 +1,4 @@
-"""A right click on a topic makes an alarm, which tells by a banner and goes off by itself."""
+"""Test of an alarm created by a right click on a topic: its banner, and its end without a user."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A walk with mouse and keyboard: alerts cover nothing, open from the status bar; panels keep their size."""
+"""Test of alerts in the real window: they cover no panel, open from the status bar and resize nothing."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TOOLS = ("Dock", "TitleTab", "_Segment", "StatusItem")
 
 @pytest.fixture
 def held() -> Iterator[list[int]]:
-    """Three ports that this process holds, where the gateway wants to listen."""
+    """Three ports of the gateway, occupied by this process."""
     with ExitStack() as stack:
         sockets = [stack.enter_context(socket.socket()) for _ in range(3)]
         for each in sockets:
@@ -38,7 +38,7 @@ def held() -> Iterator[list[int]]:
 
 @pytest.fixture
 def master(address: str, held: list[int], tmp_path: Path) -> Iterator[Master]:
-    """A master whose gateway finds its ports taken."""
+    """Master whose gateway finds its ports occupied."""
     gateway = GatewayAttachment(tmp_path / "ports.json", Ports(*held))
     with Master(address, attachments=[gateway], learn_s=0.0) as master:
         yield master
@@ -46,7 +46,7 @@ def master(address: str, held: list[int], tmp_path: Path) -> Iterator[Master]:
 
 @contextmanager
 def adder(address: str) -> Iterator[None]:
-    """A program that offers a service."""
+    """Program that offers a service."""
     with nep.node("adder", master=address) as node:
         node.new_server("add", lambda _request: {"sum": 3, "of": {"a": 1, "b": 2}}, threads=1)
         thread = threading.Thread(target=node.spin)
@@ -65,7 +65,7 @@ def overlap(one: Sequence[float], other: Sequence[float]) -> bool:
 
 
 def places(studio: Studio) -> dict[tuple[str, str, str], Sequence[float]]:
-    """Where panels and all that can be pressed is, but for what is in the banner."""
+    """Return the rectangles of panels and buttons, except those in the banner."""
     banner = next((each["rect"] for each in studio.all(kind="Banner")), (0, 0, 0, 0))
     found = {}
     for each in studio.look():
@@ -79,7 +79,7 @@ def places(studio: Studio) -> dict[tuple[str, str, str], Sequence[float]]:
 
 
 def height_of_timeline(studio: Studio) -> float:
-    """Open the recording that is chosen; the height of the Timeline once it stands still."""
+    """Open the selected recording and return the height of the Timeline once it no longer changes."""
     seen: list[float] = []
 
     def still() -> bool:

@@ -1,4 +1,4 @@
-"""A behaviour asks, the person in front of Studio answers with the keyboard alone, and the robot says it."""
+"""Tests of a behaviour that asks a question: the user types the answer, and the robot speaks it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def chooses(words: str, choices: list[str], below: Block) -> Block:
 
 @pytest.fixture
 def asking(start: Callable[..., Studio], tmp_path: Path) -> Studio:
-    """Studio runs a behaviour that asks for a name."""
+    """Studio that runs a behaviour which asks for a name."""
     script = started(asks("What is your name?", says_the_answer()))
     studio = start(str(write(tmp_path / "Mine.nepb", script)))
     studio.spot("[data-id=started]")  # a menu that is open when the blocks come is closed by them

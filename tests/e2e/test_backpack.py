@@ -1,4 +1,4 @@
-"""The backpack with a real mouse: from one file into another, and still full at the next start."""
+"""Test of the backpack with a real mouse: blocks are copied between files and kept across a restart."""
 
 from __future__ import annotations
 

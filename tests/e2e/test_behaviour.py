@@ -1,4 +1,4 @@
-"""Behaviours by mouse: pause and step, errors on their block, the Python text, examples, robots that go."""
+"""Tests of behaviours by mouse: pause, step, errors at a block, Python code, examples, lost robots."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.timeout(240)
 
 @pytest.fixture
 def with_robot(start: Callable[..., Studio], tmp_path: Path) -> Callable[[dict], Studio]:
-    """Studio with the virtual robot and this script."""
+    """Function that starts Studio with a script and the virtual robot."""
 
     def open_script(script: dict) -> Studio:
         studio = start(str(write(tmp_path / "Mine.nepb", script)))

@@ -1,4 +1,4 @@
-"""Blocks that are dragged out of the page: a tab takes them, anything else does not lose them."""
+"""Tests of blocks dragged out of the page: a tab accepts them, and other targets don't lose them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PATH = f"{VISIBLE} .blocklyBlockCanvas [data-id='{{}}'] > .blocklyPath"
 
 
 def carry(studio: Studio, block: str, x: float, y: float) -> None:
-    """Drag a block to a place of the screen, and hold it there."""
+    """Drag a block to a position on the screen without releasing it."""
     left, top, _, _ = studio.spot(PATH.format(block))
     studio.screen.move(left + 12, top + 18)
     studio.screen.press()
@@ -35,7 +35,7 @@ def place_of(studio: Studio, name: str) -> tuple[float, float]:
 
 
 def ringed(studio: Studio, name: str) -> bool:
-    """Whether this tab's edge has the accent's colour."""
+    """Return whether the border of this tab has the accent colour."""
     picture = studio.picture(studio.find(name, kind="BehaviourTab"))
     return bool(abs(picture[picture.shape[0] // 2, 0].astype(int) - ACCENT).max() < 12)
 

@@ -1,4 +1,4 @@
-"""Copies of blocks go from tab to tab, wherever in the window a click has left the keys."""
+"""Test of pasting copied blocks in another tab, whichever widget has the focus after a click."""
 
 from __future__ import annotations
 

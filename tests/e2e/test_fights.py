@@ -1,4 +1,4 @@
-"""Two scripts fight for the robot: the loser's block says so, and Problems puts one after the other."""
+"""Test of two scripts that compete for a robot: the warning at the block and its fix from Problems."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def script(first: Block, name: str, x: int) -> Block:
 
 
 def bubbles(studio: Studio) -> list[str]:
-    """What stands beside blocks as a warning."""
+    """Return the texts of the warning bubbles of the blocks."""
     return studio.page("[...document.querySelectorAll('.nepBubble-warning')].map(e => e.textContent)") or []
 
 

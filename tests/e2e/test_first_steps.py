@@ -1,4 +1,4 @@
-"""Who has never programmed goes the first steps with the mouse: each is checked, and the card says so."""
+"""Tests of the first steps for beginners with the mouse: the card checks each step and shows the result."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CANVAS = ".blocklySvg > .blocklyWorkspace > .blocklyBlockCanvas"
 
 
 def take(studio: Studio, category: str, kind: str, x: float, y: float) -> None:
-    """Drag the first block of that type out of its category, by the middle of its left edge."""
+    """Drag the first block of this type out of its category by its left edge to (x, y)."""
     studio.open_category(category)
     studio.drag(f".blocklyFlyout .blocklyDraggable.{kind}", x, y)
 

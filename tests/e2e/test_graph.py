@@ -1,4 +1,4 @@
-"""The graph of the real window: who talks to whom is seen, walked along by keys, and led to by the mouse."""
+"""Test of the graph in the real window: connections are shown and followed with keys and mouse."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ended.set()
 
 
 def said(studio: Studio) -> str:
-    """What a screen reader says of what is chosen in the graph."""
+    """Return the screen reader's description of the selection in the graph."""
     return str(studio.find("Graph of nodes")["description"])
 
 
@@ -54,7 +54,7 @@ def test_graph_navigation_leads_from_a_topic_publisher_to_its_subscribers(
         studio.find("Graph of nodes", focus=True)
 
         def walked() -> bool:
-            """To the first node, and along its line as soon as that is drawn."""
+            """Select the first node, then follow its line as soon as it is drawn."""
             if not said(studio).startswith("/chatter"):
                 fingers.press("Right")
             return "from talker to listener" in said(studio)

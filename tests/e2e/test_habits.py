@@ -1,4 +1,4 @@
-"""A person with the keyboard alone finds commands, changes a key, and stops: also from inside the page."""
+"""Tests of commands and Stop with the keyboard alone, also from inside the page."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FIELD = "Find a command, panel, topic, robot or file"
 
 
 def chosen_first(studio: Studio, words: str) -> None:
-    """Wait until the palette shows this as its best."""
+    """Wait until this entry is the first match of the palette."""
     until(
         lambda: words in [row["texts"][0] for row in studio.rows("Matches")][1:2],
         lambda: f"{words} is first: {studio.rows('Matches')[:3]}",

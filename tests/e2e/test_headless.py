@@ -1,4 +1,4 @@
-"""`python -m app run FILE`: a behaviour with no window, on the virtual robot.
+"""Tests of ``python -m app run FILE``: a behaviour without a window, on the virtual robot.
 
 `tests/test_readme.py` runs an example to its end.
 """

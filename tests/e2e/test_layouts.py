@@ -1,4 +1,4 @@
-"""What a person arranged comes back as it was left."""
+"""Tests of panels and layouts that are restored after a restart."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ pytestmark = pytest.mark.timeout(240)
 
 
 def panels(studio: Studio) -> dict[str, tuple[int, ...]]:
-    """Where each panel is in the window, by its name; of those that float only how large they are.
+    """Return the position and size of each panel in the window by name; of floating panels, only the size.
 
-    (Without a window manager Qt moves windows down a little at each start.)
+    Without a window manager Qt moves windows down a little at each start.
     """
     seen = studio.look()
     left, top, _, _ = next(each["rect"] for each in seen if each["kind"] == "MainWindow")
@@ -30,7 +30,7 @@ def panels(studio: Studio) -> dict[str, tuple[int, ...]]:
 
 
 def settled(studio: Studio, true: Callable[[dict[str, tuple[int, ...]]], bool]) -> dict[str, tuple[int, ...]]:
-    """The panels, once this is true of them and nothing moves any more."""
+    """Wait until the panels fulfil the condition and no longer move; return them."""
     before: list[dict[str, tuple[int, ...]]] = []
 
     def still() -> bool:
@@ -42,7 +42,7 @@ def settled(studio: Studio, true: Callable[[dict[str, tuple[int, ...]]], bool]) 
 
 
 def close(one: tuple[int, ...], other: tuple[int, ...]) -> bool:
-    """The same place, but for the two pixels of a rounded share."""
+    """Return whether two rectangles are equal within 2 pixels, the rounding of a splitter."""
     return len(one) == len(other) and all(abs(a - b) <= 2 for a, b in zip(one, other, strict=True))
 
 

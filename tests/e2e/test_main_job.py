@@ -1,4 +1,4 @@
-"""The main job by mouse and keyboard: a robot, its topics and pictures, blocks that run, Stop."""
+"""Tests of the main workflow by mouse and keyboard: connect a robot, watch topics, run blocks, press Stop."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_blocks_dragged_with_the_mouse_run_on_the_robot(studio: Studio, address:
 
 
 def type_angle(studio: Studio, field: str, angle: int) -> None:
-    """Click into a block's number, and type another one."""
+    """Click the number of a block and replace it."""
     studio.point(field, dx=10, dy=10)
     typing = "document.activeElement && document.activeElement.classList.contains('blocklyHtmlInput')"
     until(lambda: studio.page(typing), "the number is edited")
@@ -116,13 +116,13 @@ def type_angle(studio: Studio, field: str, angle: int) -> None:
 
 
 def green(picture: Picture) -> bool:
-    """Whether most of it is a green tint."""
+    """Return whether the median colour of a picture is a green tint."""
     red, green, blue = (int(value) for value in np.median(picture.reshape(-1, 3), axis=0))
     return green > red + 5 and green > blue
 
 
 def _stops(answers: nep.Subscriber) -> list[dict]:
-    """The answers to a stop that have arrived by now."""
+    """Return the stop replies received so far, or an empty list until one has succeeded."""
     found = []
     while (message := answers.receive(0.0)) is not None:
         if message.payload["op"] == "stop":

@@ -1,4 +1,4 @@
-"""The menus by the keyboard alone, also while the blocks have it: Alt and a letter, then a letter."""
+"""Tests of the menus with the keyboard alone, also while the block editor has the focus."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BLOCKS = "document.querySelectorAll('.nepTab:not([hidden]) .blocklyBlockCanvas .
 
 @pytest.fixture
 def mine(start: Callable[..., Studio], tmp_path: Path) -> Studio:
-    """Studio with one file, whose block “say” has the keyboard."""
+    """Studio with one file whose “say” block has the focus."""
     studio = start(str(write(tmp_path / "Mine.nepb", started(say("One")))))
     studio.point("[data-id='say One'] > .blocklyPath", 8, 10)
     until(

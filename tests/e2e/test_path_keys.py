@@ -1,4 +1,4 @@
-"""With the keyboard alone: over the start page, through a run block by block, to topics and values, saved."""
+"""Filmed user journey with the keyboard alone, from the start page to a saved behaviour."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A person's path with the mouse alone, from the start page to a saved behaviour; every step is filmed."""
+"""Filmed user journey with the mouse alone, from the start page to a saved behaviour."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.timeout(230)
 
 
 def colours_of(studio: Studio, block: str) -> str:
-    """The label of the colour of a block."""
+    """Return the HTML of the colour field of a block."""
     field = f"document.querySelector(\"[data-id='{block}'] .nepColour\")"
     return str(studio.page(f"{field}.outerHTML"))
 

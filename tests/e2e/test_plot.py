@@ -1,4 +1,4 @@
-"""A plot by mouse and keyboard in the real window: a value dragged from the Inspector, and typed."""
+"""Test of a plot in the real window: a value dragged from the Inspector and a typed field path."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.long, pytest.mark.timeout(240)]
 
 @contextmanager
 def odometry(address: str) -> Iterator[None]:
-    """Publishes /odom 50 times a second."""
+    """Program that publishes /odom 50 times per second."""
     ended = threading.Event()
     with nep.node("wheels", master=address) as node:
         publisher = node.new_pub("/odom", "json")
@@ -47,7 +47,7 @@ def curves(studio: Studio) -> list[str]:
 
 
 def coloured(studio: Studio) -> int:
-    """Pixels of the canvas in a strong colour: what a curve has and axes have not."""
+    """Return the number of saturated pixels of the canvas; curves have them, axes don't."""
     picture = studio.picture(studio.find("Curves")).astype(int)[..., :3]
     return int((np.ptp(picture, axis=2) > 60).sum())
 

@@ -1,4 +1,4 @@
-"""Record, stop, and read back what was published meanwhile, to the last message."""
+"""Test of a recording that is read back to its last message."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A crash of Studio, for real: the next start offers a report of it once, and a person writes it."""
+"""Tests of real crashes of Studio: the next start offers to report them once."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def crash(studio: Studio, number: int) -> None:
 
 
 def renderers_of(studio: Studio) -> list[psutil.Process]:
-    """Chromium's zygotes, Studio's own children, fork them."""
+    """Return the renderer processes, which Chromium forks from zygotes that are children of Studio."""
     own = psutil.Process(studio.process.pid).children()
     return [each for zygote in own if "--type=zygote" in zygote.cmdline() for each in zygote.children()]
 
 
 def has_looked_back(studio: Studio) -> None:
-    """What a start does before it can be found by others."""
+    """Wait until the start has checked for earlier crashes, which happens before its socket exists."""
     until(lambda: Path(socket_name(studio.home)).exists(), "it can be found")
     studio.choose("Help", "About NEP Studio")
     studio.says("Copy version information")

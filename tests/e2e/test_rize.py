@@ -1,4 +1,4 @@
-"""A driver in 30 lines on the original nep 0.5.3.5 is a robot like any other: found, driven, stopped."""
+"""Tests of a driver of 30 lines for nep 0.5.3.5: it is found, driven and stopped like any other robot."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ VERSION = "0.5.3.5"
 
 @pytest.fixture
 def driver(peers: Peers, address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Peer]:
-    """The driver of the example in an environment of its own, and a master with its gateway."""
+    """Example driver in a virtual environment of its own, and a master with its gateway."""
     monkeypatch.setenv("NEP_STATE_DIR", str(tmp_path / "state"))
     peers.start(VERSION, "subscriber", "warming/up").kill()  # installs the peer, or skips the test
     start_master(peers, address)
@@ -34,7 +34,7 @@ def driver(peers: Peers, address: str, tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def turtle(tmp_path: Path) -> Path:
-    """Says hello and walks, once."""
+    """Behaviour file that speaks and walks once."""
     fields = {"ROBOT": "Turtle", "DIRECTION": "forwards"}
     walk = block("robot_rize_do_walk", fields=fields, METERS=number(0.5))
     first = started(say("Hello from blocks", walk, "Turtle", "rize"))

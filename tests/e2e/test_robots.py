@@ -1,4 +1,4 @@
-"""A person tries a real robot for the first time: the question, the movement, Stop; and a second robot."""
+"""Tests of the first use of a real robot, with the permission, the motion and Stop, and of a second robot."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.timeout(240)
 
 
 def press(studio: Studio, name: str) -> None:
-    """Click on a widget that has come to its place: a panel that has just opened is still laid out."""
+    """Wait until a widget no longer moves, then click it: the layout of a new panel takes a while."""
     places: list[object] = []
 
     def rests() -> bool:
@@ -28,9 +28,10 @@ def press(studio: Studio, name: str) -> None:
 
 @pytest.fixture
 def table(start: Callable[..., Studio], tmp_path: Path) -> Iterator[Studio]:
-    """Studio, and the example of a driver, which is no virtual robot.
+    """Studio with the example driver, which is no virtual robot.
 
-    It turns a degree in a second, so that it still turns when Stop is pressed, however slow the computer is.
+    The robot turns one degree per second, so that it still turns when Stop is pressed on a slow
+    computer.
     """
     studio = start()
     network = {"NEP_MASTER": studio.master}

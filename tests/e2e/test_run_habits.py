@@ -1,4 +1,4 @@
-"""Run as Scratch has it: Run pressed again begins anew, and edits while it runs say that they apply later."""
+"""Tests of Run as in Scratch: a second press restarts, and edits during a run show when they apply."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ CHILD = "app.blocks.runtime.child"
 
 
 def programs(studio: Studio) -> list[int]:
-    """The processes of programs that run."""
+    """Return the process ids of the running programs."""
     return [each.pid for each in studio.children(CHILD)]
 
 
 def only_another(studio: Studio, *before: int) -> list[int]:
-    """The process of the program that runs, once it is another one than these and they are gone."""
+    """Return the process id of the only running program if it is not in ``before``, else an empty list."""
     found = programs(studio)
     return found if len(found) == 1 and found[0] not in before else []
 
 
 def lasts(studio: Studio) -> None:
-    """Wait until a run has lasted a second; a press before that would be half of a double click."""
+    """Wait until a run has lasted a second; an earlier press would count as a double click."""
     seen: list[int] = []
 
     def grows() -> bool:
@@ -42,7 +42,7 @@ def lasts(studio: Studio) -> None:
 
 @pytest.fixture
 def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
-    """Studio with the virtual robot and a behaviour that turns for ever; it runs."""
+    """Studio that runs a behaviour which turns the virtual robot in an endless loop."""
     speech = {**say("Round and round"), "x": 420, "y": 56}
     path = write(tmp_path / "Turning.nepb", started(forever(turn(300))), speech)
     studio = start(str(path))

@@ -1,4 +1,4 @@
-"""`nep-studio --selftest DIR`: the one test of every package, with the block editor and without it."""
+"""Tests of ``nep-studio --selftest DIR``, which checks every package, with and without the block editor."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ sys.exit(main(sys.argv[1:]))
 
 
 class Tried:
-    """One self-test in a process of its own."""
+    """Self-test in a process of its own."""
 
     def __init__(
         self, screen: Screen, folder: Path, *arguments: str, begin: tuple[str, ...] = ("-m", "app")
@@ -56,15 +56,15 @@ class Tried:
 
     @property
     def report(self) -> dict:
-        """The report that it has left."""
+        """Content of the report file."""
         return json.loads((self.folder / "report.json").read_text("utf-8"))
 
     def steps(self) -> dict[str, dict]:
-        """Its steps by their names."""
+        """Steps of the report by name."""
         return {step["name"]: step for step in self.report["steps"]}
 
     def left(self) -> list[psutil.Process]:
-        """The processes that still live in its home."""
+        """Return the processes that still run in the home folder of the self-test."""
         found = []
         for process in psutil.process_iter():
             try:
@@ -76,13 +76,13 @@ class Tried:
         return found
 
     def nothing_is_left(self) -> None:
-        """Processes of the web engine end a moment after the one that they belong to."""
+        """Wait until all processes have ended; those of the web engine end a moment after their parent."""
         until(lambda: not self.left(), lambda: f"all have ended: {self.left()}", 20)
 
 
 @pytest.fixture(scope="module")
 def both(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Tried, Tried]]:
-    """One with the editor and one that can't have it, at the same time on the same screen."""
+    """Two concurrent self-tests on the same screen: with the block editor and without it."""
     folder = tmp_path_factory.mktemp("自己 テスト")
     web = Tried(screen, folder / "with")
     plain = Tried(screen, folder / "without", "--no-web", begin=("-c", NO_WEB))

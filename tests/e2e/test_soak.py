@@ -1,4 +1,4 @@
-"""A minute of everything at once: memory, handles and threads stay flat."""
+"""Soak test of one minute under full load: memory, handles and threads stay constant."""
 
 from __future__ import annotations
 

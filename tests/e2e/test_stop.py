@@ -1,4 +1,4 @@
-"""F12 stops everything, whatever has the keyboard: the robot stands still and says so."""
+"""Tests of F12, which stops the robot and the program whichever widget has the focus."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.timeout(240)
 
 @pytest.fixture
 def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
-    """Studio with the virtual robot and a behaviour that turns for ever; it runs."""
+    """Studio that runs a behaviour which turns the virtual robot in an endless loop."""
     speech = {**say("Round and round"), "x": 420, "y": 56}
     lights = {"ROBOT": "Pepper", "WHERE": "eyes", "COLOUR": "#35b0fa"}
     light = {**block("robot_pepper_do_light", fields=lights), "x": 56, "y": 360}
@@ -35,13 +35,13 @@ def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
 
 
 def run_again(studio: Studio) -> None:
-    """The program runs once more, and nothing is open or in the hand."""
+    """Start the program again, with no menu open and no block dragged."""
     studio.click("Run", kind="RunButton")
     until(lambda: "turn" in studio.outlined("running"), "the block glows again")
 
 
 def stands_still(studio: Studio) -> None:
-    """The robot answered, and what it says of itself from then on is that it does not move."""
+    """Check that the stop is confirmed, the published state stays still and the program has ended."""
     studio.says("Pepper stopped (")
     with nep.node("listener", master=studio.master) as node:
         states = node.new_sub("/Pepper/state", "json")
@@ -53,7 +53,7 @@ def stands_still(studio: Studio) -> None:
 
 
 def stands_still_again(studio: Studio) -> None:
-    """The same after another run, whose last stop is still to be read while this one is under way."""
+    """Check the standstill after another run, once the text of the previous stop is replaced."""
     studio.find("Run", kind="RunButton", enabled=True)
     stands_still(studio)
 
@@ -86,7 +86,7 @@ def test_f12_in_a_field_of_the_developer_layout_stops(turning: Studio) -> None:
 
 @pytest.mark.timeout(300)  # three runs
 def test_stop_works_while_blocks_are_dragged_or_a_block_menu_is_open(turning: Studio) -> None:
-    """It stops at once, and what was begun ends as it would have otherwise."""
+    """Stop works at once, and the drag or the menu is not cancelled by it."""
     before = sorted(turning.blocks())
     left, top, _, _ = turning.spot("[data-id='say Round and round'] > .blocklyPath")
     turning.screen.move(left + 12, top + 18)
@@ -104,7 +104,7 @@ def test_stop_works_while_blocks_are_dragged_or_a_block_menu_is_open(turning: St
     typing = "document.hasFocus() && document.activeElement.matches('.nepPalette input')"
 
     def has_the_keyboard() -> bool:
-        """A press may miss it while the palette still comes to its place: a person presses again."""
+        """Click the field again until it has the focus: a click may miss while the palette still moves."""
         turning.point(".nepPalette input", dx=12, dy=10)
         return bool(turning.page(typing))
 
@@ -127,7 +127,7 @@ def test_stop_works_while_blocks_are_dragged_or_a_block_menu_is_open(turning: St
 
 
 def menus(studio: Studio) -> list[Seen]:
-    """The menus of ours that are open."""
+    """Return the open menus of Studio."""
     return studio.menus("popup")
 
 
@@ -147,7 +147,7 @@ def the_menu_of_a_block(studio: Studio) -> None:
     there = "!!document.querySelector('.blocklyContextMenu')"
 
     def is_open() -> bool:
-        """A press opens nothing while X still takes the mouse away from the menu before: press again."""
+        """Right-click until the menu opens: X may still grab the mouse for the previous menu."""
         studio.screen.click(left + 12, top + 18, RIGHT)
         with suppress(AssertionError):
             return until(lambda: bool(studio.page(there)), "it is open", 5.0)
@@ -176,7 +176,7 @@ def a_name_that_is_typed(studio: Studio) -> None:
 
 
 def test_one_click_on_stop_works_while_any_menu_or_sheet_is_open(turning: Studio) -> None:
-    """X gives the mouse to what pops up: the first press beside it must do more than close it."""
+    """X grabs the mouse for a popup, so the first click outside must not only close it."""
     answers: list[nep.Message] = []
     with nep.node("listener", master=turning.master) as node:
         node.new_sub("/Pepper/answer", "robot/answer", sink=answers.extend)
@@ -204,7 +204,7 @@ def test_one_click_on_stop_works_while_any_menu_or_sheet_is_open(turning: Studio
 
 
 def stops_of(messages: list[nep.Message]) -> list[str]:
-    """The stops that the robot has carried out."""
+    """Return the ids of the stops that the robot has executed."""
     told = [message.payload for message in messages]
     return [each["id"] for each in told if each["op"] == "stop" and each["state"] == "succeeded"]
 

@@ -1,4 +1,4 @@
-"""A tab is renamed where it stands; its file, and the title of the window, follow."""
+"""Test of renaming a tab in place: its file and the window title follow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several behaviours as tabs: undo across them, a second start, and the tabs at the next start."""
+"""Tests of behaviours in tabs: restored tabs, earlier versions and files opened while Studio runs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SHOWN = "document.querySelector('.nepTab:not([hidden])')"
 
 
 def shown(studio: Studio) -> set[str]:
-    """The blocks of the tab that shows."""
+    """Return the ids of the blocks in the visible tab."""
     ids = f"[...{SHOWN}.querySelectorAll('.blocklyBlockCanvas .blocklyDraggable')].map(e => e.dataset.id)"
     return set(studio.page(ids) or [])
 
@@ -30,7 +30,7 @@ def tabs(studio: Studio) -> list[str]:
 
 
 def start_once_more(studio: Studio, path: Path) -> int:
-    """What a double click on a file does while Studio runs."""
+    """Open a file while Studio runs, as a double click on it does; return the exit code."""
     environ = {
         **os.environ, "NEP_STUDIO_HOME": str(studio.home), "NEP_MASTER": studio.master,
         "QT_QPA_PLATFORM": "offscreen", "NEP_GATEWAY": "0",

@@ -1,4 +1,4 @@
-"""The hour of a teacher with the keyboard alone; every step is filmed."""
+"""Filmed first hour of a teacher with the keyboard alone."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_first_hour_of_a_teacher_is_completed_by_keyboard(
 
 
 class Ears:
-    """Hear all that Pepper says, also what is said between two looks at the screen."""
+    """Recorder of everything that Pepper speaks, including speech between two checks of the screen."""
 
     def __init__(self, node: nep.Node) -> None:
         self.said: list[str] = []
@@ -78,16 +78,16 @@ class Ears:
                 self.said.append(words)
 
     def turtle_moves(self) -> bool:
-        """Whether it has been at two places that are some centimetres apart."""
+        """Return whether the Turtle has been more than 5 cm away from its first position."""
         return any(math.dist(self._places[0], each) > 0.05 for each in self._places)
 
     def hear(self, words: str) -> None:
-        """Wait until it says so."""
+        """Wait until Pepper has spoken these words."""
         until(lambda: words in self.said, lambda: f"{words}: {self.said}")
 
 
 def done(studio: Studio, words: str) -> None:
-    """Wait until a first step is done."""
+    """Wait until this item of the first steps is done."""
     until(
         lambda: f"{words}: done" in [each["name"] for each in studio.all(kind="StepRow")],
         lambda: f"{words}: {[each['name'] for each in studio.all(kind='StepRow')]}",
@@ -95,7 +95,7 @@ def done(studio: Studio, words: str) -> None:
 
 
 def new_page(studio: Studio, fingers: Fingers) -> None:
-    """Ctrl+N: an empty page, whose canvas has the keyboard."""
+    """Open an empty page with Ctrl+N and focus its canvas."""
     before = len(tabs(studio))
     fingers.press("n", held=["Ctrl"])
     until(lambda: len(tabs(studio)) > before, "a new tab")
@@ -104,7 +104,7 @@ def new_page(studio: Studio, fingers: Fingers) -> None:
 
 
 def to_room(fingers: Fingers) -> None:
-    """F6 until the room has the keyboard."""
+    """Press F6 and Tab until the room has the focus."""
     fingers.until_on("F6", **{"in": "robot"})
     fingers.until_on("Tab", kind="RoomView")
 

@@ -1,4 +1,4 @@
-"""The film of a teacher's first hour with the mouse alone: every step has a caption and is checked."""
+"""Filmed first hour of a teacher with the mouse alone: every step has a caption and is checked."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ WHY = "document.querySelector('.nepWhy')?.textContent ?? ''"
 
 
 class Mouse(MouseOnly, Counted):
-    """The only tool; it counts."""
+    """Mouse that counts clicks and drags, on a screen without a keyboard."""
 
 
 @dataclass
 class Hour:
-    """What all parts of the film have: the window, its film, the hand, and the robots' states."""
+    """Shared state of all parts of the film: window, film, mouse and room."""
 
     studio: Studio
     film: Film
@@ -57,7 +57,7 @@ class Hour:
     home: Path
 
     def follow(self, studio: Studio) -> None:
-        """Go on in another window."""
+        """Continue in another window."""
         studio.screen = self.mouse
         self.studio = self.hand.studio = self.room.studio = studio
         self.film.follow(studio)
@@ -104,13 +104,13 @@ def stop(hour: Hour) -> None:
 
 
 def touch(hour: Hour) -> None:
-    """Tap on Pepper's head in the room."""
+    """Click Pepper's head in the room."""
     at = hour.room.state("Pepper")
     hour.mouse.click(*hour.room.on_screen((at["x"], at["y"]), up=HEAD))
 
 
 def move_the_robot(hour: Hour) -> str:
-    """From the start page to the first motion; the block that turns."""
+    """Film the path from the start page to the first motion; return the id of the turn block."""
     studio, film, hand, mouse = hour.studio, hour.film, hour.hand, hour.mouse
     with film.step("The start page asks what you would like to do"):
         studio.says("What would you like to do?")
@@ -172,7 +172,7 @@ def greet(hour: Hour) -> None:
 
 
 def react_to_touch(hour: Hour) -> str:
-    """A script that counts touches and lists things; the last block of it."""
+    """Film a script that counts touches and fills a list; return the id of its last block."""
     studio, film, hand = hour.studio, hour.film, hour.hand
     with film.step("Reaction to touch: its own start block"):
         hat = hand.put("Sensors", "robot_pepper_when_touched", 430, 40)

@@ -1,4 +1,4 @@
-"""Trying blocks on the robot at once: from the toolbox, from a stack, and the value of a sensor."""
+"""Test of trying blocks on the robot: from the toolbox, from a stack, and the value of a sensor."""
 
 from __future__ import annotations
 

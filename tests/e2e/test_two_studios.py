@@ -1,4 +1,4 @@
-"""Two Studios on one computer: one master, one virtual robot, both stop it, and either may go first."""
+"""Test of two Studios on one computer with one master and one virtual robot; the first can quit first."""
 
 from __future__ import annotations
 

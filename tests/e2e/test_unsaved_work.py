@@ -1,4 +1,4 @@
-"""`kill -9` of Studio, of a publisher, of the master: no work, no message and no process is lost or left."""
+"""Tests of SIGKILL for Studio, a publisher and the master: no work or message is lost, no process remains."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def delete_the_script(studio: Studio) -> None:
 
 
 def add_a_block(studio: Studio) -> None:
-    """By the keyboard: find it in the toolbox of the tab that shows."""
+    """Find a block with the keyboard in the toolbox of the visible tab and add it."""
     studio.choose("Edit", "Find and add a block")
     until(lambda: studio.page("document.activeElement.type") == "search", "the keys go to the field")
     studio.screen.type("wait")

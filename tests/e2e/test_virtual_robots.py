@@ -1,4 +1,4 @@
-"""Virtual robots as a person lives with them: they come back, share a room, are moved and spoken to."""
+"""Tests of virtual robots: restored at startup, in one room, moved and controlled by the user."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Place = tuple[float, float]
 
 
 class RoomOnScreen:
-    """Where things of the room are on the screen, as the drawing has them."""
+    """Positions of robots and things of the room on the screen."""
 
     def __init__(self, studio: Studio, node: nep.Node) -> None:
         self.studio = studio
@@ -51,19 +51,22 @@ class RoomOnScreen:
         self._last: dict[str, dict] = {}
 
     def state(self, name: str) -> dict:
-        """How a robot is now."""
+        """Return the newest state of a robot, or an empty dict before its first one."""
         message = self.states[name].receive(0.0)
         if message is not None:
             self._last[name] = message.payload
         return self._last.get(name, {})
 
     def thing(self, name: str) -> Place:
-        """Where a robot has a thing, in m."""
+        """Return the position of a thing in metres as Pepper reports it, or (99, 99) if it is unknown."""
         found = (each for each in self.state("Pepper").get("objects", ()) if each["name"] == name)
         return next(((each["x"], each["y"]) for each in found), (99.0, 99.0))
 
     def on_screen(self, place: Place, up: float = 0.0) -> Place:
-        """The pixel of a place on the floor (m), or so many units of its scale above it."""
+        """Return the pixel of a position on the floor in metres, or of a point above it.
+
+        ``up`` is the height in drawing units, multiplied by the scale of objects at this position.
+        """
         x, y, wide, high = self.studio.find(kind="RoomView")["rect"]
         bounds = RoomBounds(-2.5, 3.0, -2.5, 2.5)
         stage = Stage(QRectF(x, y, wide, high), bounds)
@@ -72,7 +75,7 @@ class RoomOnScreen:
         return at.x(), at.y()
 
     def drag(self, start: Place, end: Place) -> None:
-        """Drag as a hand does, from one pixel to another."""
+        """Drag in small steps from one pixel to another."""
         screen = self.studio.screen
         screen.move(*start)
         screen.press()

@@ -1,4 +1,4 @@
-"""Waiting for something to be true, never for a time to pass."""
+"""Waiting for a condition, never for a fixed time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LOOK_S, MAX_CHECK_S = 0.05, 0.2
 
 
 def until(true: Callable[[], T], what: str | Callable[[], str], within_s: float = 40.0) -> T:
-    """Ask until the answer is true, and return it; fails with `what`, or what it says then."""
+    """Call ``true`` until its result is truthy and return it; fail with ``what`` after a timeout."""
     pause = threading.Event()
     end, look_s = time.monotonic() + within_s, LOOK_S
     while not (found := true()):

@@ -1,6 +1,6 @@
-"""A person's hands on an X screen: real mouse and key events, and pictures of what is on the screen.
+"""Mouse, keyboard and pictures of an X screen, with real input events.
 
-It speaks to libX11 and libXtst, which Qt WebEngine needs anyway, so no package is wanted for it.
+It uses libX11 and libXtst, which Qt WebEngine requires too, so that no package is needed for it.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def _library(name: str) -> ctypes.CDLL:
 
 
 class Screen:
-    """One X display."""
+    """X display with mouse and keyboard."""
 
     def __init__(self, display: str) -> None:
         self.display = display
@@ -68,7 +68,7 @@ class Screen:
         self._x.XCloseDisplay(self._d)
 
     def let_all_go(self) -> None:
-        """Release what is still held: the next test could press nothing while a failed one holds it."""
+        """Release all held keys and buttons: one held by a failed test would disturb the next one."""
         for button in list(self._buttons):
             self.release(button)
         for name in list(self._keys):
@@ -82,7 +82,7 @@ class Screen:
         self._x.XSync(self._d, 0)
 
     def glide(self, x: float, y: float, steps: int = 12) -> None:
-        """Move there as a hand does, not in one jump."""
+        """Move the mouse to a position in small steps."""
         (left, top), parts = self._at, range(1, steps + 1)
         for part in parts:
             self.move(left + (x - left) * part / steps, top + (y - top) * part / steps)
@@ -99,7 +99,7 @@ class Screen:
         self.release(button)
 
     def double_click(self, x: float, y: float) -> None:
-        """Two clicks, between which the screen itself waits: however busy the computer is, they are near."""
+        """Double-click with a delay of the X server, so that the clicks stay close on a busy computer."""
         self.click(x, y)
         self._button(LEFT, down=True, after_ms=60)  # two of one millisecond are none
         self.release()
@@ -112,7 +112,7 @@ class Screen:
     # -- the keyboard -----------------------------------------------------------------------------
 
     def key(self, name: str, held: Sequence[str] = ()) -> None:
-        """Press and release a key, while others are held down."""
+        """Press and release a key while the ``held`` keys are down."""
         for each in held:
             self._key(each, down=True)
         self._key(name, down=True)
@@ -121,15 +121,15 @@ class Screen:
             self._key(each, down=False)
 
     def hold(self, name: str) -> None:
-        """Press a key and keep it down, until `let_go`."""
+        """Press a key without releasing it; `let_go` releases it."""
         self._key(name, down=True)
 
     def let_go(self, name: str) -> None:
-        """Release a key that is held down."""
+        """Release a held key."""
         self._key(name, down=False)
 
     def type(self, text: str) -> None:
-        """Type on a keyboard with the American layout, which Xvfb has."""
+        """Type a text on the US keyboard layout, the one of Xvfb."""
         for letter in text:
             self.key(letter, ["Shift"] if letter.isupper() or letter in SHIFTED else [])
 
@@ -144,7 +144,7 @@ class Screen:
     # -- pictures ---------------------------------------------------------------------------------
 
     def picture(self, rect: Sequence[float]) -> Picture:
-        """What is on the screen there: rows of pixels, red, green and blue from 0 to 255."""
+        """Return a rectangle of the screen as rows of RGB pixels, 0 to 255."""
         x, y, width, height = (round(value) for value in rect)
         got = self._x.XGetImage(
             self._d, self._root, x, y, width, height, ctypes.c_ulong(ALL_PLANES), Z_PIXMAP

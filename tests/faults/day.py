@@ -1,4 +1,4 @@
-"""A day of a network: its master, who publishes and who hears on its hosts, and what they counted."""
+"""Master, publishers and subscribers on the hosts of a fault test, with their message counts."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from tests.faults.hosts import Host, Network
 from tests.nep.programs import Program, eventually, running
 
 WAIT_S = 60.0
-"""For what must happen in the end, however busy this computer is."""
+"""Timeout in seconds for conditions that must become true, even on a busy computer."""
 _MASTER = "from nep.cli import main; main()"
 
 
 class Part:
-    """A program of `traffic` on a host."""
+    """Program of `traffic` that runs on a host."""
 
     def __init__(self, program: Program, host: Host) -> None:
         self.host = host
@@ -28,14 +28,18 @@ class Part:
         assert program.line() == "ready"
 
     def ask(self, what: str) -> dict[str, Any]:
-        """Its answer. An AssertionError when something went wrong in it."""
+        """Send a request to the program and return its reply.
+
+        Raises:
+            AssertionError: If the program reports an error.
+        """
         self._program.say(what)
         answer: dict[str, Any] = json.loads(self._program.line())
         assert not answer.get("error"), answer["error"]
         return answer
 
     def hold(self, *, is_held: bool) -> None:
-        """Halt the program as a debugger does, or let it go on."""
+        """Suspend or resume the program, as a debugger does."""
         process = psutil.Process(self._program.process.pid).children(recursive=True)[-1]
         if is_held:
             process.suspend()
@@ -44,7 +48,7 @@ class Part:
 
 
 class Master:
-    """The master that runs, and where."""
+    """Running master and its host."""
 
     def __init__(self, program: Program, host: Host) -> None:
         self.host = host
@@ -52,9 +56,9 @@ class Master:
 
 
 class Day:
-    """Starts programs on hosts; they are killed at the end.
+    """Programs on the hosts of one test; they are killed at its end.
 
-    `address` is that of the master for other hosts.
+    `address` is the address at which other hosts reach the master.
     """
 
     def __init__(self, hosts: Network, stack: ExitStack) -> None:
@@ -64,7 +68,7 @@ class Day:
         self._stack = stack
 
     def begin_master(self, host: Host) -> float:
-        """Start a master that serves the network, as a person does; when that was. Returns when it does."""
+        """Start a master from the command line, wait until it serves and return the time of its start."""
         began = now()
         self.address = f"{host.address}:7780"
         words = ("master", "--no-gateway", "--listen", host.address)
@@ -81,7 +85,7 @@ class Day:
     def start(
         self, part: Callable[[], None], host: Host, topic: str, *, master: str = "", **more: Any
     ) -> Part:
-        """A program of `traffic`, when it is ready."""
+        """Start a program of `traffic` on a host and wait until it is ready."""
         options = json.dumps({"node": f"{part.__name__}-{host.name}", "topic": topic, **more})
         program = running(
             traffic.code_of(part),
@@ -95,15 +99,15 @@ class Day:
 
 @contextmanager
 def day(hosts: Network) -> Iterator[Day]:
-    """Ends all programs at the end."""
+    """Yield a `Day` and kill its programs at the end."""
     with ExitStack() as stack:
         yield Day(hosts, stack)
 
 
 def balance(sent: int, subscriber: Part) -> dict[str, Any]:
-    """Wait until all that was sent is received or lost; what the subscriber counted then.
+    """Wait until every sent message is received or counted as lost; return the subscriber's counts.
 
-    It must have been given what it received, each once and in order.
+    Every received message must have been delivered once and in order.
     """
     seen: dict[str, Any] = {}
 
@@ -120,11 +124,11 @@ def balance(sent: int, subscriber: Part) -> dict[str, Any]:
 
 
 def is_hearing(subscriber: Part) -> Callable[[], bool]:
-    """Whether it got anything since now."""
+    """Return a function that checks whether the subscriber has received messages since this call."""
     before = subscriber.ask("look")["read"]
     return lambda: bool(subscriber.ask("look")["read"] > before)
 
 
 def now() -> float:
-    """The clock that the programs on all hosts have, too."""
+    """Return the monotonic time in seconds, which all hosts share."""
     return monotonic()

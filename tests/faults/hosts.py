@@ -1,10 +1,11 @@
-"""Computers of a test: network and process namespaces, joined by a switch.
+"""Hosts of a test: network and process namespaces that are connected by a switch.
 
-Nothing of it has a name in the system that could be taken or stay behind: a namespace lives as long as a
-process in it. Each host has a first process that reads its standard input; when this program ends, also by
-`kill -9`, that input ends, so does the first process, and the system kills everything else in there.
+No host has a name in the system that could conflict or remain: a namespace exists as long as a process
+in it. The first process of each host reads its standard input. When this program ends, also by
+`kill -9`, that input is closed, the first process ends, and the kernel kills all other processes in the
+namespace.
 
-A user who is not root gets a namespace of users as well, where the system lets him.
+A user who is not root also gets a user namespace, where the system allows it.
 """
 
 from __future__ import annotations
@@ -24,24 +25,24 @@ _TIMEOUT_S = 20.0
 _SWITCH = "switch"
 _NET = "10.88.0"
 _FIRST = "mount -t tmpfs tmpfs /dev/shm; ip link set lo up; hostname {name}; echo; exec cat"
-"""Memory and abstract sockets are shared on one computer only."""
+"""First process of a host, with its own /dev/shm: shared memory must not reach other hosts."""
 _ANNOUNCE = (
     "sleep {wait_s}; echo 1 > /proc/sys/net/ipv4/conf/eth0/arp_notify; ip link set eth0 address {number}"
 )
 _ARP_LOCK_S = 1.1
-"""Hosts ignore an announcement of an address that they learned within the last second (`locktime`)."""
+"""Seconds that hosts ignore an announcement of an address they have just learned (`locktime`: 1 s)."""
 _ESTABLISHED = "01"
 _RANDOM, _EVER = 0xFFFFF038, 2**32 - 1
 _PROGRAM = "4,32 0 0 {random},37 1 0 {below},6 0 0 2,6 0 0 {pass_on},"
-"""For the kernel's packet filter: a random number; above the bound the packet goes on, else it is dropped."""
+"""BPF program of the kernel's packet filter: drops a packet whose random number is below the bound."""
 
 
 class CannotMakeHostsError(Exception):
-    """This computer has no namespaces for this user, or lacks a command."""
+    """Error for a computer without a required command or without namespaces for this user."""
 
 
 class Host:
-    """A computer. `address` is its IPv4 address; everything in it is killed with it."""
+    """Simulated host. `address` is its IPv4 address; its processes are killed when it ends."""
 
     def __init__(self, name: str, address: str, before: Sequence[str]) -> None:
         self.name, self.address = name, address
@@ -60,40 +61,44 @@ class Host:
         """Of its first process."""
 
     def inside(self) -> list[str]:
-        """The words that start a program on this computer. It ends with the process that these make."""
+        """Return the command prefix that starts a program on this host and kills it with its parent."""
         enter = [*_entering(self.pid), "--net", "--pid", "--mount", "--uts"]
         return [*enter, "setpriv", "--pdeathsig", "KILL"]
 
     def run(self, *words: str) -> str:
-        """What a command on this computer prints. Raises `subprocess.CalledProcessError`."""
+        """Run a command on this host and return its output.
+
+        Raises:
+            subprocess.CalledProcessError: If the command fails.
+        """
         done = subprocess.run(
             [*self.inside(), *words], check=True, capture_output=True, text=True, timeout=_TIMEOUT_S
         )
         return done.stdout
 
     def change_address(self, new: str) -> None:
-        """What another Wi-Fi does: the old address is gone, then there is a new one."""
+        """Replace the address, as a change of the Wi-Fi network does: the old one is removed first."""
         self.run("ip", "addr", "del", f"{self.address}/24", "dev", "eth0")
         self.address = new
         self.run("ip", "addr", "add", f"{new}/24", "dev", "eth0")
 
     def resent(self) -> int:
-        """Segments of TCP that this computer had to send again."""
+        """Return the number of TCP segments that this host has retransmitted."""
         names, values = (
             line.split() for line in self.run("cat", "/proc/net/snmp").splitlines() if line.startswith("Tcp:")
         )
         return int(values[names.index("RetransSegs")])
 
     def connections_to(self, address: str) -> int:
-        """How many connections of this computer lead there, as far as it knows."""
+        """Return the number of established connections to an address in this host's kernel."""
         theirs = socket.inet_aton(address)[::-1].hex().upper()
         lines = [line.split() for line in self.run("cat", "/proc/net/tcp").splitlines()[1:]]
         return sum(words[2].startswith(f"{theirs}:") and words[3] == _ESTABLISHED for words in lines)
 
     def kill(self) -> None:
-        """The power is cut: all its processes are killed at once, and nobody is told. It has no network then.
+        """Simulate a power failure: kill all processes at once, without a message to other hosts.
 
-        Its network is let go only after them, so that no connection can say goodbye.
+        The processes are suspended before the network goes down, so no connection is closed properly.
         """
         for process in psutil.Process(self.pid).children(recursive=True):
             process.suspend()
@@ -101,16 +106,16 @@ class Host:
         self.end()
 
     def end(self) -> None:
-        """Kill what is left in it."""
+        """Kill the remaining processes."""
         if self._outer.poll() is None:
             self._outer.kill()
         self._outer.communicate()
 
 
 class Network:
-    """Hosts that are joined by a switch; `stack` ends them and what runs on them.
+    """Hosts connected by a switch; `stack` ends the hosts and their programs.
 
-    A thread may pull cables while others use other hosts.
+    A thread may disconnect cables while other threads use other hosts.
     """
 
     def __init__(self, stack: ExitStack) -> None:
@@ -125,7 +130,7 @@ class Network:
         self._lock = Lock()
 
     def host(self, name: str, address: str = "") -> Host:
-        """A new computer; `name` has 10 letters at most. It takes the next free address if none is given."""
+        """Add a host; ``name`` has at most 10 letters, and ``address`` "" means the next free one."""
         with self._lock:
             before = [] if os.geteuid() == 0 else self._switch.inside()
             made = Host(name, address or f"{_NET}.{len(self._hosts) + 1}", before)
@@ -154,11 +159,11 @@ class Network:
         return made
 
     def cable(self, host: Host, *, is_in: bool) -> None:
-        """Pull the cable between a host and the switch, or put it in again. The host keeps its address."""
+        """Connect or disconnect the cable between a host and the switch. The host keeps its address."""
         self._switch.run("ip", "link", "set", _port_of(host), "up" if is_in else "down")
 
     def lose(self, host: Host, ratio: float) -> None:
-        """Lose this share of all packets to a host and from it, at random."""
+        """Drop this share (0 to 1) of all packets to and from a host, at random."""
         self._filter(_port_of(host), _PROGRAM.format(random=_RANDOM, below=int(ratio * _EVER), pass_on=_EVER))
 
     def _filter(self, device: str, program: str) -> None:
@@ -167,7 +172,7 @@ class Network:
             self._switch.run("tc", "filter", "add", "dev", device, way, "bpf", "da", "bytecode", program)
 
     def narrow(self, host: Host, mbit: float) -> None:
-        """Let no more than this through to a host in a second; 0 takes that back."""
+        """Limit the bandwidth to a host, in Mbit/s; 0 removes the limit."""
         port = _port_of(host)
         if not mbit:
             self._switch.run("tc", "qdisc", "del", "dev", port, "root")
@@ -187,7 +192,11 @@ def _port_of(host: Host) -> str:
 
 @contextmanager
 def network() -> Iterator[Network]:
-    """A network without hosts; closed at the end. Raises `CannotMakeHostsError`."""
+    """Yield a network without hosts and close it at the end.
+
+    Raises:
+        CannotMakeHostsError: If this computer lacks a required command or namespaces.
+    """
     if not sys.platform.startswith("linux"):
         raise CannotMakeHostsError("computers are made with Linux's namespaces")
     missing = [each for each in ("ip", "tc", "unshare", "nsenter", "setpriv") if shutil.which(each) is None]

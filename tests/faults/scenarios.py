@@ -1,7 +1,8 @@
-"""Faults, one a function: each uses hosts and a topic of its own, so that several go on side by side.
+"""Fault scenarios, one per function, with their own hosts and topics, so that several run concurrently.
 
-All check that every message is received or counted as lost, also the last ones, that none comes twice or out
-of order, and that everything goes on by itself. Each returns what it measured, in seconds or messages.
+Every scenario checks that each message, including the last ones, is received or counted as lost, that
+none is duplicated or out of order, and that the connection recovers by itself. It returns its
+measurements in seconds or messages.
 """
 
 from __future__ import annotations
@@ -15,32 +16,32 @@ from tests.faults.day import WAIT_S, Day, Part, balance, is_hearing, now
 from tests.nep.programs import eventually
 
 _BEFORE_S = 0.5
-"""Traffic before a fault."""
+"""Seconds of traffic before a fault."""
 _SILENT_S = 8.0
-"""The system gives up a silent connection after 15 s."""
+"""Seconds in which a dead connection must be closed; the kernel's own timeout is 15 s."""
 RATE = 500
-"""Messages a second."""
+"""Messages per second."""
 _LARGE = 20_000
-"""Bytes of a message that is large."""
+"""Size of a large message in bytes."""
 Measured = dict[str, float]
 Scenario = Callable[[Day, float], Measured]
 
 
 def _wait(seconds: float) -> None:
-    """Let a fault last."""
+    """Wait while a fault lasts."""
     threading.Event().wait(seconds)
 
 
 def _back_s(subscriber: Part, since: float) -> float:
-    """Wait until it hears again; how long that took since then."""
+    """Wait until the subscriber receives messages again; return the seconds since ``since``."""
     eventually(is_hearing(subscriber), WAIT_S)
     return max(0.0, float(subscriber.ask("look")["back_at"]) - since)
 
 
 def _begin(day: Day, name: str, size: int = 0, **more: Any) -> tuple[Part, Part]:
-    """A publisher and a subscriber on hosts of their own, with traffic between them.
+    """Start a publisher and a subscriber on separate hosts, with traffic between them.
 
-    `size` is that of a message, in bytes at least.
+    `size` is the minimum size of a message in bytes.
     """
     subscriber = day.start(traffic.subscriber, day.hosts.host(f"s-{name}"), name, **more)
     publisher = day.start(traffic.publisher, day.hosts.host(f"p-{name}"), name, rate=RATE, size=size)
@@ -52,7 +53,7 @@ def _begin(day: Day, name: str, size: int = 0, **more: Any) -> tuple[Part, Part]
 
 
 def _close(publisher: Part, subscriber: Part) -> dict[str, Any]:
-    """More traffic, then the publisher closes; all must be told of then."""
+    """Send more messages, close the publisher and return the counts when all messages are accounted for."""
     publisher.ask("go")
     eventually(is_hearing(subscriber), WAIT_S)
     sent = publisher.ask("end")
@@ -60,13 +61,13 @@ def _close(publisher: Part, subscriber: Part) -> dict[str, Any]:
 
 
 def cable_of_subscriber(day: Day, out_s: float) -> Measured:
-    """The subscriber's cable is pulled; then again, and what is sent meanwhile are the last messages."""
+    """Disconnect the subscriber's cable twice; the second time the last messages are sent meanwhile."""
     publisher, subscriber = _begin(day, "cable-s")
     return _cable(day, publisher, subscriber, subscriber, out_s)
 
 
 def cable_of_publisher(day: Day, out_s: float) -> Measured:
-    """The same with the publisher's cable."""
+    """Disconnect the publisher's cable twice; the second time the last messages are sent meanwhile."""
     publisher, subscriber = _begin(day, "cable-p")
     return _cable(day, publisher, subscriber, publisher, out_s)
 
@@ -94,7 +95,7 @@ def _cable(day: Day, publisher: Part, subscriber: Part, cut: Part, out_s: float)
 
 
 def address_of_publisher(day: Day, _out_s: float) -> Measured:
-    """The publisher's host gets another address while it publishes."""
+    """Change the address of the publisher's host while it publishes."""
     publisher, subscriber = _begin(day, "addr-p")
     publisher.host.change_address("10.88.0.200")
     back_s = _back_s(subscriber, now())
@@ -102,7 +103,7 @@ def address_of_publisher(day: Day, _out_s: float) -> Measured:
 
 
 def address_of_subscriber(day: Day, _out_s: float) -> Measured:
-    """The subscriber's host gets another address."""
+    """Change the address of the subscriber's host."""
     publisher, subscriber = _begin(day, "addr-s")
     before = subscriber.host.address
     assert publisher.host.connections_to(before) == 1
@@ -114,7 +115,7 @@ def address_of_subscriber(day: Day, _out_s: float) -> Measured:
 
 
 def address_of_wildcards(day: Day, _out_s: float) -> Measured:
-    """A subscriber with wildcards gets another address, then a publisher that it hears."""
+    """Change the address of a subscriber with wildcards, then that of its publisher."""
     topic = "addr-w/topic"
     subscriber = day.start(traffic.subscriber, day.hosts.host("s-addr-w"), "addr-w/*")
     publisher = day.start(traffic.publisher, day.hosts.host("p-addr-w"), topic, rate=RATE)
@@ -129,7 +130,7 @@ def address_of_wildcards(day: Day, _out_s: float) -> Measured:
 
 
 def subscriber_gone(day: Day, _out_s: float) -> Measured:
-    """A subscriber's host vanishes: the other one misses nothing, and the publisher notices."""
+    """Cut the power of a subscriber's host: the other subscriber loses nothing, and the publisher notices."""
     publisher, subscriber = _begin(day, "gone-s")
     other = day.start(traffic.subscriber, day.hosts.host("s2-gone-s"), "gone-s")
     eventually(lambda: publisher.ask("look")["subscribers"] == 2, WAIT_S)
@@ -143,7 +144,7 @@ def subscriber_gone(day: Day, _out_s: float) -> Measured:
 
 
 def publisher_gone(day: Day, _out_s: float) -> Measured:
-    """A publisher's host vanishes, and another one comes with the same address and the same program."""
+    """Replace a publisher's host by one with the same address and the same program."""
     publisher, subscriber = _begin(day, "gone-p")
     sent = publisher.ask("pause")["sent"]
     balance(sent, subscriber)
@@ -160,7 +161,7 @@ def publisher_gone(day: Day, _out_s: float) -> Measured:
 
 
 def closed_unheard(day: Day, out_s: float) -> Measured:
-    """The subscriber's cable is out while the publisher sends its last messages and closes."""
+    """Send the last messages and close the publisher while the subscriber's cable is disconnected."""
     publisher, subscriber = _begin(day, "closed")
     day.hosts.cable(subscriber.host, is_in=False)
     _wait(_BEFORE_S)
@@ -168,7 +169,7 @@ def closed_unheard(day: Day, out_s: float) -> Measured:
 
 
 def killed_unheard(day: Day, out_s: float) -> Measured:
-    """The subscriber's cable is out when the publisher's computer vanishes; it had told the master."""
+    """Cut the publisher's power while the subscriber is disconnected; the master knows the count."""
     publisher, subscriber = _begin(day, "killed")
     day.hosts.cable(subscriber.host, is_in=False)
     _wait(_BEFORE_S)
@@ -189,12 +190,12 @@ def _unheard(day: Day, sent: int, subscriber: Part, out_s: float) -> Measured:
 
 
 def lossy_1(day: Day, out_s: float) -> Measured:
-    """1 % of all packets is lost at the subscriber's cable, both ways."""
+    """Drop 1 % of all packets at the subscriber's cable in both directions."""
     return _lossy(day, out_s, 0.01)
 
 
 def lossy_10(day: Day, out_s: float) -> Measured:
-    """10 %."""
+    """Drop 10 % of all packets at the subscriber's cable in both directions."""
     return _lossy(day, out_s, 0.1)
 
 
@@ -214,12 +215,12 @@ def _lossy(day: Day, out_s: float, ratio: float) -> Measured:
 
 
 _SLOW_S = 100 / RATE
-"""For each message: 100 times too long."""
+"""Processing time per message in seconds, 100 times too long for the rate."""
 _ROOM = 10
 
 
 def slow_all(day: Day, out_s: float) -> Measured:
-    """A subscriber that is 100 times too slow has room for 10 messages."""
+    """Subscribe with a queue of 10 messages and a processing time 100 times too long."""
     publisher, subscriber = _begin(day, "slow-all", work_s=_SLOW_S, max_messages=_ROOM)
     _wait(out_s)
     sent = publisher.ask("end")["sent"]
@@ -230,7 +231,7 @@ def slow_all(day: Day, out_s: float) -> Measured:
 
 
 def slow_latest(day: Day, out_s: float) -> Measured:
-    """A subscriber that is 100 times too slow wants the newest message only: it is never late."""
+    """Subscribe to the newest message only, with a processing time 100 times too long: no backlog grows."""
     publisher, subscriber = _begin(day, "slow-new", work_s=_SLOW_S, keep="latest")
     _wait(out_s)
     sent = publisher.ask("end")["sent"]
@@ -242,7 +243,7 @@ def slow_latest(day: Day, out_s: float) -> Measured:
 
 
 def held(day: Day, out_s: float) -> Measured:
-    """A subscriber is held by a debugger, while more is sent to it than the system keeps for it."""
+    """Suspend a subscriber while more is sent to it than the kernel buffers."""
     publisher, subscriber = _begin(day, "held", size=_LARGE)
     subscriber.hold(is_held=True)
     _wait(out_s)
@@ -252,12 +253,12 @@ def held(day: Day, out_s: float) -> Measured:
 
 
 def held_for_long(day: Day, _out_s: float) -> Measured:
-    """The same for so long that the connection is given up."""
+    """Suspend a subscriber until its connection times out."""
     return held(day, 25.0)
 
 
 def narrow(day: Day, out_s: float) -> Measured:
-    """A cable is 100 times too slow for what is sent; then it is quick again."""
+    """Limit the bandwidth to a hundredth of what is sent, then remove the limit."""
     publisher, subscriber = _begin(day, "narrow", size=10 * _LARGE)
     day.hosts.narrow(subscriber.host, 10 * _LARGE * RATE * 8 / 1e6 / 100)
     _wait(out_s)
@@ -270,7 +271,7 @@ def narrow(day: Day, out_s: float) -> Measured:
 
 
 def calls(day: Day, out_s: float) -> Measured:
-    """A client's cable is pulled while it calls: each call is answered or raises, none is made twice."""
+    """Disconnect a client that calls: each call gets a reply or raises, and none is executed twice."""
     server = day.start(traffic.server, day.hosts.host("p-calls"), "calls")
     client = day.start(traffic.client, day.hosts.host("s-calls"), "calls")
     client.ask("go")
@@ -294,7 +295,7 @@ def calls(day: Day, out_s: float) -> Measured:
 
 
 def _answered_again_s(client: Part) -> float:
-    """Wait until a call that starts from now on is answered; return after how many seconds it started."""
+    """Wait until a call made from now on gets a reply; return the seconds until that call started."""
     since = now()
     eventually(lambda: client.ask("look")["answered_from"] > since, WAIT_S)
     return float(client.ask("look")["answered_from"]) - since
@@ -318,11 +319,11 @@ SIDE_BY_SIDE = (
 
 
 ALONE = (subscriber_gone, address_of_wildcards, held_for_long, narrow)
-"""What takes long, or many bytes."""
+"""Scenarios that take long or send many bytes."""
 
 
 def master_again(day: Day, out_s: float) -> Measured:
-    """The master is killed, and after a while there is one that knows nothing."""
+    """Kill the master and start a new one without any state."""
     publisher, subscriber = _begin(day, "master")
     day.master.kill()
     _wait(out_s)
@@ -331,7 +332,7 @@ def master_again(day: Day, out_s: float) -> Measured:
 
 
 def master_moved(day: Day, out_s: float) -> Measured:
-    """The master's computer vanishes, and another one has its address and a master that knows nothing."""
+    """Cut the power of the master's host; another host with its address starts a master without any state."""
     publisher, subscriber = _begin(day, "master")
     day.master.host.kill()
     _wait(out_s)
@@ -340,7 +341,7 @@ def master_moved(day: Day, out_s: float) -> Measured:
 
 
 def _with_another_master(day: Day, publisher: Part, subscriber: Part, began: float) -> Measured:
-    """Nothing was lost meanwhile, and who comes now meets who was there before."""
+    """Check that no message was lost and that a new subscriber finds the earlier publisher."""
     late = day.start(traffic.subscriber, day.hosts.host("late"), "master")
     found_s = now() - began
     sent = publisher.ask("pause")["sent"]

@@ -1,6 +1,6 @@
-"""Computers that vanish, cables that are pulled, packets that are lost: no loss that is not counted.
+"""Tests of network faults: vanishing hosts, pulled cables and packet loss cause no uncounted loss.
 
-`docs/faults.md` has the table of what was measured; `--long` measures it.
+`--long` measures the table in `docs/faults.md`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _OUT_S, _OUT_LONG_S = 1.0, 10.0
 
 @pytest.fixture
 def is_long(pytestconfig: pytest.Config) -> bool:
-    """Whether faults last."""
+    """Return whether the tests run with the long faults of `--long`."""
     return bool(pytestconfig.getoption("--long"))
 
 
@@ -34,7 +34,7 @@ def _with_long(is_long: bool) -> None:
 
 @pytest.fixture
 def today() -> Iterator[Day]:
-    """A network with a master that serves it, on a host of its own."""
+    """Network of hosts with a master on a host of its own."""
     try:
         with network() as hosts, day(hosts) as made:
             made.begin_master(hosts.host("m"))
@@ -48,7 +48,7 @@ def _name(scenario: scenarios.Scenario) -> str:
 
 
 def _tell(scenario: scenarios.Scenario, measured: scenarios.Measured) -> None:
-    """For the table, with `-s`; pytest shows it, too, when something fails."""
+    """Print the measured values of a scenario; visible with `-s` or when the test fails."""
     sys.stdout.write(
         f"{_name(scenario)}: {json.dumps({each: round(value, 2) for each, value in measured.items()})}\n"
     )

@@ -1,7 +1,7 @@
-"""The programs on the hosts: a publisher, a subscriber, a server and a client that say what they counted.
+"""Programs that run on the hosts of a fault test: publisher, subscriber, server and client with counters.
 
-Each is started by `code_of` with its options as JSON, says a line when it is ready, and answers each line
-that it is given by one of JSON. It ends with its standard input.
+Each is started with `code_of` and gets its options as JSON. It writes `ready`, then replies to each
+command line on standard input with a line of JSON. It ends when standard input is closed.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ import nep
 from nep.errors import NepError
 
 _BURST = 5
-"""So many messages follow each other at once, so that batches are lost, too."""
+"""Number of messages published without a pause, so that batches are lost, too."""
 Answer = dict[str, Any]
 
 
 def code_of(part: Callable[[], None]) -> str:
-    """The program that is this part."""
+    """Return the Python code that runs one of these programs."""
     return f"from tests.faults import traffic; traffic.{part.__name__}()"
 
 
@@ -35,7 +35,7 @@ def _talk(answers: dict[str, Callable[[], Answer]]) -> None:
 
 
 class _Worker:
-    """A thread that does one thing again and again while it is told to. An error in it is told."""
+    """Thread that repeats a function until it is paused. An exception pauses it and is stored in `error`."""
 
     def __init__(self, turn: Callable[[], None], every_s: float = 0.0) -> None:
         self._turn, self._every_s = turn, every_s
@@ -51,7 +51,7 @@ class _Worker:
         return {}
 
     def pause(self) -> None:
-        """When this returns it rests."""
+        """Pause the thread; return when the current turn has finished."""
         self._goes.clear()
         self._rests.wait()
 
@@ -79,7 +79,10 @@ class _Worker:
 
 
 def publisher() -> None:
-    """Publishes numbers, those after `after`. Commands: go, pause, look, told, end (closes the node)."""
+    """Publish ascending numbers that start after the option `after`.
+
+    Commands: go, pause, look, told (the sequence number that the master knows), end (closes the node).
+    """
     options = json.loads(sys.argv[1])
     node = nep.node(options["node"])
     pub = node.new_pub(options["topic"], latched=options.get("latched", False))
@@ -102,7 +105,7 @@ def publisher() -> None:
         return look()
 
     def told() -> Answer:
-        """How far the master knows that it came."""
+        """Return the newest sequence number of this publisher that the master knows."""
         (known,) = node.graph().topics[options["topic"]].publishers
         return {"sent": known.last_seq}
 
@@ -116,7 +119,7 @@ def publisher() -> None:
 
 
 class _Heard:
-    """What a subscriber's program was given, in which order."""
+    """Counters of received messages: repeated, reordered and skipped ones, and the longest silence."""
 
     def __init__(self) -> None:
         self.read = self.last = self.twice = self.backwards = self.skipped = 0
@@ -140,7 +143,7 @@ class _Heard:
 
 
 def subscriber() -> None:
-    """Reads what is published; needs `work_s` seconds for each message. Commands: look, again, end."""
+    """Receive messages and spend `work_s` seconds on each. Commands: look, again, end."""
     options = json.loads(sys.argv[1])
     node = nep.node(options["node"])
     sub = node.new_sub(
@@ -165,7 +168,7 @@ def subscriber() -> None:
         return {**counted, **told, "error": worker.error}
 
     def again() -> Answer:
-        """Measure the longest silence anew."""
+        """Reset the longest measured silence."""
         heard.silent_s = 0.0
         return {}
 
@@ -181,7 +184,7 @@ def subscriber() -> None:
 
 
 def server() -> None:
-    """Answers each call with its number, and counts which it carried out. Commands: look."""
+    """Reply to each call with its number, and count executed and repeated requests. Commands: look."""
     options = json.loads(sys.argv[1])
     node = nep.node(options["node"])
     done: Counter[str] = Counter()
@@ -195,10 +198,11 @@ def server() -> None:
 
 
 def client() -> None:
-    """Calls repeatedly. Commands: go, pause, look.
+    """Call the service repeatedly. Commands: go, pause, look.
 
-    `answered_from` is when the newest answered call started. The time of its answer would not do: a
-    call can wait for a new connection and be answered, and then no call fails after a change of address.
+    `answered_from` is the start time of the newest call that got a reply. The time of the reply is not
+    suitable: a call can wait for a new connection and succeed, and then no call fails after a change of
+    address.
     """
     options = json.loads(sys.argv[1])
     node = nep.node(options["node"])

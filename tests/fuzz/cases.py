@@ -1,11 +1,11 @@
-"""Bytes that a parser once could not bear, by the target that finds them, each with what became of it."""
+"""Regression inputs that once broke a parser, by fuzz target. A comment describes the effect of each."""
 
 from __future__ import annotations
 
 import json
 
 LONG = b"9" * 5_000
-"""More digits than Python makes a number of."""
+"""Number with more digits than Python converts to an `int`."""
 DEEP = 100_000
 NEIGHBOUR = {"robot": "a", "figure": "f", "theta_deg": 9, "radius": 0.2, "height": 1}
 HUGE = 10**400

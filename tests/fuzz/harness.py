@@ -1,11 +1,11 @@
-"""Targets under atheris: started by tools/fuzz.py, in an environment of its own.
+"""Run fuzz targets with atheris. Started by tools/fuzz.py in a separate environment.
 
     python tests/fuzz/harness.py --list
     python tests/fuzz/harness.py FOLDER TARGET=SECONDS ...
     python tests/fuzz/harness.py --again FOLDER/findings/TARGET-...
 
-Each target is a process of its own, forked from one that has imported everything. A finding does not end it:
-the next one may be behind it. Each place in the sources is told once.
+Each target runs in its own process, forked from one that has imported everything. A finding does not
+stop the target, because it can hide others. Each source location is reported once.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 SLOW_S = 5.0
-"""Of processor time, and counting where the program goes makes all of it slower."""
+"""Limit of processor time in seconds for one input; coverage instrumentation slows all code down."""
 MAX_LENGTH = 8192
 HANG_S = 25
 MEMORY_MB = 3000
 
 
 class Findings:
-    """What was found so far, in a folder."""
+    """Folder with the inputs that failed and their tracebacks."""
 
     def __init__(self, folder: Path, name: str) -> None:
         self._folder, self._name = folder, name
@@ -50,13 +50,13 @@ class Findings:
 
 
 def place_of(error: BaseException) -> tuple[object, ...]:
-    """Where it was raised: two of the same place are one finding."""
+    """Return the key of an exception: its type and two innermost source lines. Equal keys are one finding."""
     frames = traceback.extract_tb(error.__traceback__)
     return (type(error), *((each.filename, each.lineno) for each in frames[-2:]))
 
 
 def fuzz_all(folder: Path, plan: Mapping[str, int]) -> int:
-    """One after the other; 1 when any ended before its time."""
+    """Fuzz the targets one after the other. Return 1 if any process failed or ended early, otherwise 0."""
     import atheris
 
     with atheris.instrument_imports(include=["nep", "app", "json.decoder", "tomllib"]):
@@ -84,7 +84,7 @@ def fuzz_all(folder: Path, plan: Mapping[str, int]) -> int:
 
 
 def fuzz(target: Target, seconds: int, folder: Path) -> None:
-    """Does not return: libFuzzer ends the process."""
+    """Fuzz one target for some seconds. Does not return: libFuzzer ends the process."""
     import atheris
 
     from tests.fuzz.mutation import mutated
@@ -102,7 +102,7 @@ def fuzz(target: Target, seconds: int, folder: Path) -> None:
     )
 
     def mutate(data: bytes, most: int, seed: int) -> bytes:
-        """Half of the time another value; see `tests.fuzz.mutation`."""
+        """Apply a structural mutation (`tests.fuzz.mutation`) to half of the inputs, else libFuzzer's."""
         chance = Random(seed)
         other = mutated(data, chance) if chance.random() < 0.5 else None
         made: bytes = atheris.Mutate(data, most) if other is None else other

@@ -1,6 +1,6 @@
-"""Strange values: what JSON or msgpack says, with something replaced, left out, repeated or put elsewhere.
+"""Structural mutations of JSON and msgpack: values are replaced, removed, repeated or moved.
 
-Bytes that are changed at random mostly are no JSON any more, and never reach what looks at the value.
+Random changes of bytes mostly produce invalid JSON, which never reaches the code behind the decoder.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ DEEP = (60, 400, 2_000)
 
 
 def mutated(data: bytes, chance: Random) -> bytes | None:
-    """Bytes that say another value, one that is nearly that of `data`; None when that is no value."""
+    """Return `data` with its decoded value changed in a few places, or None if `data` can't be decoded."""
     parts = data.split(SEPARATOR)
     at = chance.randrange(len(parts))
     try:
@@ -47,7 +47,7 @@ def _json(value: object) -> bytes:
 
 
 def _changed(value: object, chance: Random) -> object:
-    """The value with one change, somewhere."""
+    """Return a copy of a value with one random change."""
     if isinstance(value, dict) and value and chance.random() < 0.85:
         return _changed_map(value, chance)
     if isinstance(value, list) and value and chance.random() < 0.85:

@@ -1,4 +1,4 @@
-"""Targets: files that a person opens in Studio, and what robots tell it. Without Qt."""
+"""Fuzz targets for files that a person opens in Studio and for messages of robots. They need no Qt."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ if IS_THERE:  # they are no needs of the library's own
         heard.must_give_way(0.0, 0.0, 0.5)
 
     class Still:
-        """A clock that stands."""
+        """Clock that always returns the same time."""
 
         def now(self) -> float:
             return 1.0

@@ -1,4 +1,4 @@
-"""Targets: what a person types after `nep`, and how what came is shown on a terminal."""
+"""Fuzz targets for the arguments of `nep` and for the display of received values on a terminal."""
 
 from __future__ import annotations
 

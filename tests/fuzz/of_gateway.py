@@ -1,4 +1,4 @@
-"""Targets: what programs of the original NEP ask and send, the gateway's own file, and a bridge's."""
+"""Fuzz targets for requests and messages of the original NEP and for the files of gateway and bridge."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def refuse_constant(word: str) -> None:
 
 
 def shield(data: bytes) -> None:
-    """What is written for JavaScript and C# says the same."""
+    """Check that text escaped for JavaScript and C# decodes to the same value."""
     try:
         value = json.loads(data)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""Targets: payloads, pictures, typed messages, and what is made of a payload by nep itself."""
+"""Fuzz targets for payloads, images, typed messages and the functions of nep that process payloads."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def raw_pictures_decoded(data: bytes) -> None:
 
 
 class Colour(Enum):
-    """A choice."""
+    """Enum as a field of `Everything`."""
 
     RED = "red"
     ONE = 1
@@ -149,7 +149,7 @@ class Colour(Enum):
 
 @dataclass
 class Point:
-    """Something inside."""
+    """Nested dataclass as a field of `Everything`."""
 
     x: float
     y: float = 0.0
@@ -157,7 +157,7 @@ class Point:
 
 @dataclass
 class Everything:
-    """One field of each kind."""
+    """Dataclass with one field of each supported kind."""
 
     number: int
     real: float = 1.0

@@ -1,4 +1,7 @@
-"""Targets: ROS, ROS 2, nanomsg and zenoh, and addresses; what needs no network and no ROS."""
+"""Fuzz targets for the ROS, ROS 2, nanomsg and zenoh back ends and for addresses.
+
+They need no network and no ROS.
+"""
 
 from __future__ import annotations
 
@@ -323,7 +326,7 @@ def keys_of_zenoh(data: bytes) -> None:
 
 
 def _is_text(text: str) -> bool:
-    """Whether it has no halves of letters: zenoh never hands them out."""
+    """Return whether a text has no lone surrogates; zenoh never delivers them."""
     try:
         text.encode()
     except UnicodeEncodeError:

@@ -1,4 +1,4 @@
-"""Targets: operations and origins of web pages, and messages in each compression."""
+"""Fuzz targets for operations and origins of web pages and for messages in each compression."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Targets: the native wire, batches, services, and what nodes and master say."""
+"""Fuzz targets for the native wire, batches, services and the messages between nodes and master."""
 
 from __future__ import annotations
 

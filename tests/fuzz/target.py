@@ -1,4 +1,4 @@
-"""What a target of fuzzing is: one parser, what it may raise, and bytes to begin with."""
+"""Fuzz targets: a parser, the exceptions that it may raise, and its seed inputs."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ import orjson
 from nep.messages.packing import unpack
 
 SEPARATOR = b"\xff|\xff"
-"""Between the parts of one message."""
+"""Separator between the parts of a multipart message."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """`run` gives whatever bytes to a parser: it may raise `errors`, and nothing else; it also checks.
+    """Fuzz target that passes bytes to a parser.
 
-    `seeds` makes what the parser takes, by the library's own writers where there are some. `slower` is how
-    many times as long one run may take as others.
+    `run` may raise `errors` and nothing else; it can also check the result. `seeds` returns valid
+    inputs, encoded by the library where possible. `slower` is the factor by which one run may take
+    longer than for other targets.
     """
 
     name: str
@@ -30,7 +31,7 @@ class Target:
     slower: int = 1
 
     def try_bytes(self, data: bytes) -> None:
-        """Raises what the parser must not."""
+        """Run the target; raise every exception that the parser must not raise."""
         try:
             self.run(data)
         except self.errors as error:
@@ -39,7 +40,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Targets:
-    """All of them, by name."""
+    """Registry of fuzz targets by name."""
 
     known: dict[str, Target] = field(default_factory=dict)
 
@@ -50,7 +51,7 @@ class Targets:
         words: tuple[bytes, ...] = (),
         slower: int = 1,
     ) -> Callable[[Callable[[bytes], object]], Callable[[bytes], object]]:
-        """Makes a function a target that is called like it."""
+        """Return a decorator that registers a function as the target with the function's name."""
 
         def made(run: Callable[[bytes], object]) -> Callable[[bytes], object]:
             name = run.__name__
@@ -62,11 +63,11 @@ class Targets:
 
 
 MAX_LETTERS = 20_000
-"""A sentence for a person, however much somebody sent, is no longer than what was sent and this."""
+"""Maximum length of an error message in characters, for inputs of any size."""
 
 
 def check_sentence(error: Exception) -> None:
-    """What is raised says something, and can be shown."""
+    """Check that an error message is not empty, not too long and can be encoded."""
     said = str(error)
     assert said, f"{type(error).__name__} says nothing"
     assert len(said) < MAX_LETTERS, f"a sentence of {len(said)} letters"
@@ -74,22 +75,22 @@ def check_sentence(error: Exception) -> None:
 
 
 def parts_of(data: bytes) -> list[bytes]:
-    """Bytes as the parts of a message."""
+    """Split bytes into the parts of a multipart message."""
     return data.split(SEPARATOR)
 
 
 def joined(parts: Iterable[bytes | memoryview]) -> bytes:
-    """The other way round."""
+    """Join the parts of a multipart message; the inverse of `parts_of`."""
     return SEPARATOR.join(map(bytes, parts))
 
 
 def text_of(data: bytes) -> str:
-    """Bytes as text; those that are none are halves of letters, as in the arguments of a program."""
+    """Decode bytes as UTF-8; invalid bytes become lone surrogates, as in command-line arguments."""
     return data.decode("utf-8", "surrogateescape")
 
 
 def value_of(data: bytes) -> object:
-    """Bytes as a value: what JSON, Python's JSON (NaN, halves of letters, long numbers) or msgpack says."""
+    """Decode bytes as JSON (strict, then Python's dialect) or msgpack, otherwise as text."""
     for read in (orjson.loads, json.loads, unpack):
         try:
             return read(data)
@@ -99,7 +100,7 @@ def value_of(data: bytes) -> object:
 
 
 def map_of(data: bytes) -> Mapping[str, object]:
-    """The same; what is no map is one in a map."""
+    """Decode bytes to a mapping; any other value becomes the only item of one."""
     value = value_of(data)
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return value
@@ -107,5 +108,5 @@ def map_of(data: bytes) -> Mapping[str, object]:
 
 
 def is_same(one: object, other: object) -> bool:
-    """Whether two values are the same, NaN being NaN."""
+    """Return whether two values are equal, with NaN equal to NaN."""
     return repr(one) == repr(other)

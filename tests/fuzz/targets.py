@@ -1,4 +1,4 @@
-"""All targets: every parser of bytes or text that come from outside."""
+"""Fuzz targets of all parsers of external input."""
 
 from __future__ import annotations
 

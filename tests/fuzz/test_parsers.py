@@ -1,6 +1,7 @@
-"""Whatever bytes a parser gets: a value, or the one error that it promises; and soon.
+"""Tests that each parser returns a value or raises a documented error for any bytes, within a time limit.
 
-`python3 dev.py fuzz` looks for more, with the same targets (docs/fuzzing.md); what it found is in `cases`.
+`python3 dev.py fuzz` runs the same targets for longer (docs/fuzzing.md). Its findings are kept in
+`cases`.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ FEW = settings(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much],
 )
 SECONDS = 2.0
-"""Of processor time: no parser may take longer for so few bytes, however busy the computer is."""
+"""Time limit of one parser run in seconds of processor time, which a busy computer does not increase."""
 
 
 def mutated(target: Target) -> st.SearchStrategy[bytes]:
-    """Bytes at random, and what the parser takes with something cut, repeated or replaced."""
+    """Return a strategy for random bytes and for seeds with parts cut, repeated or replaced."""
     seeds = st.sampled_from([*target.seeds(), b""])
     piece = st.binary(max_size=12) | st.sampled_from([*target.words, b"\0", b"\xff" * 4])
 

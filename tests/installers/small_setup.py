@@ -1,4 +1,4 @@
-"""A setup program of a small frozen program, made by NSIS as the real one is."""
+"""Helpers that build a setup program of a small frozen program with NSIS, as the real one is built."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FILES = ("nep.exe", "nep-studio.exe", "_internal/b.dll", "_internal/a.dll", "_in
 
 
 def frozen_program(root: Path, version: str = "1.2.3", program: bytes = b"MZ") -> Context:
-    """What a packer gets, with a frozen program of a few small files; `program` is that of its .exe files."""
+    """Return a packer context with a small frozen program. `program` is the content of its .exe files."""
     made = replace(Context("windows"), root=root, version=version, epoch=1_750_000_001)
     for name in FILES:
         path = made.frozen / name
@@ -27,7 +27,7 @@ def frozen_program(root: Path, version: str = "1.2.3", program: bytes = b"MZ") -
 
 
 def setup_of(context: Context) -> Path:
-    """Its setup program."""
+    """Build the setup program of a context and return its path."""
     icon, picture = context.root / "small.ico", context.root / "small.bmp"
     icon.write_bytes(ico({16: _file(".png")}))
     picture.write_bytes(_file(".bmp"))

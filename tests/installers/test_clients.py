@@ -1,4 +1,4 @@
-"""Packages of the client libraries: nep-js can be installed from its file; missing tools skip a package."""
+"""Tests of the client libraries' packages: nep-js installs from its file; missing tools skip a package."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ NUSPEC = """<?xml version="1.0" encoding="utf-8"?>
 
 
 def write_nuget(path: Path, nuspec: str = NUSPEC, *, leaves_out: str = "") -> None:
-    """Write a package with the files that `dotnet pack` puts into one."""
+    """Write a NuGet package with the files that `dotnet pack` produces."""
     files = ("README.md", "lib/netstandard2.0/Nep.dll", "lib/netstandard2.0/Nep.xml", "_rels/.rels")
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("Nep.nuspec", nuspec)

@@ -1,4 +1,4 @@
-"""What goes into a package, by the names that files have on each system."""
+"""Tests of the selection of files for a package, with the file names of each system."""
 
 from __future__ import annotations
 

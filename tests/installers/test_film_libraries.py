@@ -1,4 +1,4 @@
-"""OpenCV in a package still reads and writes pictures, and has no film library in it."""
+"""Test that a packaged OpenCV reads and writes images and contains no video library."""
 
 from __future__ import annotations
 

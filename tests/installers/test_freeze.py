@@ -1,4 +1,4 @@
-"""What lies beside the frozen program."""
+"""Tests of the files that are stored next to a frozen program."""
 
 from __future__ import annotations
 

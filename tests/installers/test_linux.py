@@ -1,4 +1,4 @@
-"""The Linux packages of a small program that stands for the frozen one, packed by the real tools."""
+"""Tests of the Linux packages, built by the real tools from a small fake of the frozen program."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture
 def context(tmp_path: Path) -> Context:
-    """With a frozen program that is a script, and painted icons."""
+    """Packer context with shell scripts as the frozen program and generated icons."""
     made = replace(Context("linux"), root=tmp_path, epoch=1_700_000_000)
     made.dist.mkdir()
     inside = made.frozen / "_internal"
@@ -93,7 +93,7 @@ def test_checksum_file_is_accepted_by_sha256sum(context: Context) -> None:
 
 @pytest.fixture
 def unpacked(context: Context, tmp_path: Path) -> Path:
-    """The archive in a folder whose name is hard to quote."""
+    """Archive extracted to a folder whose name is hard to quote."""
     home = tmp_path / "Ana María 太郎 $(x) %u"
     home.mkdir()
     with tarfile.open(packer.archive(context)) as archive:
@@ -139,7 +139,7 @@ def test_minimum_glibc_version_is_determined(context: Context) -> None:
 
 
 def library(folder: Path, name: str, *needs: str) -> Path:
-    """A library that is linked with others, of which only the names are there."""
+    """Build a library that is linked with others, for which stubs are built."""
     made = folder / name
     made.parent.mkdir(parents=True, exist_ok=True)
     stubs = folder.parent / "stubs"

@@ -1,4 +1,4 @@
-"""What is given to NSIS and PyInstaller for Windows, and the zip."""
+"""Tests of the inputs of NSIS and PyInstaller for Windows, and of the zip file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LATER = 1_800_000_000
 
 @pytest.fixture
 def context(tmp_path: Path) -> Context:
-    """With a frozen program of a few small files."""
+    """Packer context with a frozen program of a few small files."""
     return frozen_program(tmp_path)
 
 
@@ -72,7 +72,7 @@ def test_version_is_padded_to_four_numbers(version: str, numbers: tuple[int, ...
 
 @dataclass
 class Written:
-    """One thing of a version file, as PyInstaller would make it."""
+    """Element of a version resource, as PyInstaller would construct it."""
 
     args: tuple[object, ...]
     named: dict[str, object]

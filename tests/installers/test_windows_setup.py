@@ -1,4 +1,4 @@
-"""The setup program, run under Wine as one user would: installing, updating, bad days, removing."""
+"""Tests of the setup program under Wine: installation, update, failures and removal."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ LONG_PATH = ";".join(rf"C:\\Some folder\\{number}" for number in range(200))
 
 @dataclass(frozen=True)
 class Windows:
-    """A Windows of Wine's, with the setup of two versions."""
+    """Windows of a Wine prefix, with the setup programs of two versions."""
 
     prefix: Path
     setups: dict[str, Path] = field(default_factory=dict)
 
     @property
     def environ(self) -> dict[str, str]:
-        """For programs of Windows."""
+        """Environment variables for programs that run under Wine."""
         return {
             **{name: text for name, text in os.environ.items() if name != "DISPLAY"},
             "WINEPREFIX": str(self.prefix),
@@ -57,17 +57,17 @@ class Windows:
 
     @property
     def local(self) -> Path:
-        """The user's folder of programs and of what they keep."""
+        """Folder of the user's local application data."""
         (user,) = [each for each in (self.prefix / "drive_c/users").iterdir() if each.name != "Public"]
         return user / "AppData" / "Local"
 
     @property
     def folder(self) -> Path:
-        """Where Studio is installed."""
+        """Folder in which Studio is installed."""
         return self.local / "Programs" / "NEP Studio"
 
     def run(self, *command: str | Path) -> tuple[int, str]:
-        """The exit code of a program of Windows and what it says."""
+        """Run a Windows program and return its exit code and output."""
         done = subprocess.run(
             ["wine", *map(str, command)],
             env=self.environ, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, check=False,
@@ -76,7 +76,7 @@ class Windows:
 
     @contextlib.contextmanager
     def running(self, *command: Path) -> Iterator[None]:
-        """A program that says when it has started, and ends with the block."""
+        """Run a program for the duration of a block; it reports its start and is stopped at the end."""
         words = ["wine", *map(str, command)]
         started = subprocess.Popen(words, env=self.environ, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         assert started.stdout is not None
@@ -86,25 +86,25 @@ class Windows:
         subprocess.run(["wineserver", "--wait"], env=self.environ, check=True)
 
     def uninstall(self) -> None:
-        """Remove Studio silently; back when all of it has ended."""
+        """Remove Studio silently and wait until all processes have ended."""
         self.run(self.folder / "uninstall.exe", "/S")
         subprocess.run(["wineserver", "--wait"], env=self.environ, check=True)
 
     def registry(self, key: str, name: str | None = None) -> str:
-        """A value of the registry, or nothing."""
+        """Return a value of the registry, or an empty text if it doesn't exist."""
         which = ["/ve"] if name is None else ["/v", name]
         _code, said = self.run("reg", "query", key, *which)
         lines = [line.split("    ", 3) for line in said.splitlines() if "    REG_" in line]
         return lines[0][3].strip() if lines and len(lines[0]) > 3 else ""
 
     def path(self) -> str:
-        """The user's PATH."""
+        """PATH variable of the user."""
         return self.registry(r"HKCU\Environment", "Path")
 
 
 @pytest.fixture(scope="module")
 def computer(tmp_path_factory: pytest.TempPathFactory) -> Windows:
-    """With two versions of the setup; made once, as it takes long."""
+    """Windows with two versions of the setup. Created once for all tests, because it takes long."""
     folder = tmp_path_factory.mktemp("windows")
     (folder / "program.c").write_text(PROGRAM, "utf-8")
     program = folder / "program.exe"
@@ -119,7 +119,7 @@ def computer(tmp_path_factory: pytest.TempPathFactory) -> Windows:
 
 @pytest.fixture
 def windows(computer: Windows) -> Iterator[Windows]:
-    """With version 1.2.3 installed, and removed afterwards."""
+    """Windows with version 1.2.3 of Studio installed; it is removed after the test."""
     assert computer.run(computer.setups["1.2.3"], "/S") == (0, "")
     yield computer
     if (computer.folder / "uninstall.exe").exists():

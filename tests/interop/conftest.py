@@ -1,4 +1,7 @@
-"""The published packages of the original NEP as test peers, and the fixed ports for one run at a time."""
+"""Fixtures that run published packages of the original NEP as peers.
+
+The original NEP has fixed ports, so only one test run at a time can use them.
+"""
 
 from __future__ import annotations
 
@@ -28,16 +31,19 @@ PYTHON_PEERS = ("0.5.3.5", "0.5.4.5", "0.5.4.6", "0.5.4.7", "0.5.4.8")
 JAVASCRIPT_PEER = "nep-js"
 ROSLIB_PEER = "roslib"
 JAVASCRIPT = {JAVASCRIPT_PEER: "javascript", ROSLIB_PEER: "roslib"}
-"""Peers from npm, each with the folder that pins it."""
+"""Peers from npm, each with the folder of its lock file."""
 SHARED = "shared"
-"""The environment of the packages that all Python peers need."""
+"""Name of the environment with the packages that all Python peers need."""
 MARK = "\x1e"
 LONG_S = 20.0
 FIRST_S = 600.0
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The first test of a peer installs it, and may wait for another run's ports."""
+    """Raise the time limit.
+
+    The first test of a peer installs it and may wait for the ports of another test run.
+    """
     here = Path(__file__).parent
     for item in items:
         if here in item.path.parents and item.get_closest_marker("timeout") is None:
@@ -45,7 +51,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 class Program:
-    """A process that takes lines of JSON and says lines of JSON, in between whatever it likes to print."""
+    """Process that reads and writes lines of JSON; other lines that it prints are kept as text."""
 
     def __init__(self, command: Sequence[str], **environment: str) -> None:
         self._said: list[object] = []
@@ -74,23 +80,23 @@ class Program:
                 self._news.notify_all()
 
     def tell(self, value: object) -> None:
-        """Hand one value to the program."""
+        """Send a value to the program."""
         self.process.stdin.write(json.dumps(value) + "\n")
         self.process.stdin.flush()
 
     @property
     def got(self) -> list[object]:
-        """Everything that it received so far."""
+        """Values that the program has received so far."""
         with self._news:
             return [said["got"] for said in self._said if isinstance(said, dict)]
 
     @property
     def printed(self) -> str:
-        """What else it printed."""
+        """Output of the program that is not part of the protocol."""
         return "".join(self._printed)
 
     def wait(self, done: Callable[[], bool], what: str, timeout_s: float = LONG_S) -> None:
-        """Wait until something is true of what it said."""
+        """Wait until a condition on the program's output holds; fail after the timeout."""
         with self._news:
             if not self._news.wait_for(done, timeout_s):
                 raise AssertionError(
@@ -98,22 +104,22 @@ class Program:
                 )
 
     def hears(self, value: object, timeout_s: float = LONG_S) -> bool:
-        """Whether it received this value, within the time."""
+        """Return whether the program receives this value within the timeout."""
         with self._news:
             return self._news.wait_for(lambda: {"got": value} in self._said, timeout_s)
 
     def settle(self, timeout_s: float) -> None:
-        """Give others a moment: what they received can't be waited for here."""
+        """Wait some seconds for effects in other programs, which can't be observed here."""
         with self._news:
             self._news.wait_for(lambda: self.process.poll() is not None, timeout_s)
 
     def wait_ready(self) -> Program:
-        """Wait until it has its sockets."""
+        """Wait until the program has opened its sockets."""
         self.wait(lambda: "ready" in self._said, f"{self.process.args} being ready")
         return self
 
     def kill(self) -> None:
-        """End it as `kill -9` does, and give everything back."""
+        """Kill the process with SIGKILL and release its resources."""
         self.process.kill()
         self.process.wait(LONG_S)
         self._reader.join(LONG_S)
@@ -123,13 +129,13 @@ class Program:
 
 
 def _environment(changes: Mapping[str, str]) -> dict[str, str]:
-    """This process's environment without what would lead a peer to our own `nep` instead of its own."""
+    """Return this process's environment without `PYTHONPATH`, so that a peer imports its own `nep`."""
     kept = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     return {**kept, "PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8", **changes}
 
 
 class Peers:
-    """Starts programs of the original NEP. A peer that cannot be had skips the test that asks for it."""
+    """Starter of programs of the original NEP. Skips the test when a peer can't be installed."""
 
     def __init__(self) -> None:
         self._running: list[Program] = []
@@ -145,7 +151,7 @@ class Peers:
         mode: str = "many2many",
         name: str = "",
     ) -> Program:
-        """A program of `version` (one of `PYTHON_PEERS`, "nep-js" or "native") with its own node."""
+        """Start a program of `version` (one of `PYTHON_PEERS`, `nep-js` or `native`) with its own node."""
         arguments = [role, topic, msg_type, mode, name or f"{role}_{version.replace('.', '')}"]
         if version == "nep-js":
             return self.run_javascript(version, "javascript_peer.js", arguments)
@@ -155,21 +161,21 @@ class Peers:
         return self.run([str(_python_of(folder)), str(SCRIPTS / "python_peer.py"), *arguments])
 
     def run_javascript(self, peer: str, script: str, arguments: Sequence[str]) -> Program:
-        """A script that finds what is installed for this peer."""
+        """Start a script in the folder of an npm peer, where it finds the installed packages."""
         copy = self.folder(peer) / script
         shutil.copyfile(SCRIPTS / script, copy)
         return self.run(["node", str(copy), *arguments])
 
     def folder(self, peer: str) -> Path:
-        """Where a peer from npm is installed."""
+        """Return the folder in which an npm peer is installed."""
         return self._have(peer, _install_javascript)
 
     def run_native(self, arguments: Sequence[str]) -> Program:
-        """A program on our own `nep`."""
+        """Start a Python program with the `nep` of this repository."""
         return self.run([sys.executable, *arguments], PYTHONPATH=str(REPOSITORY))
 
     def run(self, command: Sequence[str], **environment: str) -> Program:
-        """Any program that speaks the same lines."""
+        """Start any program that uses the same protocol of JSON lines."""
         self._running.append(Program(command, **environment))
         return self._running[-1]
 
@@ -182,7 +188,7 @@ class Peers:
         return folder
 
     def close(self) -> None:
-        """End all of them."""
+        """Kill all programs."""
         for program in self._running:
             program.kill()
         self._running.clear()
@@ -193,7 +199,7 @@ def _python_of(folder: Path) -> Path:
 
 
 def _install_python(version: str, folder: Path) -> str:
-    """The version alone, with what all share seen from its environment: that is large, and the same."""
+    """Install one version in its own environment, which also sees the shared large packages."""
     missing = "" if _is_complete(SHARED) else _make_python(SHARED, CACHE / SHARED)
     return missing or _make_python(version, folder, sees=CACHE / SHARED)
 
@@ -213,7 +219,7 @@ def _make_python(version: str, folder: Path, sees: Path | None = None) -> str:
 
 
 def _packages_in(folder: Path) -> Path:
-    """Where an environment has its packages."""
+    """Return the site-packages folder of an environment."""
     scheme = {"base": str(folder), "platbase": str(folder)}
     layout = "venv" if "venv" in sysconfig.get_scheme_names() else sysconfig.get_default_scheme()
     return Path(sysconfig.get_path("purelib", layout, scheme))
@@ -235,13 +241,13 @@ def _install_javascript(version: str, folder: Path) -> str:
 
 
 def _is_complete(version: str) -> bool:
-    """Whether its environment is there, and made of what is asked for now."""
+    """Return whether the environment of a peer exists and matches its current pins."""
     done = CACHE / version / "complete"
     return done.is_file() and done.read_text("utf-8") == _packages(version)
 
 
 def _pins(version: str) -> Path:
-    """What is installed for a peer, with hashes."""
+    """Return the file with the pinned packages and hashes of a peer."""
     if version in JAVASCRIPT:
         return SCRIPTS / JAVASCRIPT[version] / "package-lock.json"
     if version == SHARED:
@@ -250,7 +256,7 @@ def _pins(version: str) -> Path:
 
 
 def _packages(version: str) -> str:
-    """What a peer's environment is made of: when that changes it is made anew."""
+    """Return the pins of a peer's environment; the environment is rebuilt when they change."""
     common = SCRIPTS / "python.txt"
     return _pins(version).read_text("utf-8") + common.read_text("utf-8")
 
@@ -263,7 +269,7 @@ def _run_all(
     is_complete: bool = False,
     where: Path | None = None,
 ) -> str:
-    """Run commands that install a peer, the last ones too; the reason why it is not there, or nothing."""
+    """Run the commands that install a peer. Return the reason for a failure, or an empty text."""
     what = "what the test peers need" if version == SHARED else f"the test peer nep {version}"
     if version in JAVASCRIPT:
         what = f"the test peer {version}"
@@ -292,7 +298,7 @@ def _run_all(
 
 @pytest.fixture(scope="session")
 def fixed_ports() -> Iterator[None]:
-    """The originals' ports, free and ours while the tests run."""
+    """Fixed ports of the original NEP, locked for this test run; fails if another program uses one."""
     with one_run_at_a_time():
         for port in FIXED_PORTS:
             with socket.socket() as probe:
@@ -306,7 +312,7 @@ def fixed_ports() -> Iterator[None]:
 
 @pytest.fixture
 def peers(fixed_ports: None) -> Iterator[Peers]:
-    """Programs of the original NEP, ended after the test."""
+    """Programs of the original NEP, killed after the test."""
     started = Peers()
     yield started
     started.close()
@@ -314,7 +320,7 @@ def peers(fixed_ports: None) -> Iterator[Peers]:
 
 @pytest.fixture
 def nep_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A master's address of its own on this computer, and a place of its own for what it keeps."""
+    """Separate master address and state folder for one test."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
@@ -325,18 +331,18 @@ def nep_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 @pytest.fixture
 def master(peers: Peers, nep_home: str) -> Program:
-    """`nep master` with its gateway, as a process of its own."""
+    """Process of `nep master` with its gateway."""
     return start_master(peers, nep_home)
 
 
 @pytest.fixture
 def start_again(peers: Peers, nep_home: str) -> Callable[[], Program]:
-    """Starts the master again after it was killed."""
+    """Function that restarts the master after it was killed."""
     return lambda: start_master(peers, nep_home)
 
 
 def start_master(peers: Peers, address: str) -> Program:
-    """Start `nep master` and wait until it answers."""
+    """Start `nep master` and wait until it replies and has bound the fixed ports."""
     program = peers.run_native(["-m", "nep", "master"])
     if not is_running(address, LONG_S):
         raise AssertionError(f"the master does not answer\n{program.printed}")

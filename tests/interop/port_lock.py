@@ -1,4 +1,4 @@
-"""The originals' fixed ports exist once on a computer: one test run at a time has them."""
+"""Lock for the fixed ports of the original NEP, so that only one test run per computer uses them."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ import pytest
 
 _MAX_WAIT_S = 900.0
 _held: list[IO[bytes]] = []
-"""The lock's file, once for each who holds it in this process: a second lock would wait for the first."""
+"""Open lock file, once per holder in this process; a second lock would wait for the first."""
 
 
 @contextlib.contextmanager
 def one_run_at_a_time() -> Iterator[None]:
-    """Hold a lock file; whoever asks again in the same run has it, too."""
+    """Hold the lock during a block. Reentrant within one process."""
     stream = _held[0] if _held else (Path(tempfile.gettempdir()) / "nep-interop.lock").open("a+b")
     if not _held:
         _wait_for(stream)

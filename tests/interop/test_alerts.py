@@ -1,4 +1,4 @@
-"""The gateway's alerts in the graph."""
+"""Tests of the gateway's alerts in the graph."""
 
 from __future__ import annotations
 

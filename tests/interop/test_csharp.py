@@ -1,8 +1,8 @@
-"""The C# client on the native wire and originals, through the gateway of `nep master`.
+"""Tests of the C# client with programs of the original NEP through the gateway of `nep master`.
 
-The originals are nep-js 0.1.1, and programs with `Nep.dll` 0.0.0.5, which are played by sockets.
-The three languages among themselves are in tests/clients/test_directions.py.
-Python with nep-js 0.1.1 is in test_matrix.py, nep-js 0.2 with it in test_javascript.py.
+The programs of the original NEP are nep-js 0.1.1 and sockets that act as programs with `Nep.dll`
+0.0.0.5. Related tests: the three languages with each other in tests/clients/test_directions.py; Python
+with nep-js 0.1.1 in test_matrix.py; nep-js 0.2 with nep-js 0.1.1 in test_javascript.py.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ COUNT = 20
 
 @pytest.fixture
 def start(peers, master):
-    """Starts the C# program of the nine directions."""
+    """Function that starts the C# program of tests/clients/test_directions.py."""
     source = mono_programs.CSHARP / "tests" / "peer" / "Directions.cs"
     program = mono_programs.program("Directions.exe", source)
 
@@ -72,7 +72,7 @@ def original() -> Iterator[Original]:
 
 
 def read_by_nep_dll(frame: bytes) -> object:
-    """Return the value that `Nep.dll` gives to its program: the piece after the first of all spaces."""
+    """Return the value that `Nep.dll` delivers: the text between the first and the second space."""
     return json.loads(frame.decode().split(" ")[1])
 
 

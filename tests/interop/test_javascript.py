@@ -1,4 +1,4 @@
-"""nep-js and its original 0.1.1 together: the same program runs with both packages."""
+"""Tests of nep-js with its original version 0.1.1: the same program runs with both packages."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ say("ready");
 
 @pytest.fixture
 def start(peers, master, tmp_path):
-    """Starts a program with the nep-js of this repository."""
+    """Function that starts a program with the nep-js of this repository."""
     build_package()
 
     def run(script: str, *arguments: str):

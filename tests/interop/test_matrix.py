@@ -1,4 +1,4 @@
-"""Every direction between native programs and the published packages of the original NEP."""
+"""Tests of every direction between native programs and the published packages of the original NEP."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def text(kind, number):
 
 @pytest.fixture(autouse=True)
 def master_is_calm(peers, master):
-    """The master logs nothing while it serves."""
+    """Check after each test that the master has printed no traceback."""
     yield
     assert "Traceback" not in master.printed, master.printed
 
 
 class Room:
-    """Programs of several kinds on one topic, each once as publisher and once as subscriber."""
+    """One publisher and one subscriber of each kind of program on the same topic."""
 
     def __init__(self, peers, kinds, topic, msg_type, master):
         self.master = master
@@ -42,7 +42,10 @@ class Room:
             program.wait_ready()
 
     def warm_up(self, make):
-        """Publish until the slow joiners of the originals have joined: everybody hears everybody."""
+        """Publish until every subscriber receives from every publisher.
+
+        Subscribers of the original NEP join late.
+        """
         for kind, publisher in self.publishers.items():
             for number in range(-1, -50, -1):
                 publisher.tell(make(kind, number))
@@ -56,7 +59,10 @@ class Room:
                 pytest.fail(f"{kind} is not heard by everybody: {heard} {printed}")
 
     def publish(self, make, first=0, count=MESSAGES):
-        """All publish in turn, each message when the one before was heard: originals keep the newest only."""
+        """Publish from all programs in turn, and wait for each message.
+
+        The original NEP keeps only the newest message.
+        """
         for number in range(first, first + count):
             for kind, publisher in self.publishers.items():
                 publisher.tell(make(kind, number))
@@ -64,7 +70,7 @@ class Room:
                     assert subscriber.hears(make(kind, number)), f"{to} misses {number} from {kind}"
 
     def assert_each_once(self, make, first=0, count=MESSAGES):
-        """Every subscriber got every message of every publisher exactly once."""
+        """Check that every subscriber received every message of every publisher exactly once."""
         for kind in self.publishers:
             for to, subscriber in self.subscribers.items():
                 got = subscriber.got

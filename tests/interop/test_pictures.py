@@ -1,4 +1,4 @@
-"""Pictures between native programs and the published packages, in both of the originals' forms."""
+"""Tests of images between native programs and published packages, in both formats of the original NEP."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ PEERS = (
 )
 SHAPE = [48, 64, 3]
 NEAR = 3
-"""JPEG keeps an even colour to about this."""
+"""Tolerance for the value of an even colour after JPEG compression."""
 
 
 def picture(publisher):
-    """A colour that nobody else sends: JPEG may change it a little."""
+    """Return the colour of a publisher, distinct from others even after JPEG compression."""
     return [40 * publisher + 20, 220 - 40 * publisher, 128]
 
 

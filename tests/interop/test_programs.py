@@ -1,4 +1,4 @@
-"""Published packages and native programs together: lists, restarts, odd payloads, other modes."""
+"""Tests of native programs with published packages: listings, restarts, unusual payloads and other modes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def node(master):
 
 @pytest.fixture
 def graph_shows(node):
-    """Waits until the graph is as wanted; the view that was."""
+    """Return a function that waits until the graph meets a condition and returns the graph."""
 
     def wait(wanted, timeout_s=30.0):
         watch = nep.node("watch")
@@ -37,7 +37,7 @@ def graph_shows(node):
 
 
 def tell_until_heard(publisher, value, *subscribers):
-    """Publish until slow joiners have joined."""
+    """Publish a value repeatedly until all subscribers receive it, because they join late."""
     for _ in range(60):
         publisher.tell(value)
         if all(each.hears(value, 0.3) for each in subscribers):

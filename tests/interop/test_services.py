@@ -1,4 +1,4 @@
-"""Services with the original NEP's `client` and `server`, without a master."""
+"""Tests of services with the original NEP's `client` and `server`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ VERSIONS = ("0.5.3.5", "0.5.4.5", "0.5.4.8")
 
 @pytest.fixture
 def originals() -> Iterator[Peers]:
-    """Programs of the original NEP, which need none of its fixed ports here."""
+    """Programs of the original NEP that don't use its fixed ports."""
     started = Peers()
     yield started
     started.close()

@@ -1,4 +1,4 @@
-"""Programs of the original NEP work on while hostile ones flood every port that the gateway has."""
+"""Test that programs of the original NEP keep working while every port of the gateway is flooded."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from tests.interop.conftest import FIXED_PORTS
 pytestmark = [pytest.mark.ports, pytest.mark.interop, pytest.mark.timeout(600)]
 
 ROUNDS = 60
-"""So many messages at least each hears of the other; more until every attack has been made once."""
+"""Minimum number of messages in each direction; more follow until every attack has run once."""
 PAUSE_S = 0.02
-"""Between two attacks of one kind: a hundred a second; without it they starve the tests beside them."""
+"""Pause in seconds between two attacks of one kind; without it they starve tests that run in parallel."""
 GARBAGE = (b"GET / HTTP/1.1\r\n\r\n", b"\xff" * 4000, b"\xff\x00\x00")
 
 
 class Flood:
-    """Threads that attack until it is closed; each round of each attack is counted."""
+    """Threads that repeat attacks until closed, with a count of the rounds of each attack."""
 
     def __init__(self) -> None:
         self.rounds: dict[str, int] = {}
@@ -56,7 +56,7 @@ def flood() -> Iterator[Flood]:
 
 
 def garbage_into(port: int) -> Callable[[], None]:
-    """Bytes that are no ZeroMQ, and connections that end in the middle of a greeting."""
+    """Return an attack that sends bytes other than ZeroMQ's protocol and closes within the greeting."""
 
     def attack() -> None:
         try:
@@ -69,7 +69,7 @@ def garbage_into(port: int) -> Callable[[], None]:
 
 
 def requests_to(port: int, context: zmq.Context[zmq.Socket[bytes]]) -> Callable[[], None]:
-    """Requests for topics that nobody needs, in the name of others, and what is no request at all."""
+    """Return an attack that sends invalid requests, and requests in other nodes' names for unused topics."""
 
     def attack() -> None:
         asked = {
@@ -91,7 +91,7 @@ def requests_to(port: int, context: zmq.Context[zmq.Socket[bytes]]) -> Callable[
 
 
 def frames_into(port: int, context: zmq.Context[zmq.Socket[bytes]]) -> Callable[[], None]:
-    """Frames that are none, of other topics, and large ones, into the port of the topic."""
+    """Return an attack that publishes malformed, large and foreign frames to the topic's port."""
 
     def attack() -> None:
         with context.socket(zmq.PUB) as publishing:
@@ -105,7 +105,7 @@ def frames_into(port: int, context: zmq.Context[zmq.Socket[bytes]]) -> Callable[
 
 
 def deaf_subscriber_of(port: int, context: zmq.Context[zmq.Socket[bytes]]) -> Callable[[], None]:
-    """One that subscribes everything, reads nothing and goes."""
+    """Return an attack that subscribes to everything, reads nothing and disconnects."""
 
     def attack() -> None:
         with context.socket(zmq.SUB) as subscribing:

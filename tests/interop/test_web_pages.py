@@ -1,4 +1,4 @@
-"""Unmodified roslib, roslibpy and Foxglove's own client library with `nep web`."""
+"""Tests of unmodified roslib, roslibpy and Foxglove's client library with `nep web`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def server(master: Master) -> Iterator[WebServer]:
 
 @pytest.fixture
 def clients() -> Iterator[Peers]:
-    """Clients of rosbridge; they don't use the fixed ports of the original NEP."""
+    """Clients of rosbridge, which don't use the fixed ports of the original NEP."""
     started = Peers()
     yield started
     started.close()

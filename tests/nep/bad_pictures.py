@@ -1,4 +1,4 @@
-"""Pictures that a hostile program makes: a few bytes that take gigabytes or minutes when they are decoded."""
+"""Images of a hostile program: a few bytes that need gigabytes of memory or minutes to decode."""
 
 from __future__ import annotations
 
@@ -10,60 +10,60 @@ SIDE = 48_000
 
 
 def chunk(kind: bytes, data: bytes) -> bytes:
-    """A chunk of a PNG."""
+    """Return a PNG chunk."""
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
 def head(width: int, height: int, depth: int = 8, colour: int = 2) -> bytes:
-    """The head of a PNG."""
+    """Return the header chunk of a PNG."""
     return chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, depth, colour, 0, 0, 0))
 
 
 def png(
     width: int, height: int, rows: bytes, *more: bytes, depth: int = 8, colour: int = 2, first: bytes = b""
 ) -> bytes:
-    """A PNG of these rows, with more chunks before its pixels."""
+    """Return a PNG of these rows, with additional chunks before its pixels."""
     pixels = chunk(b"IDAT", zlib.compress(rows))
     return PNG + first + head(width, height, depth, colour) + b"".join(more) + pixels + chunk(b"IEND", b"")
 
 
 def segment(marker: int, data: bytes) -> bytes:
-    """A segment of a JPEG."""
+    """Return a JPEG segment."""
     return bytes([0xFF, marker]) + struct.pack(">H", len(data) + 2) + data
 
 
 def frame(width: int, height: int, marker: int = 0xC0, *, bits: int = 8, colours: int = 3) -> bytes:
-    """The head of a JPEG's pixels."""
+    """Return the frame header of a JPEG."""
     parts = b"".join(bytes([each + 1, 0x11, 0]) for each in range(colours))
     return segment(marker, struct.pack(">BHHB", bits, height, width, colours) + parts)
 
 
 def scan(colours: int = 3) -> bytes:
-    """The head of a scan and a few bits."""
+    """Return the header of a JPEG scan and a few bits of data."""
     parts = b"".join(bytes([each + 1, 0]) for each in range(colours))
     return segment(0xDA, bytes([colours]) + parts + b"\0\x3f\0") + b"\x12\x34"
 
 
 def jpeg(*parts: bytes) -> bytes:
-    """A JPEG of these parts."""
+    """Return a JPEG of these parts."""
     return b"\xff\xd8" + b"".join(parts) + b"\xff\xd9"
 
 
 def exif(orientation: int, order: str = ">") -> bytes:
-    """EXIF data that tell an orientation."""
+    """Return EXIF data with an orientation."""
     mark = b"MM\0*" if order == ">" else b"II*\0"
     entry = struct.pack(f"{order}HHIHH", 0x0112, 3, 1, orientation, 0)
     return b"Exif\0\0" + mark + struct.pack(f"{order}IH", 8, 1) + entry + b"\0\0\0\0"
 
 
 def bmp(side: int) -> bytes:
-    """A BMP of 1 kB that tells of so many pixels a side."""
+    """Return a BMP of 1 kB whose header declares an image of `side` x `side` pixels."""
     info = struct.pack("<IiiHHIIiiII", 40, side, side, 1, 24, 0, 0, 0, 0, 0, 0)
     return b"BM" + struct.pack("<IHHI", 1024, 0, 0, 54) + info + bytes(970)
 
 
 def gif(side: int) -> bytes:
-    """A GIF of 35 bytes."""
+    """Return a GIF of 35 bytes whose header declares an image of `side` x `side` pixels."""
     size = struct.pack("<HH", side, side)
     return b"GIF89a" + size + b"\0\0\0," + b"\0\0\0\0" + size + b"\0\x02\x02L\x01\0;" + b"\0" * 5
 
@@ -112,4 +112,4 @@ BOMBS = {
     "nothing": b"",
     "a word": b"no picture",
 }
-"""By name. None of them may reach a decoder."""
+"""Decompression bombs by name; none may reach a decoder."""

@@ -1,4 +1,4 @@
-"""What the tests of the library share."""
+"""Shared fixtures of the library's tests."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from tests.nep.meeting import BACKENDS, Make, meeting, place_for
 
 @pytest.fixture(params=BACKENDS)
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that can meet, over each back end."""
+    """Function that creates nodes in the same network, for each back end."""
     with meeting(request.param, place_for(request.param, master.address)) as new:
         yield new
 
 
 @pytest.fixture
 def frequent_switching() -> Iterator[None]:
-    """Let threads take turns a hundred times as often as usual, so that races show."""
+    """Switch threads a hundred times as often as usual, so that races occur."""
     usual = sys.getswitchinterval()
     sys.setswitchinterval(usual / 100)
     yield

@@ -1,4 +1,4 @@
-"""Nodes of one back end that can meet, and nobody else: what the contracts of back ends are tried with."""
+"""Isolated groups of nodes over each back end, for the contract tests of back ends."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from itertools import count
 import nep
 
 BACKENDS = ("memory", "zeromq", "nanomsg", "zenoh")
-"""Those that every computer has on which the tests run."""
+"""Back ends that are available on every computer that runs the tests."""
 Make = Callable[[str], nep.Node]
 _numbers = count()
 
 
 def place_for(backend: str, master: str) -> str:
-    """Where nodes of this back end meet that belong together: the master, or a place of their own."""
+    """Return the address at which a group of nodes of this back end meets: the master's or a unique one."""
     own = f"meeting-{os.getpid()}-{next(_numbers)}"
     return {"memory": own, "zenoh": f"local/{own}"}.get(backend, master)
 
 
 @contextmanager
 def meeting(backend: str, where: str) -> Iterator[Make]:
-    """Makes nodes that meet there; closes them."""
+    """Yield a function that creates nodes of one back end at an address; close the nodes afterwards."""
     made: list[nep.Node] = []
 
     def new(name: str) -> nep.Node:

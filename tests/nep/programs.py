@@ -1,4 +1,4 @@
-"""Small programs that tests run as processes of their own, and kill."""
+"""Small programs that tests run, suspend and kill as processes."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ import psutil
 
 ROOT = Path(__file__).parents[2]
 LETTERS = {"PYTHONIOENCODING": "utf-8"} if sys.platform == "win32" else {}
-"""On Windows a program writes into a pipe with the letters of the country's code page alone."""
+"""Environment for UTF-8 output; on Windows a pipe has the country's code page by default."""
 GREETINGS_S = 40.0
-"""For how long the nodes of a test that uses the fixture `patient` wait for greetings."""
+"""Seconds that nodes wait for handshakes in tests with the fixture `patient`."""
 
 
 class Program:
-    """A Python program that is running. It says things line by line."""
+    """Running Python program whose input and output are read and written by lines."""
 
     def __init__(self, code: str, *args: str, before: Sequence[str] = (), **environment: str) -> None:
         self.process = subprocess.Popen(
@@ -37,7 +37,7 @@ class Program:
         )
 
     def line(self) -> str:
-        """The next line it prints; an AssertionError when it ends instead."""
+        """Return the next line of output; raise AssertionError with the error output if the program exits."""
         assert self.process.stdout is not None
         said = self.process.stdout.readline()
         if not said:
@@ -46,7 +46,7 @@ class Program:
         return said.strip()
 
     def say(self, text: str) -> None:
-        """Give it a line."""
+        """Write a line to the program's input."""
         assert self.process.stdin is not None
         self.process.stdin.write(text + "\n")
         self.process.stdin.flush()
@@ -55,13 +55,13 @@ class Program:
         self.process.send_signal(number)
 
     def stop(self) -> None:
-        """Halt it as a debugger does; when this returns none of its threads runs."""
+        """Suspend the process, as a debugger does; on return none of its threads runs."""
         self.signal(signal.SIGSTOP)
         process = psutil.Process(self.process.pid)
         eventually(lambda: process.status() == psutil.STATUS_STOPPED)
 
     def end(self, timeout_s: float = 50.0) -> tuple[str, str]:
-        """Wait for its end; what else it printed."""
+        """Wait until the program exits; return the rest of its output and error streams."""
         return self.process.communicate(timeout=timeout_s)
 
     def kill(self) -> None:
@@ -72,7 +72,7 @@ class Program:
 
 @contextmanager
 def running(code: str, *args: str, before: Sequence[str] = (), **environment: str) -> Iterator[Program]:
-    """A program, killed at the end. `before` are the words of a command that starts it."""
+    """Start a program; kill it at the end. `before` is a command prefix that starts it."""
     program = Program(code, *args, before=before, **environment)
     try:
         yield program
@@ -81,7 +81,7 @@ def running(code: str, *args: str, before: Sequence[str] = (), **environment: st
 
 
 def eventually(is_met: Callable[[], bool], timeout_s: float = 30.0) -> float:
-    """Seconds until `is_met()`; an AssertionError when it takes too long. Looks 100 times a second."""
+    """Poll `is_met` 100 times a second; return the seconds until it was true, else raise AssertionError."""
     started, never = monotonic(), Event()
     while not is_met():
         assert monotonic() - started < timeout_s, f"not met within {timeout_s} s"

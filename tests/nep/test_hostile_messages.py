@@ -1,4 +1,4 @@
-"""Whatever strangers publish, the commands, alarms, bridges and recorders of nep go on."""
+"""Tests that commands, alarms, bridges, recorders and servers survive hostile messages."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ RECORD: hostile.Message = {
 POSE: hostile.Message = {"pose": {"x": 1.0, "joints": [1, 2]}, "name": "a"}
 PAYLOADS = tuple(hostile.payloads(POSE, share=3))
 SMALL = tuple(each for each in PAYLOADS if len(each) < 1_000_000)
-"""Without the texts of 5 MB, which take seconds to write for people."""
+"""Payloads without the 5 MB texts, which take seconds to format."""
 
 
 @contextmanager
 def publishing(master: str, topic: str, msg_type: str, payloads: tuple[bytes, ...]) -> Iterator[None]:
-    """Publish once somebody subscribes, in a thread."""
+    """Publish the payloads in a thread as soon as the topic has a subscriber."""
     with nep.node("evil", master=master) as node:
         publisher, ended = node.new_pub(topic, msg_type), threading.Event()
 

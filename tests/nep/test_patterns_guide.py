@@ -1,4 +1,4 @@
-"""docs/patterns.md: its programs run and print what it says."""
+"""Tests of docs/patterns.md: its programs run and print the documented output."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SAID = re.compile(r"`([^`]+)`")
 
 
 def _programs() -> dict[str, tuple[str, list[str]]]:
-    """By the head of its section: a program, and the lines that it is said to print."""
+    """Return each program and its documented output lines, by the heading of its section."""
     found = {}
     for head, text in _SECTION.findall(_GUIDE):
         program = _PROGRAM.search(text)

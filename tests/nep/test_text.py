@@ -1,4 +1,4 @@
-"""Text of values that a stranger sent."""
+"""Tests of the text of values that other programs sent."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class SpeechlessError(Exception):
 
 
 class Endless(dict[str, object]):
-    """A map that counts how much of it is read."""
+    """Infinite map that counts how many keys were read."""
 
     def __init__(self) -> None:
         self.read = 0

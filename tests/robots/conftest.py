@@ -1,4 +1,4 @@
-"""What the tests of robots share: a clock of their own, a robot of their own, ears on its topics."""
+"""Shared fixtures of the robot tests: a fake clock, a robot, and a client that records its topics."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from app.robots.kit import (
 
 
 def eventually(true: Callable[[], object], timeout_s: float = 30.0) -> None:
-    """Wait until something is true; fails when it never is."""
+    """Wait until `true()` is true; fail after `timeout_s` seconds."""
     never = threading.Event()
     end = time.monotonic() + timeout_s
     while not true():
@@ -38,10 +38,10 @@ def eventually(true: Callable[[], object], timeout_s: float = 30.0) -> None:
 
 
 class FakeClock:
-    """Time that passes when a test says so.
+    """Clock that advances only when the test calls `advance`.
 
-    Whoever asks for the time and then waits for the rest of a span waits from when it was told: a test
-    may let time pass in between.
+    A thread that reads the time and then waits for a duration waits from the time that it read: a test
+    may advance the clock in between.
     """
 
     def __init__(self) -> None:
@@ -67,7 +67,7 @@ class FakeClock:
 
 
 class Turtle:
-    """A small robot whose functions end when the test lets them."""
+    """Small robot whose actions finish when the test sets `go_on`."""
 
     battery = sensor(Annotated[int, Range(0, 100, unit="%")], title="battery", text="battery", icon="battery")
     bumped = event(
@@ -99,7 +99,7 @@ class Turtle:
     def move(
         self, call: Call, distance: Annotated[float, Range(-2, 2, 0.05, "m")] = 0.5
     ) -> dict[str, object]:
-        """Move until the test says that it arrived."""
+        """Move until the test lets it arrive."""
         self.moving = True
         call.feedback(moved=0.0)
         try:
@@ -111,30 +111,30 @@ class Turtle:
 
     @action("say %text", category="Speech", icon="mic", uses=("speech",), on_busy="queue", rize="say")
     def say(self, call: Call, text: Annotated[str, Text(1, 40), Suggested("hi")]) -> None:
-        """Say it when the test lets it."""
+        """Say a text; finished by the test."""
         self._let(call)
         self.done.append(("say", text))
 
     @action("light %colour", category="Looks", icon="lightbulb", cancellable=False, rize="leds")
     def light(self, call: Call, colour: Colour = "#ffffff", bright: bool = True) -> None:
-        """At once."""
+        """Set the colour at once."""
         self.done.append(("light", colour, bright))
 
     @action("dig %times times", category="Movement", icon="move", uses=("base",), on_busy="reject")
     def dig(self, call: Call, times: Annotated[int, Range(1, 9)] = 1) -> None:
-        """Refuses when something moves."""
+        """Dig; rejected while the robot moves."""
         self.done.append(("dig", times))
 
     @action("fail", category="Movement", icon="x")
     def fail(self, call: Call, how: Literal["told", "broken"] = "told") -> None:
-        """Never works."""
+        """Fail always."""
         if how == "told":
             raise Failed("no fuel")
         raise self.breaks
 
     @action("ignore", category="Movement", icon="x", uses=("base",), timeout_s=5)
     def ignore(self, call: Call) -> None:
-        """Does not listen to its call."""
+        """Ignore cancellation."""
         self.go_on.wait(60)
 
     def _let(self, call: Call) -> None:
@@ -145,7 +145,7 @@ class Turtle:
 
     @safe_stop(watchdog_s=1.0, within_s=0.2)
     def stop(self) -> None:
-        """Stands still once the test lets it."""
+        """Stop the motion once the test sets `may_stop`."""
         self.may_stop.wait(60)
         if self.stop_fails is not None:
             raise self.stop_fails
@@ -157,7 +157,7 @@ TURTLE = Kind(model="turtle", title="Turtle", body=Turtle)
 
 
 class Ears:
-    """Hears topics of a robot and speaks to it."""
+    """Client that records topics of a robot and sends commands to it."""
 
     def __init__(self, node: nep.Node, name: str) -> None:
         self.name = name
@@ -195,7 +195,7 @@ class Ears:
         return [a["state"] for a in self.answers(wanted)]
 
     def final(self, wanted: str, op: str = "invoke", timeout_s: float = 30.0) -> dict[str, object]:
-        """The last answer to a command, when it has come."""
+        """Wait for the final reply to a command and return it."""
 
         def ends() -> list[dict[str, object]]:
             final = {"succeeded", "failed", "canceled"}
@@ -218,7 +218,7 @@ def node() -> Iterator[nep.Node]:
 
 @pytest.fixture
 def turtle(node: nep.Node, clock: FakeClock) -> Iterator[tuple[Turtle, Ears, FakeClock]]:
-    """A running turtle, ears on it, and the clock it goes by."""
+    """Running turtle, a client of it, and the fake clock of its driver."""
     with nep.node("listener", "memory") as other:
         ears = Ears(other, "Turtle")
         driver = Driver(TURTLE, "Turtle", node, clock=clock)

@@ -1,7 +1,7 @@
-"""The contract of whoever commands robots: it believes its robots' own programs, and nobody else.
+"""Contract tests of programs that command robots: they trust only the programs of these robots.
 
-A program that runs and Studio keep it alike; each has an adapter (`Side`) beside its own cases, in
-`tests/blocks/runtime/test_message_senders.py` and `tests/core/robots/test_claims.py`.
+The tests run for a running program and for Studio. Each has an adapter (`Side`) next to its own tests,
+in `tests/blocks/runtime/test_message_senders.py` and `tests/core/robots/test_claims.py`.
 """
 
 from __future__ import annotations
@@ -22,87 +22,87 @@ from tests.blocks.samples import robot
 from tests.blocks.wire_robot import WireRobot
 
 SHORT_S = 0.3
-"""How long somebody waits for who stays silent."""
+"""Waiting time in seconds for a robot that does not reply."""
 
 
 class Invoked(Protocol):
-    """What a side keeps of a command that it sent."""
+    """State that a side stores for a command it sent."""
 
     id: str
     state: str
 
 
 class Side(Protocol):
-    """Who commands robots."""
+    """Interface to a program that commands robots."""
 
     told: Mapping[str, str]
-    """What it says of "another topic", "two programs" and "foreign topic", as whole regular expressions."""
+    """Messages for "another topic", "two programs" and "foreign topic", as complete regular expressions."""
 
     def until(self, true: Callable[[], object]) -> None:
-        """Go on until something is true; fails when it never is."""
+        """Process events until a condition is true; fail after a timeout."""
 
     def meet(self, described: Robot, node_id: str) -> None:
-        """Be ready to command this robot, which is that node."""
+        """Prepare to command this robot, which is the node with this id."""
 
     def invoke(self, action: str, input: Mapping[str, object]) -> Invoked:
-        """Let Pepper do something."""
+        """Start an action of Pepper and return its state."""
 
     def runs(self, call: Invoked) -> bool:
-        """Whether it waits for the end of a command, and for nothing else of the robot."""
+        """Return whether the side waits for the end of this command and for no other command of the robot."""
 
     def check_ended(self, call: Invoked, states: Sequence[str]) -> None:
-        """Fail unless all that it keeps of a command is what these answers said."""
+        """Fail unless the stored state of a command agrees with replies of these states."""
 
     def knows(self, publisher: nep.Publisher) -> bool:
-        """Whether it has asked the master whose publisher of Pepper's answers this is, which has sent one."""
+        """Return whether the side knows from the master which node has this publisher of Pepper's replies."""
 
     def hearing_commands(self) -> int:
-        """How many programs are there that hear Pepper's commands."""
+        """Return the number of programs that subscribe to Pepper's commands."""
 
     def watch(self, sensor: str) -> AbstractContextManager[object]:
-        """Want Pepper's sensor meanwhile."""
+        """Return a context manager that subscribes to a sensor of Pepper."""
 
     def value(self, sensor: str) -> object:
-        """The newest value of Pepper's sensor, None before there is one."""
+        """Return the newest value of a sensor of Pepper, or None before the first."""
 
     def stop(self, patience_s: float = 30.0) -> bool:
-        """Stop the robots; whether all are proven still."""
+        """Stop the robots; return whether all stops were confirmed."""
 
     def stop_says(self) -> str:
-        """What it says of Pepper after a stop that was not proven."""
+        """Return the message about Pepper after a stop that was not confirmed."""
 
     def robots(self) -> Mapping[str, tuple[str, str]]:
-        """The robots that it believes in: where they are commanded, and which node they are."""
+        """Return the trusted robots as name: (command topic, node id)."""
 
     def claim(self, topic: str) -> str:
-        """What it says about whoever announces something on this topic that is not believed."""
+        """Return the message about an untrusted announcement on this topic."""
 
     def claims_nothing(self) -> bool:
-        """Whether there is nothing that it does not believe."""
+        """Return whether there is no untrusted announcement."""
 
 
 def described(name: str = "Pepper", **topics: str) -> dict[str, object]:
-    """The description of a robot, with some of its topics elsewhere."""
+    """Return the description of a robot, with `topics` in place of some of its default topics."""
     made = copy.deepcopy(dict(robot(name).source))
     made["rb:topics"] = {**cast("Mapping[str, object]", made.get("rb:topics") or {}), **topics}
     return made
 
 
 def announce(node: nep.Node, topic: str, description: Mapping[str, object]) -> nep.Publisher:
-    """Let a node say that it is this robot."""
+    """Publish a description of a robot from a node and return the publisher."""
     publisher = node.new_pub(topic, DESCRIPTION_TYPE, latched=True)
     publisher.publish(dict(description))
     return publisher
 
 
 def answer(id: object, state: str, op: str = "invoke", **more: object) -> dict[str, object]:
-    """What a robot answers."""
+    """Return the payload of a robot's reply."""
     told = {"id": id, "op": op, "action": "say", "state": state, "output": {}, "feedback": {}, "error": None}
     return {**told, **more}
 
 
 class WhoseWordsCount:
-    """The cases; a subclass has the fixture `side`."""
+    """Test cases; a subclass provides the fixture `side`."""
 
     @pytest.fixture
     def pepper(self, master: Master) -> Iterator[WireRobot]:
@@ -188,7 +188,7 @@ class WhoseWordsCount:
     def test_answer_of_an_unlisted_publisher_is_queued_until_the_master_lists_the_publisher(
         self, master: Master, side: Side, states: tuple[str, ...]
     ) -> None:
-        """The robot makes its answer topic only when it has something to say."""
+        """A robot creates its reply topic only when it sends the first reply."""
         with nep.node("late", master=master.address) as late:
             announce(late, "/Pepper/description", described())
             heard: list[object] = []

@@ -331,7 +331,7 @@ def test_huge_description_is_rejected_before_decoding():
 
 
 def test_description_with_too_many_values_is_rejected_without_validation():
-    """Checking all of it took the window six seconds, and its Stop with it."""
+    """Its validation blocked the window, and with it the Stop button, for six seconds."""
     described = thing_description(model("pepper"), "Pepper")
     described["actions"] = {f"do {number}": {"title": number} for number in range(25_000)}
     with pytest.raises(DescriptionError, match="the description has more than 20000 values"):
@@ -353,7 +353,7 @@ def test_confusable_robot_name_is_rejected_with_an_escaped_message(name):
 
 
 def test_control_characters_are_removed_from_texts_of_a_description():
-    """A letter that turns the direction of writing would turn the question that has it in its middle, too."""
+    """A character that reverses the writing direction would also reverse a question around the text."""
     described = thing_description(model("pepper"), "Pepper")
     say = described["actions"]["say"]
     say["title"] = "\u202esay\n"

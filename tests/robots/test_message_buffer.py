@@ -1,4 +1,4 @@
-"""Messages of unknown publishers are bounded, and a flood displaces nobody else's."""
+"""Tests of the bounded buffer for messages of unknown publishers; a flood evicts only its own messages."""
 
 from __future__ import annotations
 

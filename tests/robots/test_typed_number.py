@@ -1,4 +1,4 @@
-"""Numbers as people type them: the same examples as those of the block editor."""
+"""Tests of the parser for typed numbers, with the same examples as the tests of the block editor."""
 
 from __future__ import annotations
 

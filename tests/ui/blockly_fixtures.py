@@ -1,4 +1,4 @@
-"""Fixtures of the tests that need a live block editor (a pytest plugin of those modules)."""
+"""Fixtures for tests with a live block editor, as a pytest plug-in of their modules."""
 
 from __future__ import annotations
 

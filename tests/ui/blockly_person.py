@@ -1,4 +1,4 @@
-"""Samples, and a person at the mouse, for the tests of the block editor."""
+"""Sample programs and a simulated user for the tests of the block editor."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ for (const kind of ['pointerdown', 'pointerup', 'keydown', 'focusin', 'focusout'
     }, true);
 }
 """
-"""Keeps the last events of the page, for whoever asks why it does not come to what was waited for."""
+"""JavaScript that records the latest events of the page, to explain a timeout."""
 
 
 def workspace(*blocks: dict) -> dict:
@@ -43,12 +43,12 @@ def workspace(*blocks: dict) -> dict:
 
 
 def outlined(name: str) -> str:
-    """A script: ids of the blocks with this outline."""
+    """Return JavaScript that lists the ids of blocks with this outline."""
     return f"[...document.querySelectorAll('.nepState-{name}')].map(e => e.parentElement.dataset.id)"
 
 
 def editor(qtbot, definitions: dict, width: int = 1180, height: int = 700) -> BlocklyView:
-    """A block editor of that size with these blocks, not shown yet."""
+    """Return a hidden block editor with these definitions; width and height in pixels."""
     made = BlocklyView()
     qtbot.addWidget(made)
     made.resize(width, height)
@@ -57,7 +57,7 @@ def editor(qtbot, definitions: dict, width: int = 1180, height: int = 700) -> Bl
 
 
 class Person:
-    """Looks at the page and uses the mouse and the keyboard in it."""
+    """Simulated user, who reads the page and uses mouse and keyboard."""
 
     def __init__(self, qtbot, view: BlocklyView) -> None:
         self._qtbot = qtbot
@@ -84,7 +84,7 @@ class Person:
             raise AssertionError(f"{script} is {answers[0]!r}, not {expected!r}. {self.story()}") from error
 
     def story(self) -> str:
-        """What the page was told of mouse, keys and focus, and what else may have taken them."""
+        """Return the recorded events of the page, and windows that may have received the input instead."""
         windows = [
             f"{each} {each.geometry()}" for each in QGuiApplication.topLevelWindows() if each.isVisible()
         ]
@@ -113,7 +113,7 @@ class Person:
         return self.newest().get("blocks", {}).get("blocks", [])
 
     def box(self, selector: str) -> dict:
-        """Where an element is on the screen of the page, once it is there and has stopped moving."""
+        """Return the rectangle of an element in pixels of the page, once it exists and has stopped moving."""
         self.ask(f"({LOOK})({json.dumps(selector)})")
         found: list = []
 
@@ -136,7 +136,7 @@ class Person:
         )
 
     def hover(self, at: QPoint) -> None:
-        """Move the mouse there from elsewhere: where another test has left it already, nothing is told."""
+        """Move the mouse to a position, starting elsewhere: Qt reports no move to the current position."""
         QTest.mouseMove(self.target, at + QPoint(9, 9))
         QTest.mouseMove(self.target, at)
 
@@ -144,10 +144,10 @@ class Person:
         QTest.keyClick(self.target, key, modifiers)
 
     def wheel(self, by: int) -> None:
-        """Turn the wheel over the middle of the blocks; a negative way shows what is below.
+        """Turn the wheel over the middle of the canvas; a negative value scrolls down.
 
-        Once the page has been painted: before that it drops a turn, and with it all that follow within half
-        a second, which are one movement to it.
+        Waits until the page is painted: an unpainted page drops the event and all that follow within
+        half a second, because they belong to the same gesture.
         """
         self.wait_for(PAINTED)
         middle = QPointF(self.target.rect().center())

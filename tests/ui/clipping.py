@@ -1,6 +1,6 @@
-"""Finds words that do not fit: labels, buttons and chips smaller than what they ask for, or cut off.
+"""Detection of clipped text: labels, buttons and chips that are smaller than their text or cut off.
 
-Words that are shortened on purpose have a tooltip with the whole.
+Text that is elided on purpose has a tooltip with the complete text.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ASKED = (QAbstractButton, Chip, StatusItem)
 
 
 def shown(root: QWidget) -> Iterator[QWidget]:
-    """Every widget inside that is there for a person, also what one has to scroll to."""
+    """Yield every visible widget below `root`, including those outside of a scroll area's viewport."""
     behind = [dock for dock in root.findChildren(QDockWidget) if dock.x() < -dock.width() / 2]
     for widget in [root, *root.findChildren(QWidget)]:
         hidden = any(dock.isAncestorOf(widget) for dock in behind)  # Qt moves what is behind a tab away
@@ -38,7 +38,7 @@ def shown(root: QWidget) -> Iterator[QWidget]:
 
 
 def lengthen(root: QWidget) -> None:
-    """Make every fixed word about a third longer, as other languages do."""
+    """Make every label and button text about a third longer, as translations do."""
     for widget in shown(root):
         if isinstance(widget, QLabel | QAbstractButton) and widget.text() and not widget.property("long"):
             widget.setProperty("long", True)
@@ -46,7 +46,7 @@ def lengthen(root: QWidget) -> None:
 
 
 def longer(text: str) -> str:
-    """A word gets longer letters, a sentence more words."""
+    """Return a longer text: a single word gets more letters, a sentence more words."""
     more = math.ceil(len(text) * LONGER)
     if " " not in text:
         return text + "n" * more
@@ -54,7 +54,7 @@ def longer(text: str) -> str:
 
 
 def clipped(root: QWidget) -> list[str]:
-    """What does not fit, one sentence each."""
+    """Return a sentence for each widget that is too small for its text."""
     heads = [widget for widget in shown(root) if isinstance(widget, TableHeader)]
     return [
         *(fault for widget in shown(root) for fault in _faults(widget, root)),
@@ -63,7 +63,7 @@ def clipped(root: QWidget) -> list[str]:
 
 
 def sideways(root: QWidget) -> list[str]:
-    """What has a bar to scroll it sideways, one sentence each."""
+    """Return a sentence for each scroll area that can be scrolled horizontally."""
     areas = [area for area in shown(root) if isinstance(area, QAbstractScrollArea) and area.accessibleName()]
     never = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
     return [
@@ -103,7 +103,7 @@ def _below_minimum(widget: QWidget, said: str) -> Iterator[str]:
 
 
 def _heads(head: TableHeader) -> Iterator[str]:
-    """The heads of a table that have too little room, and no tip that says the whole."""
+    """Yield a sentence for each column header that is too narrow and has no tooltip with its text."""
     model, across = head.model(), Qt.Orientation.Horizontal
     for place in range(head.count()):
         words = str(model.headerData(place, across, Qt.ItemDataRole.DisplayRole))
@@ -114,7 +114,7 @@ def _heads(head: TableHeader) -> Iterator[str]:
 
 
 def head_needs(head: TableHeader, words: str) -> float:
-    """How wide a column is whose head is not shortened."""
+    """Return the width in pixels of a column whose header is not elided."""
     return QFontMetricsF(header_font(head._theme)).horizontalAdvance(words) + 2 * PADDING
 
 
@@ -135,7 +135,7 @@ def _label(label: QLabel, said: str) -> Iterator[str]:
 
 
 def _cut(widget: QWidget, root: QWidget) -> str:
-    """The ancestor that shows only a part of it; what can be scrolled to is not cut."""
+    """Return the ancestor that clips a widget, or "" if there is none or the widget can be scrolled to."""
     rect = widget.rect()
     step = widget
     while step is not root:
@@ -155,7 +155,7 @@ def _cut(widget: QWidget, root: QWidget) -> str:
 
 
 def _scrolls(viewport: QWidget, rect: QRect) -> bool:
-    """Whether a person can bring it into view: vertically always, sideways when there is a bar."""
+    """Return whether an area can scroll to `rect`: always vertically, horizontally only with a scroll bar."""
     area = viewport.parentWidget()
     if not isinstance(area, QAbstractScrollArea) or area.viewport() is not viewport:
         return False

@@ -1,7 +1,7 @@
-"""Tests of widgets: no screen needed; a Qt warning, or a window left open, fails the test that caused it.
+"""Fixtures of widget tests, which need no screen; a Qt warning or an open window fails its test.
 
-While the test runs, pytest-qt watches for warnings; while its widgets are closed and deleted, we do.
-The few lines that are known noise are in pyproject.toml, ``qt_log_ignore``.
+pytest-qt watches for warnings while a test runs, this file while its widgets are closed and deleted.
+Known harmless warnings are listed in pyproject.toml, ``qt_log_ignore``.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ if hasattr(os, "geteuid") and os.geteuid() == 0:
 QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
 
 WAIT_MS = 30_000
-"""How long a test waits for what must come: on a busy computer much longer than the 5 s of pytest-qt."""
+"""Default timeout in milliseconds; the 5 s of pytest-qt are too short on a busy computer."""
 
 BAD = {QtMsgType.QtWarningMsg, QtMsgType.QtCriticalMsg, QtMsgType.QtFatalMsg}
 
 
 class PatientBot(QtBot):
-    """Waits longer unless a test says how long."""
+    """Bot with longer default timeouts."""
 
     waitUntil = partialmethod(QtBot.waitUntil, timeout=WAIT_MS)  # noqa: N815 - pytest-qt's names
     waitSignal = partialmethod(QtBot.waitSignal, timeout=WAIT_MS)  # noqa: N815
@@ -49,17 +49,17 @@ class PatientBot(QtBot):
 
 @pytest.fixture
 def qtbot(qapp: object, request: pytest.FixtureRequest) -> QtBot:
-    """A bot with patience."""
+    """Bot of pytest-qt with longer default timeouts."""
     return PatientBot(request)
 
 
 @pytest.fixture(autouse=True, scope="module")
 def _garbage() -> Iterator[None]:
-    """Only this thread collects what is of Qt's, as in Studio; those of later tests find nothing of it.
+    """Collect garbage of Qt objects only in this thread, as Studio does, after the tests of each file.
 
-    What is still used then is put aside: up to 1.8 million objects took 1.5 s to be looked at, file by file.
-    Widgets that are left are deleted before: a style sheet goes through all that there are, and with those of
-    fifty files it took longer than the tests themselves.
+    Remaining objects are frozen, because scanning up to 1.8 million of them took 1.5 s per file.
+    Remaining widgets are deleted before: a style sheet is applied to every widget, and with the widgets
+    of fifty files this took longer than the tests.
     """
     gc.disable()
     yield
@@ -76,7 +76,7 @@ def _garbage() -> Iterator[None]:
 
 @pytest.fixture(autouse=True, scope="module")
 def _text_as_before(qapp: QApplication) -> Iterator[None]:
-    """The tests of each file find letters as large as they are at first."""
+    """Restore the default text size after the tests of each file."""
     yield
     if qapp.property(STYLED_PROPERTY) is not None:
         Theme("light").apply()
@@ -84,7 +84,7 @@ def _text_as_before(qapp: QApplication) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def _sessions_end() -> Iterator[None]:
-    """Ends the sessions in memory that the test has made, and takes away what it left."""
+    """Close the test's sessions in memory and collect their garbage."""
     yield
     close_sessions()
     collect_garbage()
@@ -92,17 +92,17 @@ def _sessions_end() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def _silent(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test opens the sound system: Qt keeps its connections to it for as long as the process lives."""
+    """Block Qt's sound modules: their connections to the sound system stay open until the process exits."""
     for module in ("PySide6.QtTextToSpeech", "PySide6.QtMultimedia"):
         monkeypatch.setitem(sys.modules, module, None)  # what an import fails at
 
 
 @pytest.fixture(autouse=True)
 def _mouse_is_away(qapp: QApplication) -> Iterator[None]:
-    """Each test begins with the mouse beside its windows, and ends with no button held.
+    """Move the mouse away from the windows before each test, and release all buttons after it.
 
-    Where an earlier test left the mouse, panels wait for it to go; with the left button held, as
-    ``QTest.mouseDClick`` leaves it, a page takes no press of the right one.
+    Panels react to a mouse that an earlier test left over them. While the left button is held, as after
+    ``QTest.mouseDClick``, a page ignores the right button.
     """
     QCursor.setPos(0, 0)
     yield
@@ -114,9 +114,9 @@ def _mouse_is_away(qapp: QApplication) -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, object, object]:
-    """Fails a test whose widgets warn while they are closed and deleted, or that leaves a window open.
+    """Fail a test if Qt warns while its widgets are closed and deleted, or if it leaves a window open.
 
-    Such a window lies above those of later tests and takes their clicks.
+    An open window would cover those of later tests and receive their clicks.
     """
     noise = [re.compile(pattern) for pattern in item.config.getini("qt_log_ignore")]
     warnings: list[str] = []

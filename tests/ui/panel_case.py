@@ -1,4 +1,4 @@
-"""What tests of panels share: a panel over a session in memory, and what it asked of the window."""
+"""Helpers for tests of panels: a panel with a session in memory, and a fake window."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OUT_OF_SIGHT = 5000
 
 @dataclass
 class Window:
-    """Stands for the main window: writes down what panels ask of it."""
+    """Fake main window that records the requests of panels."""
 
     session: Session
     theme: Theme = field(default_factory=lambda: Theme("light"))
@@ -31,7 +31,7 @@ class Window:
     beside: list[str] = field(default_factory=list)
     asked_why: list[tuple[PanelWidget, str]] = field(default_factory=list)
     panels: list[PanelWidget] = field(default_factory=list)
-    """Those that can be seen, besides the one that is made."""
+    """Visible panels, other than the panel under test."""
     answers: Answers = field(default_factory=Answers)
 
     def context(self) -> PanelContext:
@@ -49,12 +49,11 @@ class Window:
         )
 
     def show_toast(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:
-        """A toast."""
         self.toasts.append(words)
         self.toast_buttons.append((button, run))
 
     def make(self, panel: Panel, size: tuple[int, int] = (640, 480)) -> PanelWidget:
-        """The panel, shown in our fonts also when no test has loaded them before."""
+        """Return a panel that is shown with Studio's fonts."""
         fonts.load()
         made = panel.make(self.context())
         _give_title(made)
@@ -65,7 +64,7 @@ class Window:
 
 
 def _give_title(made: PanelWidget) -> None:
-    """A place for what stands in its title, as the dock gives it; alone, each would be a window."""
+    """Put the panel's header widgets into a parent, as its dock does; without one, each would be a window."""
     title = QWidget(made)
     row = QHBoxLayout(title)
     for widget in made.header_widgets():
@@ -74,26 +73,26 @@ def _give_title(made: PanelWidget) -> None:
 
 
 def ticks(window: Window, panel: PanelWidget, count: int = 1) -> None:
-    """Some thirtieths of a second."""
+    """Advance the session by `count` thirtieths of a second, refreshing the panel each time."""
     for _ in range(count):
         window.session.tick()
         panel.refresh()
 
 
 def button(widget: QWidget, name: str) -> QWidget:
-    """The visible control of that accessible name."""
+    """Return the child widget with this accessible name."""
     found = [child for child in widget.findChildren(QWidget) if child.accessibleName() == name]
     assert found, f"nothing is called {name!r}"
     return found[0]
 
 
 def has_keys(widget: QWidget) -> bool:
-    """If its window gives it the keys; `hasFocus` asks also if no other window became the active one."""
+    """Return whether a widget has the focus of its window; `hasFocus` also needs the window to be active."""
     return widget.window().focusWidget() is widget
 
 
 def press(widget: QWidget) -> None:
-    """Press a button in its middle."""
+    """Click the centre of a widget."""
     from PySide6.QtCore import Qt
 
     QTest.mouseClick(widget, Qt.MouseButton.LeftButton)

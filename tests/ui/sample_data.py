@@ -1,4 +1,4 @@
-"""What tests of panels show: the robot, the topics, the nodes and the lines of the design's pictures."""
+"""Sample data for tests of panels: robot, topics, nodes and console lines of the design images."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, Subscrib
 
 
 def Topic(name: str, msg_type: str = "json", codec: str = "json", **more: object) -> topics_module.Topic:
-    """A topic of the real kind as most tests want it: one node publishes it, and nothing is lost."""
+    """Return a topic with defaults: one publisher, no lost messages."""
     given: dict[str, object] = {
         "publishers": 1,
         "publisher_nodes": ("pepper_driver",),
@@ -40,7 +40,7 @@ def Invocation(
     id: str, action: str, state: str = "running", feedback: Mapping[str, object] | None = None, *,
     elapsed_s: float = 0.0, left_s: float | None = None, **more: object,
 ) -> link_module.Invocation:  # fmt: skip
-    """A try of the real kind, at whose clock so much time has passed."""
+    """Return an invocation that started ``elapsed_s`` ago and times out in ``left_s`` (None: never)."""
     made = link_module.Invocation(id, action, state, feedback or {}, clock=lambda: elapsed_s, **more)  # type: ignore[arg-type]
     if left_s is not None:
         made.execution_start_s, made.timeout_s = 0.0, elapsed_s + left_s
@@ -85,7 +85,7 @@ VALUES: Mapping[str, object] = {
     "faces": {"count": 1, "name": "Aiko", "width": 320, "height": 240,
               "items": [{"name": "face", "confidence": 0.97, "box": [118, 36, 71, 77]}]},
 }  # fmt: skip
-"""What Pepper's sensors say."""
+"""Values of Pepper's sensors."""
 
 PROBLEMS = (
     Problem("warning", "b8", "robot", "wave", "NAO isn't connected, so wave will be skipped.",
@@ -140,13 +140,13 @@ ROWS: tuple[tuple[str, str, str, str, float, float, float, int, float], ...] = (
     ("/cmd_vel", "json", "2", "", 20.0, 2.0e3, 0.038, 12, 0.021),
     ("/lidar/scan", "bytes", "6", "", 0.0, 0.0, 0.0, 0, 0.0),
 )
-"""Topics: name, type, ids of the nodes that publish and that subscribe, messages/s, B/s, age, lost, share."""
+"""Topics: name, type, publisher and subscriber node ids, messages/s, bytes/s, age, lost, loss ratio."""
 
 
 def graph(revision: int, at_ns: int) -> GraphView:
-    """What the master of picture 04 tells: at first with the lidar, then without it, with RIZE and words.
+    """Return the graph of design image 04: revision 1 has the lidar, later ones RIZE and words.
 
-    The ages of its topics are right at ``at_ns``.
+    The ages of its topics are correct at ``at_ns``.
     """
     nodes = [
         ("1", "camera_driver", "lab-pc", 4110, "Python", "native", 0.12),
@@ -179,7 +179,7 @@ def _topic(
 
 
 def blackboard(t: float = 0.0) -> dict[str, object]:
-    """The message of picture 04, moving with ``t`` seconds."""
+    """Return the blackboard message of design image 04 at time ``t`` in seconds."""
     return {
         "stamp": round(1795164093.412 + t, 3),
         "robots": {
@@ -208,7 +208,7 @@ def blackboard(t: float = 0.0) -> dict[str, object]:
 
 
 def drawing(**changes: object) -> dict[str, object]:
-    """The virtual robot's state of picture 02."""
+    """Return the state of the virtual robot in design image 02, with changes."""
     state: dict[str, object] = {
         "x": 0.05, "y": 0.0, "theta_deg": 0.0, "head_yaw_deg": 0.0, "head_pitch_deg": 0.0,
         "speech": "Touch my head.", "eyes": "#35b0fa", "shoulders": "#3ab5ff", "emotion": "neutral",
@@ -225,7 +225,7 @@ def drawing(**changes: object) -> dict[str, object]:
 
 
 def picture(width: int = 320, height: int = 240) -> Picture:
-    """A camera picture: a wall, a floor, a red ball."""
+    """Return a camera image of a wall, a floor and a red ball."""
     bgra = np.empty((height, width, 4), np.uint8)
     bgra[:] = (190, 198, 196, 255)
     bgra[height // 2 :] = (96, 128, 152, 255)
@@ -299,7 +299,7 @@ SENSORS = (
 
 
 def pepper(name: str = "Pepper") -> Robot:
-    """The virtual robot's description, with one parameter of every kind."""
+    """Return the virtual robot's description, with one parameter of every kind."""
     touched = Event(
         "touched",
         "touched",

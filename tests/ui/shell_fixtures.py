@@ -1,4 +1,4 @@
-"""A window on a real session that talks to nobody, with plain panels in place of the real ones."""
+"""Fixtures of a main window with plain panels on a session without a master."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def session(home: Path) -> Session:
-    """Never started: it has no threads and no sockets."""
+    """Session that is never started and so has no threads or sockets."""
     return Session(
         Settings(home), address=free_address(), journal_folder=home / "journal", start_processes=False
     )

@@ -1,4 +1,4 @@
-"""Plain panels, a person who answers, robots in every state, and an address where nobody listens."""
+"""Test helpers for the main window: plain panels, fake file dialogs, robots in every state, free address."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NAMES = {
 
 
 class PlainPanel(PanelWidget):
-    """Writes down what the window asks of it."""
+    """Panel that records the calls of the window."""
 
     def __init__(self, context: PanelContext, title: str) -> None:
         super().__init__(context, title)
@@ -88,7 +88,7 @@ class PlainPanel(PanelWidget):
 
 
 def plain(name: str, title: str, accepts: tuple[str, ...]) -> Panel:
-    """A panel description whose widget is plain."""
+    """Return the description of a panel whose widget is a `PlainPanel`."""
     return Panel(name, title, "bot", accepts, lambda context: PlainPanel(context, title))
 
 
@@ -96,7 +96,7 @@ PANELS = {name: plain(name, title, accepts) for name, (title, accepts) in NAMES.
 
 
 class Answers:
-    """Answers for the person who is asked for a file."""
+    """Fake file dialogs that return `path`, or cancel when it is None."""
 
     def __init__(self) -> None:
         self.path: Path | None = None
@@ -145,9 +145,9 @@ class Answers:
 
 
 def robots_in(*states: str, run: str = "ready", silent: str | None = None) -> fakes.Session:
-    """Robots named "Robot 1" and so on, each in its state, while a program has come so far.
+    """Return a session with robots "Robot 1", "Robot 2", … in these states and a run in state ``run``.
 
-    ``silent`` says how they are silent.
+    ``silent`` is the reason for a robot's silence; None makes the robot unresponsive.
     """
     session = fakes.Session()
     links = [session.join(pepper(f"Robot {number}")) for number in range(1, len(states) + 1)]
@@ -167,7 +167,7 @@ def robots_in(*states: str, run: str = "ready", silent: str | None = None) -> fa
 
 
 def begin_run(session: fakes.Session, state: str) -> None:
-    """Run a behaviour until its run is running or paused."""
+    """Start a behaviour and wait until its run is running or paused."""
     session.document.apply_edit(WORKSPACE)
     session.runs.run()
     assert session.runner is not None
@@ -183,12 +183,12 @@ def begin_run(session: fakes.Session, state: str) -> None:
 
 
 def free_address() -> str:
-    """A loopback address on which nobody listens."""
+    """Return a loopback address with an unused port."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"127.0.0.1:{probe.getsockname()[1]}"
 
 
 def examples(folder: Path) -> list[Example]:
-    """Two examples without blocks."""
+    """Return two examples without blocks."""
     return [Example(folder / f"{name}.nepb", name, f"{name} does it", ()) for name in ("Greeting", "Quiz")]

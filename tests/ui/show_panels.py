@@ -1,4 +1,4 @@
-"""Paints every panel alone, at its size in the design, light and dark, into a folder of pictures.
+"""Script that renders each panel at its design size, light and dark, to images in a folder.
 
 python -m tests.ui.show_panels DIR [panel ...]
 """
@@ -76,18 +76,18 @@ ALARMS = (
     ),
     AlarmRule("silent", AlarmCondition("silent", "/robot/camera", for_s=2.0), (AlarmAction("keep"),)),
 )
-"""One that is off, one that is not finished, one that is on, one that is well; the last one is on top."""
+"""Alarms that are off, incomplete, active and normal; the last one is shown on top."""
 
 
 def wait(milliseconds: int) -> None:
-    """Let Qt work for a while."""
+    """Run the Qt event loop for this many milliseconds."""
     loop = QEventLoop()
     QTimer.singleShot(milliseconds, loop.quit)
     loop.exec()
 
 
 def show(name: str, session: Session, theme: Theme, folder: Path, suffix: str) -> None:
-    """Paint one panel in its dock."""
+    """Render a panel in its dock to an image."""
     panel, width, height, density = SIZES[name]
     context = PanelContext(session, theme, lambda _name: None, lambda _words: None, str, Answers())  # type: ignore[arg-type]
     widget = panel.make(context)
@@ -111,7 +111,7 @@ def show(name: str, session: Session, theme: Theme, folder: Path, suffix: str) -
 def shown_panel(
     qtbot: QtBot, theme: Theme, name: str, session: Session
 ) -> Iterator[tuple[Dock, PanelWidget]]:
-    """A panel alone in its dock, at its size in the design, after three ticks of what the session has."""
+    """Context manager of a panel in its dock, at its design size, after three ticks."""
     panel, width, height, density = SIZES[name]
     widget = panel.make(PanelContext(session, theme, str, str, str, Answers()))  # type: ignore[arg-type]
     dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
@@ -132,7 +132,7 @@ def shown_panel(
 
 
 def prepare(name: str, widget: PanelWidget) -> None:
-    """Choose what the design's picture has chosen."""
+    """Select in a panel what is selected in the design image."""
     if (
         name == "inspector"
         and isinstance(widget, inspector.InspectorPanel)
@@ -162,7 +162,7 @@ def prepare(name: str, widget: PanelWidget) -> None:
 
 
 def main() -> int:
-    """Paint what was asked for."""
+    """Render the panels named on the command line, or all except Behaviour."""
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)

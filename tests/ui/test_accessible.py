@@ -1,4 +1,4 @@
-"""People who do not see the window: names and roles of all that takes the keyboard, and what is said."""
+"""Tests of accessibility: names and roles of focusable widgets, tab order and announcements."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ OVER = (
 
 
 def stops(root: QWidget) -> Iterator[QWidget]:
-    """Everything that Tab can reach."""
+    """Return the widgets that Tab can reach."""
     for widget in [root, *root.findChildren(QWidget)]:
         takes = bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus)
         if takes and widget.isVisibleTo(root) and widget.isEnabled() and widget.focusProxy() is None:
@@ -41,7 +41,7 @@ def stops(root: QWidget) -> Iterator[QWidget]:
 
 
 def unsaid(root: QWidget) -> list[str]:
-    """What a screen reader would not know how to say."""
+    """Return descriptions of the focusable widgets without an accessible name or role."""
     faults = []
     for widget in stops(root):
         spoken = QAccessible.queryAccessibleInterface(widget)
@@ -91,7 +91,7 @@ def test_every_control_in_the_window_has_an_accessible_name(
 
 
 def reached(window: MainWindow, forward: bool = True) -> list[QWidget]:
-    """Where Tab leads, from where the keyboard is until it is there again."""
+    """Return the widgets in tab order, from the focused one until the order repeats."""
     seen: list[QWidget] = []
     for _ in range(200):
         focus = QApplication.focusWidget()
@@ -146,7 +146,7 @@ def test_panels_have_focus_in_reading_order(qtbot, window: MainWindow, commands:
 
 @pytest.fixture
 def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What a screen reader is told to say now; there is none in a test, so we stand in its place."""
+    """Announcements to a screen reader, which is faked."""
     heard: list[str] = []
     monkeypatch.setattr(QAccessible, "isActive", lambda: True)
     monkeypatch.setattr(QAccessible, "updateAccessibility", lambda event: heard.append(event.message()))

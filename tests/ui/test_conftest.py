@@ -1,4 +1,4 @@
-"""The net under all tests of widgets: a Qt warning at any time fails the test that caused it."""
+"""Tests of the UI test configuration: a Qt warning fails the test that caused it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_warns_when_closed(qtbot):
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """What pytest says about the inner tests, run with our own net and configuration."""
+    """Output of pytest for the inner tests, run with this project's `conftest.py` and configuration."""
     folder = tmp_path_factory.mktemp("inner")
     (folder / "test_inner.py").write_text(INNER, encoding="utf-8")
     (folder / "conftest.py").write_bytes((ROOT / "tests" / "ui" / "conftest.py").read_bytes())

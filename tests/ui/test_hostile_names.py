@@ -1,4 +1,4 @@
-"""Names from the network are shown as they are: no tooltip, label, menu or view takes them for markup."""
+"""Tests that tooltips, labels, menus and views do not interpret names from the network as markup."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_every_dynamic_tooltip_uses_the_escaping_function() -> None:
 
 
 def hostile() -> Window:
-    """A session in which everything that comes from the network has a name that looks like markup."""
+    """Return a window on a session in which all names from the network look like markup."""
     session = Session.full()
     for topic in list(session.topics):
         topic.name = f"{topic.name}{NAME}"
@@ -78,7 +78,7 @@ def hostile() -> Window:
 
 
 def shown(view: QAbstractItemView) -> Iterator[str]:
-    """The tooltips of a view, as far as its rows are there."""
+    """Return the tooltips of a view, for at most 50 rows per parent."""
     model = view.model()
 
     def below(parent: QModelIndex) -> Iterator[str]:

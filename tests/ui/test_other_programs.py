@@ -1,4 +1,4 @@
-"""What other programs inherit from a frozen Studio: nothing of its loader's."""
+"""Tests that child processes of a frozen Studio do not inherit the loader's environment variables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The self-driven tour: it waits for what it must see, takes pictures, and says what was missing."""
+"""Tests of the scripted tour: it waits for conditions, takes screenshots and reports unmet conditions."""
 
 from __future__ import annotations
 

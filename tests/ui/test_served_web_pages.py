@@ -1,4 +1,4 @@
-"""Test page and starter page of `nep web` in Chromium (Qt WebEngine)."""
+"""Tests of the test page and starter page of `nep web` in Chromium (Qt WebEngine)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TOKEN = "a-token-of-some-letters"
 
 
 class Browser(QWebEnginePage):
-    """Page that keeps what its console says, such as violations of its policy."""
+    """Page that records its console messages, such as violations of its content security policy."""
 
     def __init__(self, profile: QWebEngineProfile, qtbot: QtBot) -> None:
         super().__init__(profile)

@@ -1,4 +1,4 @@
-"""The window's speaker never waits for the computer's sound, however slow, and says why it is silent."""
+"""Tests of the speaker, which never blocks on audio and gives a reason when it is silent."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from app.ui.speaker import QtEngine, QtSpeaker, no_voice_message, passes_trial, 
 
 
 class FakeEngine:
-    """Has a voice for English; begins when the test lets it, ends when the test says so."""
+    """Fake engine with an English voice, whose start and end are controlled by the test."""
 
     def __init__(self) -> None:
         self.did: list[object] = []

@@ -1,4 +1,4 @@
-"""A block that is tried from the toolbox asks before a real robot moves for the first time, and only then."""
+"""Tests of the permission question when a block from the toolbox is tried on a real robot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def session() -> fakes.Session:
 
 
 def tried(session: fakes.Session, stack: Stack) -> str:
-    """The question that stands after the try; "" when it runs, and then it comes to its end."""
+    """Try a stack and return the title of the permission question, or "" if the stack ran without one."""
     session.tick()  # takes over that robots have come
     session.runs.try_stack(stack)
     question = session.fleet.permission.question

@@ -1,4 +1,4 @@
-"""A web page with roslib 1, as tutorials write it, in Chromium (Qt WebEngine), with `nep web`."""
+"""Tests of a web page with roslib 1 in Chromium (Qt WebEngine) against `nep web`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An *if* with as many branches as people made: compiled to if, elif and else."""
+"""Tests of compiling *if* blocks with several branches to ``if``, ``elif`` and ``else``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def chosen(extra: object, kind: str = "control_if", **parts: object) -> dict[str
 
 
 def lines(made: dict[str, object]) -> list[str]:
-    """The program's lines from the first ``if`` on."""
+    """Return the program's source lines, stripped, from the first ``if`` on."""
     program = compile_behaviour(workspace(started(made)), [])
     assert not program.problems
     source = program.source.splitlines()

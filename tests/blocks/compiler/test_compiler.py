@@ -25,7 +25,7 @@ from tests.blocks.samples import (
 
 
 def picture() -> dict[str, object]:
-    """The behaviour of the design's picture 02."""
+    """Return the workspace of the example behaviour from the second design picture."""
     return workspace(
         started(
             block("robot_pepper_do_light", ROBOT="Pepper", WHERE="eyes", COLOUR="#37B6FF"),

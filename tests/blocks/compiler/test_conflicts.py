@@ -1,4 +1,4 @@
-"""Started scripts that surely fight for a part of a robot are told before Run, with a fix; no others are."""
+"""Tests of the check for scripts that use the same robot part at the same time, and of its fix."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_recursive_function_is_visited_once() -> None:
 
 
 def ids(saved: object) -> list[str]:
-    """The ids of a script's blocks, one below the other."""
+    """Return the IDs of a script's blocks from top to bottom."""
     found: list[str] = []
     while isinstance(saved, dict):
         found.append(str(saved["id"]))

@@ -1,4 +1,8 @@
-"""Thousands of random expressions: compiled, run, and compared with a reference that knows no Python text."""
+"""Property tests of compiled expressions.
+
+Random expressions are compiled and run. Their results are compared with a reference evaluator that
+generates no Python source.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +41,7 @@ texts_plain = st.text(max_size=6)
 
 
 class NoResultError(Exception):
-    """The reference has no result."""
+    """Error of an expression for which the reference has no result."""
 
 
 def arithmetic(inner):
@@ -67,7 +71,7 @@ trees = number_trees | boolean_trees | joins | lengths | rows | items | inside
 
 
 def reference(tree):
-    """What a tree is worth, worked out without any program."""
+    """Evaluate an expression tree without compiling it."""
     if not isinstance(tree, tuple):
         # A field holds 2.0 as 2, as Blockly saves it.
         return int(tree) if isinstance(tree, float) and tree.is_integer() else tree
@@ -117,7 +121,7 @@ def rounded(how, value):
 
 
 def blocks(tree):
-    """The tree as blocks."""
+    """Convert an expression tree to blocks."""
     if isinstance(tree, bool):
         return boolean(tree)
     if isinstance(tree, str):
@@ -148,7 +152,7 @@ def list_blocks(kind, how, first, second):
 
 
 def small(tree):
-    """Whether no power in it could keep a computer busy."""
+    """Return whether no power has two compound operands, whose result could take too long to compute."""
     if not isinstance(tree, tuple):
         return True
     if tree[1] == "**" and isinstance(tree[2], tuple) and isinstance(tree[3], tuple):

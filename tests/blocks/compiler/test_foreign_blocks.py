@@ -1,4 +1,4 @@
-"""Blocks of other programs and variables without a name: what a person is told about them."""
+"""Tests of the problems reported for unknown blocks and for variables without a name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""No text of a file can become code: hostile strings in every field of every block."""
+"""Tests that text from a behaviour file can't become code.
+
+Hostile strings are put into every field of every block.
+"""
 
 from __future__ import annotations
 
@@ -99,7 +102,7 @@ def test_generated_program_calls_only_known_functions(tops, name, variables):
 
 
 def check(text: str) -> None:
-    """The text is one that the compiler meant: nothing but calls of our commands, defs, and literals."""
+    """Assert that the program contains only calls of known functions, definitions and literals."""
     tree = ast.parse(text)
     made = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     functions = {node.name for node in made}

@@ -1,4 +1,7 @@
-"""Compiling takes work in proportion to the blocks: four times the blocks, about four times the steps."""
+"""Tests that compile time is linear in the number of blocks.
+
+Executed lines are counted: four times the blocks must take about four times the lines.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,10 @@ FEW = 60
 
 
 def steps(work: Callable[[], object]) -> int:
-    """The lines of Python that some work runs: no clock, so that a busy machine changes nothing."""
+    """Count the Python lines that `work` executes.
+
+    Unlike a time measurement, the count doesn't depend on the load of the machine.
+    """
     count = 0
 
     def trace(_frame: FrameType, event: str, _argument: object) -> object:

@@ -1,4 +1,7 @@
-"""Publishing on a robot's own topics is moving that robot: told before Run, and refused in the program."""
+"""Tests that publishing on a robot's own topics counts as moving the robot.
+
+It is reported before the run and rejected at run time.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +61,7 @@ def test_robots_moved_by_a_command_or_world_topic_are_determined() -> None:
 
 
 def test_publish_on_computed_robot_topic_is_rejected_at_run_time(master: Master) -> None:
-    """The compiler did not see it: a program's process looks again, also at robots that came later."""
+    """The compiler can't check computed topics, so the program does, also for robots that joined later."""
     rover = WireRobot(master.address, "Rover")
     try:
         with nep.node("program", master=master.address) as node:

@@ -1,4 +1,7 @@
-"""One stack as a program of its own: under a start, with the functions and variables of its behaviour."""
+"""Tests of compiling one stack of blocks as a program of its own.
+
+The program has a start event and the functions and variables of its behaviour.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ BATTERY = block("robot_pepper_get_battery", "bat", ROBOT="Pepper")
 
 
 def behaviour() -> dict[str, object]:
-    """A start with three blocks, a script of an event, and a function."""
+    """Return a workspace with a start of three blocks, a script with an event block, and a function."""
     chain = stack(say("one") | {"id": "1"}, say("two") | {"id": "2"}, call("f", id="3"))
     loop = block("control_forever", "loop", BODY=[say("in") | {"id": "in"}])
     touched = block("robot_pepper_when_touched", "hat", ROBOT="Pepper", PLACE="head", below=loop)

@@ -1,4 +1,4 @@
-"""Variables that are read and never set, and the button that sets them."""
+"""Tests of the problem reported for variables that are read but never set, and of its fix."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Other words by which people look for the blocks of robots."""
+"""Tests of the synonyms by which the blocks of robots can be searched."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Broadcasts, and what ends the run of another script."""
+"""Tests of broadcasts and of the ways in which they end another script."""
 
 from __future__ import annotations
 

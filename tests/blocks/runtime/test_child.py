@@ -1,4 +1,7 @@
-"""The process of a program, spoken to as the runner does, but in this process where that is enough."""
+"""Tests of the program's process.
+
+Tests send it commands as the runner does. Where possible it runs in a thread of this process.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ LONG_S = 30.0
 
 
 class Pipe(io.TextIOBase):
-    """Lines from one thread to another; closing it ends the reading."""
+    """Pipe of lines between two threads; closing it ends the reading."""
 
     def __init__(self) -> None:
         self._lines: queue.Queue[str] = queue.Queue()
@@ -42,7 +45,7 @@ class Pipe(io.TextIOBase):
 
 
 class Child:
-    """A child in a thread, and what it said."""
+    """Program process that runs in a thread, and the reports it has sent."""
 
     def __init__(self, capsys_disabled) -> None:
         self.stdin, self.stdout = Pipe(), Pipe()
@@ -63,7 +66,7 @@ class Child:
         self.order(do="start", program=program.to_json(), robots=sources, master=master, **more)
 
     def until(self, kind: str, **content: object) -> dict[str, object]:
-        """The next line of this kind with this content."""
+        """Wait for a report of this kind with this content and return it."""
         while True:
             said = json.loads(next(self.stdout))
             self.said.append(said)
@@ -267,7 +270,7 @@ def set_score(value, id=None):
 
 
 def values_of(said):
-    """What was told of variables, in its order."""
+    """Return the reported variable values as pairs of ID and text, in the order of the reports."""
     lines = [line["values"] for line in said if line["is"] == "variables"]
     return [(value["id"], value["text"]) for values in lines for value in values]
 

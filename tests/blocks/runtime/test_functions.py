@@ -1,4 +1,4 @@
-"""Functions that people make: names, inputs, results, how deep they go, what stops in them."""
+"""Tests of user-defined functions: names, inputs, results, recursion depth and stopping."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A running program believes its robots' own programs; strangers and twins change nothing."""
+"""Tests that a running program accepts messages only from its robots' own nodes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.usefixtures("patient")
 
 
 class Program:
-    """A program's side of the contract: it looks for robots, then has the network of those."""
+    """Program under test: finds the robots, then opens a network for them."""
 
     told: ClassVar = {
         "another topic": r".*/Evil/description announces Pepper.*",
@@ -96,7 +96,7 @@ class Program:
 
 
 class TestAProgram(WhoseWordsCount):
-    """What every side owes, of a program."""
+    """Sender checks of every participant, run for a program."""
 
     @pytest.fixture
     def side(self, node: nep.Node) -> Iterator[Program]:

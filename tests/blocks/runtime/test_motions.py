@@ -1,4 +1,7 @@
-"""Motions that outlast their command: held by a pause, taken up again, forgotten for others."""
+"""Tests of motions that continue after their command has ended.
+
+They are stopped by a pause, restarted by a resume, and discarded when another motion replaces them.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ TURTLE: Robot = parse(thing_description(ROBOT.thing_model, "Turtle"))
 
 
 class Bench:
-    """What was stopped and asked for."""
+    """Recorder of stopped robots and invoked actions."""
 
     def __init__(self) -> None:
         self.stopped: list[str] = []

@@ -1,4 +1,4 @@
-"""Ask and wait: one question at a time, and what an answer is."""
+"""Tests of the *ask and wait* block: the order of questions, and the conversion of answers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tests.blocks.samples import (
 
 
 class Person:
-    """Sees the questions of a program, as a window would."""
+    """Simulated user who sees and answers a program's questions."""
 
     def __init__(self, saved: dict[str, object]) -> None:
         program = compile_behaviour(saved, [])

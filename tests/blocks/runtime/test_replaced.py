@@ -1,4 +1,4 @@
-"""A command that another script's command ended is told at its block, with its count; nothing else is."""
+"""Tests that a command canceled by another script's command is reported, with a count, at its block."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.blocks.samples import say, started, workspace
 
 
 class Fight:
-    """Programs of robots that a test answers for."""
+    """Programs that share one fake link, on which a test controls the replies."""
 
     def __init__(self) -> None:
         self.link = FakeLink()

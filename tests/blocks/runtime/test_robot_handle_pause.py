@@ -1,4 +1,4 @@
-"""What is left of an action that a pause took back."""
+"""Tests of how the remainder of an action is executed after a pause canceled it."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_unknown_remainder_of_paused_action_is_detected(name, given, feedback, u
 
 
 class Blind(FakeLink):
-    """Robots that end at once what is taken back, and never tell how far they are."""
+    """Fake link whose robots cancel actions immediately and never report progress."""
 
     def invoke(self, robot, action, input):
         call = super().invoke(robot, action, input)

@@ -26,7 +26,7 @@ def begin(saved, link: FakeLink | None = None, *, paused: bool = False) -> Play:
 
 @pytest.fixture
 def running():
-    """Begins programs and ends them."""
+    """Function that starts programs; they are stopped after the test."""
     begun: list[Play] = []
 
     def start(saved, link: FakeLink | None = None, *, paused: bool = False) -> Play:

@@ -10,7 +10,7 @@ from tests.blocks.fakes import until
 
 
 class Stage:
-    """A scheduler and what its scripts did."""
+    """Scheduler, and a log of what its scripts did."""
 
     def __init__(self) -> None:
         self.scheduler = Scheduler()

@@ -1,4 +1,4 @@
-"""What people see of a program's variables: short words of any value, and only what has changed."""
+"""Tests of reporting a program's variables: short summaries of all values, and only of changed ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A program waits for a busy robot, and gives up one that has fallen silent."""
+"""Tests of waiting for a busy robot, and of the error for a robot without a heartbeat."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def begin(link: FakeLink, beat_s: float | None = None) -> Play:
 
 
 class Queued(FakeLink):
-    """A robot that is busy with something else first."""
+    """Fake link whose robots accept an action and queue it behind a running one."""
 
     def invoke(self, robot: str, action: str, input: dict[str, object]):  # type: ignore[no-untyped-def, override]
         self.held.add(action)

@@ -1,4 +1,4 @@
-"""What people are told who ask about a block."""
+"""Tests of the help text of blocks."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ BLOCKS = {definition["type"]: definition for definition in DEFINITIONS["blocks"]
 
 
 def words(block_type: str) -> str:
-    """What stands on a block, with fields' and gaps' names."""
+    """Return the text on a block, with the names of its fields and slots in brackets."""
     definition = BLOCKS[block_type]
     lines = []
     for number in range(4):
@@ -185,7 +185,7 @@ def test_editor_definitions_are_json_serializable():
 
 
 def test_block_reference_page_is_generated_from_descriptions():
-    """If not: python tools/blocks_page.py."""
+    """If it fails, run ``python tools/blocks_page.py``."""
     text = Path("docs/blocks.md").read_text("utf-8")
     assert page(text) == text
     for category in categories():

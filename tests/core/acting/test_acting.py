@@ -1,4 +1,4 @@
-"""Acting by hand in a real session: sent and called through its network, ended by Stop, kept in a file."""
+"""Tests of sending and calling by hand in a real session: its network, Stop, and the saved file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The switch: off at first, on for some minutes and for names that were chosen."""
+"""Tests of arming: off by default, limited to some minutes and to chosen targets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Calls by hand over nodes in memory: answers, times, and every way in which there is none."""
+"""Tests of service calls by hand with nodes in memory: replies, durations and all failures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.nep.programs import eventually
 
 
 class Bench:
-    """Calls whose jobs are done at once, or when the test says so, by a node in memory."""
+    """Service calls whose jobs run on a node in memory, immediately or when the test runs them."""
 
     def __init__(self, node: Node) -> None:
         self.node, self.now = node, 0.0
@@ -36,7 +36,7 @@ class Bench:
         self.calls.call("/sum", request, "{}", timeout_s)
 
     def end(self) -> CallRecord:
-        """Wait until the call has ended."""
+        """Wait until the call has ended and return its record."""
         ended: list[CallRecord] = []
         eventually(lambda: bool(ended.extend(self.calls.tick()) or ended))
         return ended[-1]

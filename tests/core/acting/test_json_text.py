@@ -1,4 +1,4 @@
-"""JSON as it is typed: where it is wrong, what fixes it, and what its places are filled with."""
+"""Tests of JSON text typed by a user: the position of errors, their fixes, and placeholders."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LINES = """{
 
 
 def fixed(text: str) -> str:
-    """The text after all that can be fixed was, one after the other."""
+    """Return the text after all available fixes were applied one after the other."""
     for _each in range(5):
         fault = JsonText(text).fault
         if fault is None or fault.fix is None:

@@ -1,4 +1,4 @@
-"""A pixel that a person clicked as a message of each type."""
+"""Tests of publishing a clicked pixel as a message of each type."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sending once and again and again, over nodes in memory: while it is armed, and not once more."""
+"""Tests of sending a message once or repeatedly with nodes in memory, and only while armed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.nep.programs import eventually
 
 
 class Bench:
-    """An outbox whose jobs are done at once, or when the test says so, by a node in memory."""
+    """Outbox whose jobs run on a node in memory, immediately or when the test runs them."""
 
     def __init__(self, node: Node) -> None:
         self.node, self.now = node, 0.0

@@ -1,4 +1,4 @@
-"""The list of what was sent: bounded, repeats in one entry, nothing large kept."""
+"""Tests of the log of sent messages: bounded, repeats merged into one entry, no large content stored."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The shelf: kept messages, bounded, and their file."""
+"""Tests of the shelf of saved messages, its limits and its file."""
 
 from __future__ import annotations
 

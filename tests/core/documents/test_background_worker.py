@@ -1,4 +1,4 @@
-"""Work beside the window: the newest counts, failures come back, the thread ends."""
+"""Tests of the background worker: only the newest job runs, failures are raised, the thread ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The backpack: kept across starts, shared by several Studios, and nothing in it is ever thrown away."""
+"""Tests of the backpack: restored at the next start, shared by several Studios, no loss of items."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bad days of a behaviour's file: no room, cut anywhere, of another version, killed while it is saved."""
+"""Tests of behaviour files that are damaged, truncated, of another version or can't be saved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many blocks came, went and changed between two states of a behaviour."""
+"""Tests of counting added, removed and changed blocks between two states of a behaviour."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ Block = dict[str, object]
 
 
 def block(id: str, text: str = "", following: Block | None = None) -> Block:
-    """A block with a word in its gap, and what hangs below it."""
+    """Return a block with a text in its slot, and the block below it."""
     made: Block = {"id": id, "type": "robot_say"}
     if text:
         made["inputs"] = {"TEXT": {"shadow": {"id": f"{id} word", "type": "text", "fields": {"TEXT": text}}}}

@@ -1,4 +1,4 @@
-"""The open behaviour: edits are journalled, saving is atomic, damaged files are told in a sentence."""
+"""Tests of an open behaviour: edits are journalled, saving is atomic, damaged files are reported."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def document(request, journals: Path, journal_writer: BackgroundWorker[bool]) ->
 
 
 class SlowJournal(Journal):
-    """On a disk that takes nothing until it is let."""
+    """Journal whose writes block until the test releases them, as on a slow disk."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)

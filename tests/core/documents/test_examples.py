@@ -1,4 +1,4 @@
-"""Examples in the language of now: they compile, they speak it, and a person's own file stays as it is."""
+"""Tests of the translated examples: they compile and run, and files of the user are never translated."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FROM_OUTSIDE = ("robot_pepper_get_", "robot_pepper_do_", "messages_")
 
 @pytest.fixture(scope="module")
 def locale(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Every language, compiled from the translations of now."""
+    """Folder with all languages, compiled from the current translations."""
     from tools import words
 
     folder = tmp_path_factory.mktemp("locale")
@@ -37,7 +37,7 @@ def locale(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def language(request: pytest.FixtureRequest, locale: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The language of the parameter; Spanish without one."""
+    """Installed language: the fixture's parameter, or Spanish without one."""
     chosen: str = getattr(request, "param", "es")
     monkeypatch.setattr(i18n, "_current", None)
     i18n.install(chosen, locale)
@@ -46,7 +46,7 @@ def language(request: pytest.FixtureRequest, locale: Path, monkeypatch: pytest.M
 
 
 def blocks(value: object, above: str = "") -> Iterator[tuple[Mapping[str, object], str]]:
-    """(block, the type of the block around it) of all that is in the blocks."""
+    """Yield each block in the value with the type of its enclosing block, or "" at the top."""
     if isinstance(value, list):
         for each in value:
             yield from blocks(each, above)
@@ -64,7 +64,7 @@ def texts(example: BehaviourFile) -> list[str]:
 
 
 def names(example: BehaviourFile) -> list[str]:
-    """Of its variables and functions."""
+    """Return the names of the example's variables and functions."""
     variables = example.workspace.get("variables", [])
     defined = [block["fields"] for block, _above in blocks(example.workspace)
                if str(block["type"]).startswith("functions_define")]  # fmt: skip
@@ -91,7 +91,7 @@ def test_example_compiles_in_another_language(path: Path, language: str) -> None
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_translatable_example_texts_are_not_published_or_compared_with_data(path: Path) -> None:
-    """It would be translated, and they would not."""
+    """The text would be translated, but the programs and data on the other side would not."""
     for block, above in blocks(read_file(path).workspace):
         if block["type"] == "values_text":
             assert not above.startswith("messages_publish"), block

@@ -1,4 +1,4 @@
-"""A disk that is really full: nothing that was there is lost, it is said, and then all goes on."""
+"""Tests on a disk that is full: no file is lost, failures are reported, and writing resumes with space."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ print(json.dumps(told))
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
-    """What happened on a disk of 256 kB."""
+    """Results of the script that runs on a disk of 256 kB."""
     return SmallDisk(tmp_path_factory.mktemp("disk")).run(FULL)
 
 

@@ -1,4 +1,4 @@
-"""The journal: what a killed Studio leaves behind is offered, what a living one holds is not."""
+"""Tests of the journal: unsaved work of a killed Studio is offered, that of a running one is not."""
 
 from __future__ import annotations
 

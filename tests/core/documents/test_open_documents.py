@@ -1,4 +1,4 @@
-"""Several behaviours open at once: tabs, the current one, closing and opening again, the next start."""
+"""Tests of several open behaviours: tabs, the current one, closing, reopening, and the next start."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def journals(tmp_path: Path) -> Path:
 
 
 class Opens:
-    """Opens behaviours as Studio does, and ends their threads after the test."""
+    """Factory that opens behaviours as Studio does; their threads end after the test."""
 
     def __init__(self, journals: Path) -> None:
         self.journals, self.all = journals, list[Documents]()
@@ -54,7 +54,7 @@ def documents(opened: Opens) -> Documents:
 
 
 def all_kept(documents: Documents) -> bool:
-    """Waits for the journals."""
+    """Return whether all documents are written to their journals."""
     return all(document.is_on_disk for document in documents)
 
 
@@ -69,7 +69,7 @@ def names(documents: Documents) -> list[str]:
 
 
 def as_if_dead(journals: Path) -> None:
-    """The journals' process is gone."""
+    """Rewrite the journals as if their process no longer existed."""
     for journal in journals.glob("*.json"):
         entry = json.loads(journal.read_bytes())
         entry["pid"], entry["born_s"] = 2**22 + 5, 0.0

@@ -1,4 +1,4 @@
-"""A missing robot is one line, with the robots that can do its work and the virtual one."""
+"""Tests that a missing robot is one problem whose fixes are the suitable robots and the virtual one."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_missing_robot_problem_counts_nested_and_unstarted_blocks() -> None:
 
 
 def test_problem_button_describes_its_action() -> None:
-    """Nobody is told that a real robot is connected when a virtual one starts."""
+    """The label must not suggest that a real robot is connected when a virtual one starts."""
     (line,) = lines(speaks("Nao 3"), [pepper("Nao 3")], [])
     assert line.fixes == (Fix("Start a virtual Nao 3", "robot.virtual:Nao 3"),)
     (line,) = lines(speaks("Nao 3"), [], [])

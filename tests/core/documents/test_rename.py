@@ -1,4 +1,4 @@
-"""A behaviour gets another name: its file, versions, journal and place among the recent files follow."""
+"""Tests of renaming a behaviour: its file, versions, journal and entry among the recent files follow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tabs from one start to the next: whose come back, after a crash too; settings that take nothing."""
+"""Tests of restoring tabs at the next start, also after a crash and with read-only settings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.core.documents.test_open_documents import OTHER, STARTED, all_kept, a
 
 
 class Start:
-    """One start of Studio over the same folder."""
+    """One start of Studio on the same folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -30,7 +30,7 @@ class Start:
         return self.tabs.restore(unsaved_work(self.journals) if self.journals.exists() else [])
 
     def work(self) -> None:
-        """One file is open and is not saved."""
+        """Open a file, change it without saving, and save the tabs."""
         path = self.folder / "A.nepb"
         write_file(path, BehaviourFile("A", STARTED, {}))
         assert self.come_back() == []
@@ -42,7 +42,7 @@ class Start:
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Callable[[], Start]]:
-    """Starts Studio, and ends its documents after the test."""
+    """Function that starts Studio; its documents are closed after the test."""
     made: list[Start] = []
 
     def begin() -> Start:

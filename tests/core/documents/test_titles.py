@@ -1,4 +1,4 @@
-"""Behaviours are called as their files are, and no two of them the same."""
+"""Tests of document titles: derived from file names and unique."""
 
 from __future__ import annotations
 

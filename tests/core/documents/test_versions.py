@@ -1,4 +1,4 @@
-"""What files said before they were written over."""
+"""Tests of earlier versions, which keep the content of files that were overwritten."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_writing_a_file_changes_its_stamp(tmp_path: Path) -> None:
 
 
 def kept(path: Path, folder: Path, text: bytes, written_s: float, replaced_s: float) -> None:
-    """A version that was written then, and written over later."""
+    """Save a version of a file that was written at `written_s` and overwritten at `replaced_s`."""
     path.write_bytes(text)
     os.utime(path, (written_s, written_s))
     assert save_version(path, folder, lambda: replaced_s) is not None

@@ -1,4 +1,4 @@
-"""A workspace as the page's text or as blocks: parsed when it is asked for, compared without parsing."""
+"""Tests of workspaces as JSON text or as blocks: parsed on demand, compared without parsing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ONE = {"blocks": {"blocks": [{"type": "events_started", "id": "\u00e9\ud800"}]}}
 
 @pytest.fixture
 def parsed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The texts that were parsed."""
+    """Texts that were parsed during the test."""
     seen: list[str] = []
     before = deep_json.loads
 

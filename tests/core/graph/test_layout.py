@@ -14,7 +14,13 @@ from tests.nep.programs import eventually
 
 
 def graph(groups: dict[str, str], pairs: str = "", *, quiet: int = 0) -> NodeGraph:
-    """``groups``: letters by group; ``pairs``: "ab cd", who tells whom."""
+    """Return a graph of one-letter nodes.
+
+    Args:
+        groups: The letters of the nodes by group.
+        pairs: Connections as pairs of letters, publisher first: ``ab cd``.
+        quiet: Number of quiet nodes in each group.
+    """
     nodes = [DrawnNode(key, key, group, "program") for group, keys in groups.items() for key in keys]
     made = [
         GraphGroup(group, group, "", "monitor", len(keys), quiet, False)

@@ -1,4 +1,4 @@
-"""What messages draw on pictures: places as shares, and nothing that a painter could not bear."""
+"""Tests of annotations on images: normalized positions, and no values that can't be painted."""
 
 from __future__ import annotations
 

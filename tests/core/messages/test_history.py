@@ -1,4 +1,7 @@
-"""The history of a topic: bounded in number and bytes, numbers that stay, nothing decoded or borrowed."""
+"""Tests of a topic's history.
+
+It is bounded in messages and bytes, its message numbers are stable, and it stores undecoded copies.
+"""
 
 from __future__ import annotations
 

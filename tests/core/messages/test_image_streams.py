@@ -1,6 +1,6 @@
-"""Picture streams: only the newest is decoded, and only while somebody looks.
+"""Tests of image streams: only the newest image is decoded, and only while a panel shows it.
 
-The streams for tests of panels, which decode without a thread, keep to the same.
+The threadless fake that panel tests use must behave in the same way.
 """
 
 from __future__ import annotations

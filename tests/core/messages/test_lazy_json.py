@@ -1,4 +1,4 @@
-"""Large JSON looked into without decoding all of it: the same values as a whole decoding gives."""
+"""Tests of reading parts of large JSON lazily; the values must equal those of full decoding."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ VALUES = st.recursive(
 
 
 def whole(value: object) -> object:
-    """A lazy value, all of it decoded."""
+    """Return a lazy value completely decoded."""
     if isinstance(value, Mapping):
         return {key: whole(value[key]) for key in value}
     if isinstance(value, LazyList):

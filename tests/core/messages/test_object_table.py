@@ -1,4 +1,4 @@
-"""Lists of objects as tables: which they are, their columns, their order, and what spreadsheets get."""
+"""Tests of lists of objects as tables: detection, columns, order and export to spreadsheets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Messages as pictures: their colours and numbers, decoded as large as they are shown."""
+"""Tests of messages as images: colours and pixel values, decoded at the size at which they are shown."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def test_invalid_image_gives_an_error_message(sent: Message, words: str) -> None
 
 
 FAR = 3.4e38
-"""Nearly the largest float: the distance between it and its negative is none any more."""
+"""Value close to the largest float: the difference from its negative overflows."""
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_float_image_cannot_be_encoded_as_png() -> None:
 
 
 def png_of_size(side: int) -> Message:
-    """A small PNG whose head tells of many pixels."""
+    """Return a small PNG whose header declares an image of `side` x `side` pixels."""
     data = bytearray(cv2.imencode(".png", scene(8, 8))[1].tobytes())
     data[16:24] = side.to_bytes(4, "big") * 2
     data[29:33] = zlib.crc32(bytes(data[12:29])).to_bytes(4, "big")

@@ -1,4 +1,4 @@
-"""How pictures are shown: brighter, in colours of which a scale tells what they mean."""
+"""Tests of the appearance of images: brightness, contrast and colour scales."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""JSONPath queries over messages: what they find, what is wrong with them, and that none runs for ever."""
+"""Tests of JSONPath queries over messages: results, syntax errors and limits on their run time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Large messages are read elsewhere: in another thread, the newest only."""
+"""Tests of reading large messages in another thread, where only the newest pending one is read."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def taken(reader: MessageReader) -> ReadResult:
 
 
 def large(text: bytes) -> bytes:
-    """The same JSON, so large that it is looked into."""
+    """Return the JSON padded to a size at which it is read lazily."""
     return text + b" " * LARGE_BYTES
 
 
@@ -76,7 +76,7 @@ def test_reader_runs_in_another_thread(reader: MessageReader, monkeypatch) -> No
 
 
 class SlowRead:
-    """Stands in the place of reading: it waits until a test lets it go on."""
+    """Replacement of `read` that blocks until the test releases it."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.began, self.go_on = threading.Event(), threading.Event()

@@ -1,4 +1,4 @@
-"""Kept pictures: their names and folders; nothing is overwritten, nothing is left half."""
+"""Tests of saved images: file names, folders, no overwriting and no partial files."""
 
 from __future__ import annotations
 

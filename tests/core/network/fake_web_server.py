@@ -1,4 +1,4 @@
-"""A web server without sockets, and pages for it: what Studio asks of `nep.programs.web.WebServer`."""
+"""Fake web server without sockets, and pages for it; replaces `nep.programs.web.WebServer` in Studio."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nep.programs.web.server import WebSettings
 def page(
     page_id: int, *topics: PageTopic, title: str = "", origin: str = "http://lab.example"
 ) -> ConnectedPage:
-    """Return a page at 192.168.1.30, in Chrome."""
+    """Return a page connected from Chrome at 192.168.1.30."""
     return ConnectedPage(
         page_id,
         f"web_lab.example_{page_id}",
@@ -27,7 +27,7 @@ def page(
 
 
 class FakeWebServer:
-    """Notes what it is told; `pages` and `refusals` are a test's to set."""
+    """Fake web server that records its settings; tests set `pages` and `refusals`."""
 
     def __init__(self, settings: WebSettings | None = None) -> None:
         self.settings = settings if settings is not None else WebSettings()
@@ -67,7 +67,7 @@ class FakeWebServer:
         self.leave(page_id)
 
     def leave(self, page_id: int) -> None:
-        """Let a page close its connection."""
+        """Simulate that a page closes its connection."""
         self.pages = tuple(each for each in self.pages if each.id != page_id)
 
     def wait(self, _timeout_s: float) -> bool:
@@ -77,7 +77,7 @@ class FakeWebServer:
         self.has_ended = True
 
     def change_topic(self, page_id: int, **figures: float) -> None:
-        """Give the first topic of a page other figures."""
+        """Change the statistics of a page's first topic."""
         self.pages = tuple(
             replace(each, topics=(replace(each.topics[0], **figures), *each.topics[1:]))  # type: ignore[arg-type]
             if each.id == page_id

@@ -1,4 +1,4 @@
-"""Bad days of the stream, on a real network: nothing waits, nothing grows, and every number is exact."""
+"""Tests of malformed and very fast streams on a real network: no blocking, bounded memory, exact counts."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_malformed_count_is_exact_after_window_was_busy(session: Session, talker
 
 
 def ticking_s(session: Session, publisher: nep.Publisher, data: bytes, sent: int) -> float:
-    """How long the window's ticks work while so many messages are sent."""
+    """Return the CPU time in seconds that the window's ticks take while `sent` messages are published."""
     worked = 0.0
     for number in range(sent):
         publisher.publish_bytes(data)

@@ -1,4 +1,4 @@
-"""Whether messages can be read: exact while there is time for it, and said when there is not."""
+"""Tests of checking whether messages can be decoded: exact within a time budget, else marked as partial."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def messages(*data: bytes, codec: str = "json") -> list[Message]:
 
 
 class Clock:
-    """A clock that goes on by so much whenever it is read."""
+    """Fake clock that advances by `step_s` each time it is read."""
 
     def __init__(self, step_s: float = 0.0) -> None:
         self.now, self.step_s = 100.0, step_s
@@ -86,7 +86,7 @@ def test_malformed_message_allows_remaining_batch_to_use_reserve_time() -> None:
 
 
 class Reads(Clock):
-    """A clock that counts how often it is read."""
+    """Fake clock that counts how often it is read."""
 
     count = 0
 

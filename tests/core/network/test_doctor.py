@@ -1,4 +1,4 @@
-"""The doctor beside the window: looks in its own thread, one look at a time, and never vanishes."""
+"""Tests of the doctor in its background thread: one run at a time, and failures are reported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The console's lines about who came and who left."""
+"""Tests of the console lines about nodes and topics that were added or removed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bounded hand-over: newest kept, drops counted, nothing lost without a number."""
+"""Tests of the bounded mailbox: the newest messages are kept, dropped ones are counted exactly."""
 
 from __future__ import annotations
 

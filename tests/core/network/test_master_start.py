@@ -1,4 +1,4 @@
-"""Starting the master: in the background, told once why not, tried again more and more seldom."""
+"""Tests of starting the master in the background: a failure is reported once and retried with back-off."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture
 def foreign():
-    """The address of a program that is no master."""
+    """Address of a program that is no master."""
     with socket.socket() as held:
         held.bind(("127.0.0.1", 0))
         held.listen(8)
@@ -62,7 +62,7 @@ def test_running_master_is_joined(master) -> None:
 
 @pytest.fixture
 def free(monkeypatch) -> str:
-    """An address at which nobody is, and a master would meet no other."""
+    """Free address; the gateway is off, so that a master there meets no other master."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
@@ -91,7 +91,7 @@ def test_master_is_started_when_none_is_running(free) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="a program of one line is a shell's")
 def test_packaged_studio_starts_its_own_executable_as_master(free, monkeypatch, tmp_path: Path) -> None:
-    """It has no Python that knows "-m nep": it is the only program there, and takes Studio's options."""
+    """A packaged Studio contains no Python for ``-m nep``, only an executable with Studio's options."""
     studio = tmp_path / "nep-studio"
     studio.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" -m app "$@"\n', "utf-8")
     studio.chmod(0o700)

@@ -1,4 +1,4 @@
-"""Studio without any network: with the loopback it does its whole job, without it it says what is wrong."""
+"""Tests of Studio without a network: the loopback alone is sufficient, and a missing one is reported."""
 
 from __future__ import annotations
 

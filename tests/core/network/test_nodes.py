@@ -1,4 +1,4 @@
-"""The nodes as the window shows them: who is there, what they do, who is new, who vanished."""
+"""Tests of the list of nodes: their topics, and marks for new and vanished nodes."""
 
 from __future__ import annotations
 

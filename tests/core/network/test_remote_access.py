@@ -1,4 +1,4 @@
-"""Letting other computers connect, as the window asks for it."""
+"""Tests of allowing connections from other computers from the window."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nep.system.addresses import OwnAddress
 
 
 class World:
-    """A master that obeys or refuses, and what was posted to the window."""
+    """Fake master that accepts or rejects requests, and the events posted to the window."""
 
     def __init__(self):
         self.asked = []

@@ -1,4 +1,4 @@
-"""The live source: its node's name, what it missed, and how often it asks."""
+"""Tests of the live source: the name of its node, missed messages, and retries without a master."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Topics as a tree: folders by slashes, what is below them added up, and what a filter's words fit."""
+"""Tests of the tree of topics: folders, sums of their statistics, and the filter."""
 
 from __future__ import annotations
 

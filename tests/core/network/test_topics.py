@@ -1,4 +1,4 @@
-"""The topics as the window shows them: new, live, vanished; newest messages only while watched."""
+"""Tests of the list of topics: new, live and vanished ones; newest messages only while watched."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ REVISIONS = count(100)
 
 
 def view(*topics: TopicInfo, revision: int | None = None) -> GraphView:
-    """A graph; somebody came or went since the one before, unless it has the same revision."""
+    """Return a graph of these topics, with a new revision unless one is given."""
     number = next(REVISIONS) if revision is None else revision
     return GraphView(1, number, {"n1": NODE}, {topic.name: topic for topic in topics})
 

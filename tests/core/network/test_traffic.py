@@ -1,4 +1,4 @@
-"""What was shown of what was sent: exact, and only of the last 30 s."""
+"""Tests of the counts of sent and shown messages over the last 30 s."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_network_stats_are_read_from_the_graph() -> None:
 
 
 class Counted(dict[str, TopicInfo]):
-    """Topics that count how often somebody went through all of them."""
+    """Dictionary of topics that counts complete iterations."""
 
     times = 0
 

@@ -1,4 +1,4 @@
-"""A topic is subscribed while somebody looks."""
+"""Tests that a topic is subscribed to while at least one watch on it is active."""
 
 from __future__ import annotations
 

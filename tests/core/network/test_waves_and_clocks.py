@@ -1,4 +1,4 @@
-"""Bad days that a test makes by hand: waves of short-lived topics, clocks that jump."""
+"""Tests with thousands of short-lived topics and with clocks that jump."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.ui.fakes.network import Network
 
 
 class Clocks:
-    """Both clocks of a session, in the test's hand."""
+    """Fake monotonic and wall clock of a session."""
 
     def __init__(self) -> None:
         self.now, self.wall_ns = 100.0, 1_700_000_000_000_000_000

@@ -1,4 +1,4 @@
-"""Studio's web server: switches, settings that apply at once, and what is said about it."""
+"""Tests of Studio's web server: switches, settings that apply immediately, and its status messages."""
 
 from __future__ import annotations
 

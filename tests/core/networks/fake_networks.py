@@ -1,4 +1,4 @@
-"""Networks whose sources tell what a test says."""
+"""Networks with fake sources, whose events a test posts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInf
 
 
 class Fake:
-    """A source that a test tells what to tell."""
+    """Fake source that posts the events of a test."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class Fake:
 
 
 class World:
-    """Networks over fakes, and what was posted."""
+    """Networks with fake sources, and the events that these have posted."""
 
     def __init__(self, settings: Settings) -> None:
         self.made: list[Fake] = []
@@ -67,7 +67,7 @@ class World:
         return self.made[-1]
 
     def tell(self, event: object, now: float = 0.0, source: int = -1) -> None:
-        """The newest source tells this, and it is taken over."""
+        """Post an event from a source, by default the newest, and process it."""
         self.made[source].tell(event)
         self.networks.on_event(self.posted.pop(), now)
 

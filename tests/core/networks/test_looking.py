@@ -1,4 +1,4 @@
-"""Studio looks at real ROS 1 and ROS 2, each from a process of its own; see `looking_inside`."""
+"""Tests of observing real ROS 1 and ROS 2 networks, each in a separate process (`watching_child`)."""
 
 from __future__ import annotations
 

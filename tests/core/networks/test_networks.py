@@ -1,4 +1,4 @@
-"""Networks beside the native one: chosen by a person, told apart by name, grey when nobody answers."""
+"""Tests of additional networks: selected by the user, distinguished by name, grey without a connection."""
 
 from __future__ import annotations
 
@@ -264,7 +264,7 @@ def test_zenoh_network_is_observed_beside_the_native_network(session: Session) -
 
 
 class Teller:
-    """Stands for a node whose graph is gathered anew each time."""
+    """Fake node that returns the next of the given graphs on each query."""
 
     def __init__(self, *views: GraphView) -> None:
         self._views = list(views)

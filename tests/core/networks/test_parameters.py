@@ -1,4 +1,4 @@
-"""The parameters of a node as Studio shows and sets them."""
+"""Tests of showing and setting the parameters of a node in Studio."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def values(shown: NodeParameters) -> dict[str, object]:
 
 
 def settled(session: Session, shown: NodeParameters) -> str:
-    """The refusal, when the node has answered."""
+    """Wait until the node has replied, and return its rejection, or ""."""
     tick_until(session, lambda: not _refreshed(shown).setting)
     return shown.refusal
 

@@ -1,6 +1,8 @@
-"""Studio looks at ROS 1 or ROS 2, in a process of its own: rospy is for one process, DDS for one network.
+"""Program in which Studio observes ROS 1 or ROS 2.
 
-Run with the kind; says as JSON what it saw, while the other was there and after it had gone.
+It is a separate process because rospy can be initialized only once per process, and because the test of
+ROS 2 needs a network namespace. The argument is the kind of network. The program prints as JSON what
+Studio observed while the other node was running and after it had ended.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The recorder's process, as the window sees it: what it does, and what is wrong."""
+"""Tests of the client of the recorder process: commands, statistics and alerts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.nep.programs import eventually
 
 
 class OrdersOnly:
-    """Takes orders and does nothing."""
+    """Fake recorder process that stores commands and doesn't execute them."""
 
     def __init__(self) -> None:
         self.orders: list[Mapping[str, object]] = []
@@ -33,7 +33,7 @@ class OrdersOnly:
 
 
 class DrivenRecorder:
-    """A client whose processes do nothing but what a test says."""
+    """Recorder client with fake processes, whose events a test posts."""
 
     def __init__(self) -> None:
         self.alerts, self.lines, self.now = Alerts(), list[OrdersOnly](), 100.0

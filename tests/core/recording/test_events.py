@@ -1,4 +1,4 @@
-"""What the recorder is told of behaviours and alarms while they go on."""
+"""Tests of the events of runs and alarms that are sent to the recorder."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RUNNING = RunState("running", "Greeting", is_started=False, started_s=1.0)
 
 
 class Told:
-    """What was said, at times that go on by 10 ns each time that somebody looks."""
+    """Collected events; the clock advances by 10 ns each time it is read."""
 
     def __init__(self) -> None:
         self.now, self.said, self.to = 1000, list[tuple[str, dict[str, object]]](), set[str]()
@@ -34,7 +34,7 @@ class Told:
         self.to.add(to)
 
     def follow(self, *runs: RunState) -> list[dict[str, object]]:
-        """What is said of these states one after the other."""
+        """Return the events sent for these states of a run."""
         self.said.clear()
         for run in runs:
             self.events.update_run(run)

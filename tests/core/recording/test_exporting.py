@@ -1,4 +1,4 @@
-"""An export beside the window: its files, its progress, and giving it up."""
+"""Tests of exports in the background: files, progress and cancellation."""
 
 from __future__ import annotations
 

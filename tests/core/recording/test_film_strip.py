@@ -1,4 +1,4 @@
-"""A recording at a glance, and what part of it two times and some patterns mean."""
+"""Tests of the film strip of a recording, and of selecting a part by times and topic patterns."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COUNT = 40
 
 @pytest.fixture
 def look(tmp_path):
-    """/odom every 10 ms, and every tenth time a picture, the last of which is none."""
+    """Film strip of a recording with ``/odom`` every 10 ms and every tenth message an image, one invalid."""
     messages = [picture(seq) if seq % 10 == 5 else json_message(seq) for seq in range(COUNT)]
     messages[35] = Message("/camera", b"\xff\xd8none", "image", "image", stamp_ns=5, seq=9, publisher=9)
     record(tmp_path / "a.mcap", [messages])

@@ -1,4 +1,4 @@
-"""The list of recordings knows what is in each file, and never keeps the window waiting."""
+"""Tests of the list of recordings: the contents of each file, read without blocking the window."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where messages were lost is found without reading the recording."""
+"""Tests that lost messages are found without reading the whole recording."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PIECES, EACH = 128, 60  # with figures after each
 
 
 def numbers(gaps: dict[int, int]) -> Iterator[int]:
-    """Numbers of messages, with so many missing before each of these."""
+    """Yield sequence numbers; `gaps` maps the index of a message to the number of messages lost before it."""
     number = 0
     for place in itertools.count():
         number += 1 + gaps.get(place, 0)
@@ -35,7 +35,7 @@ def recording(path, gaps: dict[int, int]) -> None:
 
 @pytest.fixture
 def read_bytes(monkeypatch) -> list[int]:
-    """The lengths of the pieces that are read."""
+    """Lengths in bytes of the chunks that are read."""
     lengths: list[int] = []
     read = file_reader.read_chunk
 

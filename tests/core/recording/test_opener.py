@@ -1,4 +1,4 @@
-"""Recordings are read outside of Studio's process; one that takes too much, or kills it, is a sentence."""
+"""Tests of reading recordings in another process; one that is too large or crashes it is reported."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.nep.recordings.messages import json_message, record
 
 
 class Failing(LocalOpener):
-    """Opens nothing, or dies while its files are read."""
+    """Opener that fails, or whose recordings fail when they are read."""
 
     def __init__(self, error: RecordingError, opened: int = 0) -> None:
         self._error, self._opened = error, opened
@@ -40,7 +40,7 @@ class Failing(LocalOpener):
 
 
 class Dying(Recording):
-    """Its process is gone after opening."""
+    """Recording whose reader process dies after it was opened."""
 
     def __init__(self, path: Path, error: RecordingError) -> None:
         super().__init__(path)

@@ -1,4 +1,4 @@
-"""A session's recordings: begun, ended, kept; by a person, an alarm, and again after the next start."""
+"""Tests of a session's recordings: started and stopped by the user or an alarm, and settings kept."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NOW = datetime(2026, 11, 26, 22, 1, 5, tzinfo=timezone.utc)
 
 
 class Recorded:
-    """Recordings whose process does nothing but what a test says."""
+    """Recordings of a session with fake recorder processes."""
 
     def __init__(self, home: Path) -> None:
         self.home, self.alerts, self.lines, self.now = home, Alerts(), list[OrdersOnly](), 100.0

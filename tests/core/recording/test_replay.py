@@ -1,4 +1,4 @@
-"""An open recording as panels see it: topics, series, log, figures; and what a person does with it."""
+"""Tests of an open recording as panels see it: topics, series, log, statistics and playback controls."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LOST = 6 + 2
 
 
 def line(seq: int) -> Message:
-    """A line of a program's log."""
+    """Return a message of a program's log."""
     said = {"level": "warn", "node": "arm", "text": f"line {seq}", "pid": 1}
     data = json.dumps(said).encode()
     return Message(LOG_TOPIC, data, "json", LOG_TYPE, stamp_ns=START_NS + seq, seq=seq // 10, publisher=5)
@@ -29,7 +29,10 @@ def line(seq: int) -> Message:
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    """/a 10 ms apart, and every tenth a line of the log; so of /a's numbers eight are missing."""
+    """Recording with a message every 10 ms: every tenth a log line, the others on ``/a``.
+
+    Eight sequence numbers of ``/a`` are missing.
+    """
     path = tmp_path_factory.mktemp("recordings") / "a.mcap"
     messages = [
         line(seq) if seq % 10 == 5 else json_message(seq + 2 * (seq > 30), "/a") for seq in range(COUNT)
@@ -45,7 +48,7 @@ def whole(path):
 
 
 class Shown:
-    """A replay without its thread: a tick does what the thread does first."""
+    """Replay without its thread; a tick does the work of the thread first."""
 
     def __init__(self, path) -> None:
         self.now, self.alerts = 10.0, Alerts()
@@ -74,7 +77,7 @@ def shown(path):
 
 
 class Taker:
-    """Takes a series, as a plot does."""
+    """Consumer of a series, as a plot is."""
 
     def __init__(self) -> None:
         self.seqs: list[int | None] = []

@@ -1,4 +1,4 @@
-"""What a recording plays goes to the live network: what is armed, as it was, when it is played, or not."""
+"""Tests of publishing a replayed recording on the live network: selected topics, unchanged, in time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ COUNT = 60
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """/a and /b by turns, 10 ms apart, a picture in the middle, a speed of a base at the end."""
+    """Recording that alternates ``/a`` and ``/b`` every 10 ms.
+
+    It has an image in the middle and a velocity command of a base at the end.
+    """
     path = tmp_path_factory.mktemp("recordings") / "a.mcap"
     messages = [json_message(seq, topic=("/a", "/b")[seq % 2]) for seq in range(COUNT)]
     messages[31] = picture(31)
@@ -45,7 +48,7 @@ def whole(path: Path) -> list[tuple[int, Message]]:
 
 
 class Played:
-    """A source without its thread, and what it gives to who sends."""
+    """Replay source without its thread, and the messages that it forwards."""
 
     def __init__(self, path: Path, sent: set[str], watched: str = "") -> None:
         self.clock = Clock()
@@ -168,7 +171,7 @@ def test_watch_on_sent_topic_receives_its_newest_message(played, whole):
 
 
 class TestPublisher:
-    """Heard by two; writes down what is published."""
+    """Fake publisher with two subscribers that records what is published."""
 
     __test__ = False
 
@@ -186,7 +189,7 @@ class TestPublisher:
 
 
 class TestNode:
-    """Makes such publishers; a topic named /bad can't be published."""
+    """Fake node that creates `TestPublisher` objects; the topic ``/bad`` can't be published."""
 
     __test__ = False
 

@@ -1,4 +1,4 @@
-"""What a recording gives when it is played: the same as live, at the playhead, whatever a person does."""
+"""Tests of the replay source: messages identical to the live ones, up to the playhead, also after seeking."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COUNT = 90
 
 
 class Clock:
-    """Stands still until it is turned."""
+    """Fake clock that advances only when a test sets it."""
 
     def __init__(self) -> None:
         self.now = 50.0
@@ -30,7 +30,7 @@ class Clock:
 
 
 class Pictures:
-    """Writes down which pictures there were."""
+    """Fake image streams that record the offered images."""
 
     def __init__(self) -> None:
         self.shown: dict[str, Message] = {}
@@ -44,7 +44,7 @@ class Pictures:
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    """/a and /b by turns, a picture in the middle, /rare twice."""
+    """Recording that alternates ``/a`` and ``/b``, with an image in the middle and ``/rare`` twice."""
     path = tmp_path_factory.mktemp("recordings") / "a.mcap"
     messages = [json_message(seq, topic=("/a", "/b")[seq % 2]) for seq in range(COUNT)]
     messages[45] = picture(45)
@@ -55,13 +55,13 @@ def path(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def whole(path):
-    """(time, message) of all of it."""
+    """All (time in ns, message) pairs of the recording."""
     with Recording(path) as recording:
         return [(log_ns, message) for log_ns, message in recording.read()]
 
 
 class Replayed:
-    """A source without its thread: it goes on when the test says so."""
+    """Replay source without its thread, advanced by the test."""
 
     def __init__(self, path: Path, *topics: str) -> None:
         self.clock, self.pictures = Clock(), Pictures()

@@ -1,4 +1,4 @@
-"""The part of time that a time line shows, and how its times are written."""
+"""Tests of the visible range of a timeline and the format of its times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs and alarms of a recording, as its recorder was told of them; of damaged ones what fits."""
+"""Tests of the spans of runs and alarms in a recording, also from damaged entries."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def at(step: int) -> int:
 
 @pytest.fixture
 def found(tmp_path):
-    """What is found in a recording of ten messages in which this was said after some of them."""
+    """Function that records ten messages and the given entries, and returns the spans of the recording."""
 
     def make(*said: tuple[int, str, object]):
         path = tmp_path / "a.mcap"

@@ -1,4 +1,4 @@
-"""What a person chose to record: kept in words that settings can hold, and read back whatever they hold."""
+"""Tests of the selection of topics to record: stored as text in the settings and parsed from any value."""
 
 from __future__ import annotations
 

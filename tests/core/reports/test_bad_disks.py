@@ -1,4 +1,4 @@
-"""A disk that is really full, and one that can't be written: nothing half is left, and Studio goes on."""
+"""Tests of reports on a full and on a read-only disk: no partial files, and Studio continues."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A child of Studio that crashes is logged with what it said, and a report is kept; one that ends is not."""
+"""Tests that a crashed child process is logged and reported, but not one that ends as expected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What counts as a crash, and how a process says where it was."""
+"""Tests of detecting crashes, and of the crash location that a process prints."""
 
 from __future__ import annotations
 

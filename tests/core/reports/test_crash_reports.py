@@ -1,4 +1,4 @@
-"""Crash reports: kept for the owner alone, ten at most, and told to a person once."""
+"""Tests of crash reports: private to their owner, ten at most, shown to the user once."""
 
 from __future__ import annotations
 

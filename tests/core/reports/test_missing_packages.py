@@ -1,4 +1,4 @@
-"""`nep-studio` without the extra ``studio``, as a plain `pip install` of the wheel leaves it."""
+"""Tests of `nep-studio` without the extra ``studio``, as after a plain `pip install` of the wheel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Missing system libraries of Qt are named with the packages that bring them."""
+"""Tests that missing system libraries of Qt are named with the packages that contain them."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_package_names_match_the_distribution_release(release: dict[str, str], p
 
 
 def needed(path: Path) -> Iterator[str]:
-    """The libraries that an ELF file of 64 bits names as needed."""
+    """Yield the names of the libraries that a 64-bit ELF file needs."""
     with path.open("rb") as file:
         header = file.read(64)
         offset, size, count = (

@@ -1,4 +1,4 @@
-"""What leaves this computer in a report: neither the name of the home folder nor what a setting holds."""
+"""Tests that a report contains neither the path of the home folder nor the values of private settings."""
 
 from __future__ import annotations
 

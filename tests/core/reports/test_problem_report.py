@@ -1,4 +1,4 @@
-"""The report of a problem: what goes into the zip, what never does, and disks that do not take it."""
+"""Tests of the problem report: contents of the zip file, excluded data, and disks that can't be written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether Studio ended in order: runs that end well leave nothing, those that crash are told once."""
+"""Tests of detecting how Studio ended: a clean exit leaves no files, a crash is reported once."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_running_window_is_not_a_crash(place: Place) -> None:
 
 
 def entry(place: Place, **other: object) -> Path:
-    """The mark of a run whose process has gone."""
+    """Write the mark file of a run whose process no longer exists."""
     place.runs.mkdir(exist_ok=True)
     said = {"pid": 2**22 + 7, "began_s": 4_000_000_000.0, "version": "0.0.9", "asked": False, **other}
     mark = place.runs / "mark.json"
@@ -141,7 +141,7 @@ def test_exit_by_computer_restart_is_not_a_crash(place: Place) -> None:
 
 
 def test_reused_pid_is_recognized_by_process_start_time(place: Place) -> None:
-    """On a disk without locks a process is known by its number and its age."""
+    """On a disk without file locks, a process is identified by its PID and start time."""
     entry(place, pid=os.getpid(), began_s=4_000_000_000.0)
     assert place.run().left() == [], "as old as the mark says: it lives"
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as younger:

@@ -1,4 +1,4 @@
-"""Which versions ran here: kept when another one runs, told in a report, and safe to read from any file."""
+"""Tests of the history of Studio versions: stored when the version changes, included in reports, robust."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The words that programs wait for, offered to a person who speaks to a robot."""
+"""Tests of suggesting the words that programs wait for to a user who speaks to a robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A robot that a bridge sent a command to is entered among those that a Stop must name."""
+"""Tests that a robot commanded through a bridge is recorded as moved, so that Stop includes it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ ROBOT = parse(thing_description(ROVER.thing_model, "Arm"))
 
 
 def view(**counts: int) -> GraphView:
-    """A graph in which nodes of these names publish commands; "bridge" announces itself as a bridge."""
+    """Return a graph in which nodes with these names have published that many commands.
+
+    The node `bridge` announces itself as a bridge.
+    """
 
     def publishers(names: list[str]) -> tuple[PublisherInfo, ...]:
         return tuple(

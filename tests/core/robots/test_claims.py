@@ -1,4 +1,4 @@
-"""Programs that say that they are somebody's robot: the first one is, whatever the others say."""
+"""Tests of several programs that announce the same robot: only the first one is accepted."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def the_link(session: Session, name: str = "Pepper") -> RobotLink:
 
 
 class Clock:
-    """Stands still until somebody moves it."""
+    """Fake clock that advances only when a test sets it."""
 
     now = 0.0
 
@@ -59,7 +59,7 @@ class Clock:
 
 
 def claimed(session: Session, id: str) -> str:
-    """The words of the alert about a claim, as soon as it is there."""
+    """Wait for the alert about a claim and return its text."""
     tick_until(session, lambda: session.alerts.has(f"claim:{id}"))
     (alert,) = (each for each in session.alerts.active if each.id == f"claim:{id}")
     assert alert.severity == "error"
@@ -73,7 +73,7 @@ def stop_is_proven(session: Session) -> None:
 
 
 class Studio:
-    """Studio's side of the contract: a session, and what a person sees of it."""
+    """Participant under test: a session of Studio, and what a user sees of it."""
 
     told: ClassVar = {
         "another topic": r".*/Evil/description announces Pepper.*",
@@ -110,7 +110,7 @@ class Studio:
         assert (call.is_running, call.state) == (False, states[-1])
 
     def knows(self, publisher: nep.Publisher) -> bool:
-        """The graph shows it, with what its node serves."""
+        """Return whether Studio's graph contains the publisher."""
         graph = self.session.graph
         return graph is not None and publisher._spec.id in {
             each.id for each in graph.topics["/Pepper/answer"].publishers
@@ -134,7 +134,7 @@ class Studio:
         return self.session.runs.view().title
 
     def robots(self) -> Mapping[str, tuple[str, str]]:
-        """Those that are connected; what Studio has of Pepper is what it had before."""
+        """Return the connected robots' command topics and node IDs by name; Pepper must be unchanged."""
         assert self.session.fleet.link("Pepper") is self.link
         assert (self.link.robot, self.link.identity) == self._before
         links = [link for link in self.session.fleet.links if link.is_connected]
@@ -148,7 +148,7 @@ class Studio:
 
 
 class TestStudio(WhoseWordsCount):
-    """What every side owes, of Studio."""
+    """Sender checks of every participant, run for Studio."""
 
     @pytest.fixture
     def side(self, session: Session) -> Studio:
@@ -211,7 +211,7 @@ def test_restarted_robot_replaces_its_previous_program(session: Session, master:
 def test_new_program_with_name_of_a_moving_robot_does_not_confirm_its_stop(
     session: Session, master: Master, pepper: WireRobot
 ) -> None:
-    """It is frozen, so the master unlists it; the new one answers, and the old one may still move."""
+    """The master unlists a frozen driver. A new program then replies, but the robot may still move."""
     link = the_link(session)
     session.document.apply_edit(workspace(started(block("control_wait", SECONDS=number(600)))))
     session.runs.run()
@@ -322,7 +322,7 @@ def test_number_of_announced_robots_is_limited_and_reported() -> None:
 
 
 def _two_programs(*announcing: str) -> GraphView:
-    """A graph in which these of the nodes "first" and "second" announce Pepper, in this order."""
+    """Return a graph in which these nodes announce Pepper, in this order."""
     ids = {"first": 1, "second": 2, **{f"crowd {number}": number for number in range(10, 30)}}
     nodes = {name: NodeInfo(name, name, "here", ids[name], "python", "native", 0) for name in announcing}
     publishers = tuple(
@@ -341,7 +341,7 @@ def _said_by(publisher: int) -> Batch:
 
 @pytest.mark.parametrize("crowd", [0, 20])
 def test_robot_returns_after_another_program_used_its_name(crowd: int) -> None:
-    """Its latched description came once, over a connection that lasts; nobody sends it again."""
+    """The latched description was sent once, on a connection that still exists; it isn't sent again."""
     opened: list[str] = []
     announcements = Announcements(Watches(opened.append, opened.remove), Senders())
     announcements.update(_two_programs("first"))
@@ -403,7 +403,7 @@ def test_invalid_description_is_reported_and_the_previous_one_stays_valid(
 
 
 def test_parsing_repeated_descriptions_uses_at_most_a_fifth_of_main_thread_time() -> None:
-    """And whoever has just come is read before those who repeat themselves."""
+    """Descriptions of new publishers are parsed before repeated ones."""
     clock = Clock()
     announcements = Announcements(Watches(len, len), Senders(), clock)
     topics = {"/Pepper/description": 1, "/Again/description": 2}

@@ -1,4 +1,4 @@
-"""Reports of publishers for robots' commands that can't be opened or closed."""
+"""Tests of reporting command publishers of robots that can't be opened or closed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Alerts about data that can't be read: one for each topic, with its exact count, cured by good messages."""
+"""Tests of alerts about malformed data: one per topic with an exact count, resolved by valid messages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from nep.protocol.graph_view import Alert, GraphView, PublisherInfo, SubscriberI
 
 
 class Case:
-    """A health that looks at nothing but what the test gives it."""
+    """Health of a network whose topics, robots and check results a test sets."""
 
     def __init__(self) -> None:
         self.now = 50.0
@@ -206,7 +206,7 @@ def camera(name: str, subscribers: int) -> TopicInfo:
 
 
 def test_hidden_camera_of_second_robot_is_not_reported_as_silent(case: Case) -> None:
-    """A virtual robot sends its pictures only while somebody looks."""
+    """A virtual robot publishes images only while its camera is watched."""
     case.links += [seeing("Pepper"), seeing("Turtle")]
     both = {f"/{name}/camera": camera(name, name == "Pepper") for name in ("Pepper", "Turtle")}
     case.topics.update(GraphView(1, 1, {}, both), 0)

@@ -1,4 +1,4 @@
-"""What Health says of one robot, fact by fact."""
+"""Tests of the single facts in the health report of a robot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def seconds(age_s: float) -> str:
 
 
 class Case:
-    """A robot that is well, with all its topics."""
+    """Healthy robot with all its topics."""
 
     def __init__(self) -> None:
         self.link = RobotLink(

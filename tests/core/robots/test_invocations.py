@@ -1,4 +1,4 @@
-"""Tries of actions: answered, waiting, too long, silent robots, answers to others."""
+"""Tests of trying actions by hand: replies, waiting, timeouts, silent robots and replies to other senders."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from app.robots.turtle import ROBOT
 
 @dataclass
 class Bench:
-    """Tries with one robot, a clock, and what was sent to it."""
+    """Manual invocations on one robot, with a fake clock and a log of sent commands."""
 
     now: float = 100.0
     sent: list[Payload] = field(default_factory=list)

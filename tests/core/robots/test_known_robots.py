@@ -1,4 +1,4 @@
-"""Robots that were here once are known at the next start, with when they were last seen."""
+"""Tests of the list of known robots, which is saved with the time each was last seen."""
 
 from __future__ import annotations
 

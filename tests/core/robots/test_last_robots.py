@@ -1,4 +1,4 @@
-"""The virtual robots that a person worked with come back at the next start."""
+"""Tests of starting the virtual robots of the last session at the next start."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from app.core.storage.settings import Settings
 
 
 class Launcher:
-    """Starts nobody; knows who was wanted."""
+    """Fake launcher that records requested robots and starts none."""
 
     def __init__(self) -> None:
         self.wanted: dict[str, str] = {}
@@ -21,7 +21,7 @@ class Launcher:
 
 
 def next_start(folder: Path) -> dict[str, str]:
-    """Who is wanted after a start of Studio."""
+    """Return the robots that a start of Studio requests, as models by name."""
     launcher = Launcher()
     LastRobots(Settings(folder)).start(launcher)
     return launcher.wanted

@@ -1,4 +1,7 @@
-"""The wish for a virtual robot: kept while it is not known who is there, and when the one there has ended."""
+"""Tests of requests to start a virtual robot.
+
+A request waits until the running robots are known, and until a running robot of that name has ended.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,7 @@ from tests.ui.fakes.processes import Process
 
 
 class World:
-    """A clock, who is known to be there, and the processes that were started."""
+    """Launcher with a fake clock, a settable state of the existing robot, and the started processes."""
 
     def __init__(self) -> None:
         self.now = 100.0

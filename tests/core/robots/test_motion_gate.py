@@ -1,4 +1,7 @@
-"""A person is asked before anything is published that moves a real robot: shelf, keys, clicks and replays."""
+"""Tests of the permission that is requested before a message moves a real robot.
+
+Sources of messages: the message shelf, keys, clicks and replays.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ ORDER = SavedMessage("a", "Go", TOPIC, "json", '{"op": "invoke"}')
 
 
 def description(*, virtual: bool) -> dict[str, object]:
-    """A robot that does not call its command topic so."""
+    """Return the description of a robot with a custom command topic."""
     text = json.dumps(thing_description(ROBOT.thing_model, "Rover")).replace("/Rover/command", TOPIC)
     made = json.loads(text)
     made["rb:robot"]["virtual"] = virtual
@@ -34,7 +37,7 @@ def description(*, virtual: bool) -> dict[str, object]:
 
 
 class Robots:
-    """Robots that a test lets come."""
+    """Fake fleet whose robots a test connects."""
 
     def __init__(self) -> None:
         self.movable: tuple[Robot, ...] = ()
@@ -53,7 +56,7 @@ def rover() -> Robot:
 
 @contextmanager
 def real_robot(session: Session, master: str) -> Iterator[list[object]]:
-    """A real robot that Studio knows; what it is told."""
+    """Payloads received by a real robot that the session's fleet has connected."""
     told: list[object] = []
     with nep.node("rover", master=master) as node:
         announced = node.new_pub("/Rover/description", "robot/description", latched=True)

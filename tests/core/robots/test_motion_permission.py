@@ -1,4 +1,4 @@
-"""May this robot move? Asked once for each real robot, before it moves; never for virtual ones."""
+"""Tests of the motion permission: requested once per real robot, never for virtual robots."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from app.robots.turtle import ROBOT
 
 @pytest.fixture
 def rover() -> Robot:
-    """A real robot on two wheels."""
+    """Return a real robot with two wheels."""
     return replace(parse(thing_description(ROBOT.thing_model, "Rover")), virtual=False)
 
 
@@ -90,7 +90,7 @@ def test_new_question_replaces_the_previous_one(rover) -> None:
 
 
 def program_of(source: str) -> Program:
-    """A program whose blocks make these statements."""
+    """Return a program with this source and the robot actions that it calls."""
     return Program("p", source, source, {}, actions=invoked_actions(ast.parse(source).body))
 
 

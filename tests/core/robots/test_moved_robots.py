@@ -1,4 +1,7 @@
-"""Ledger of robots that may move: entered when told to, removed by proof, a seen end, or a person."""
+"""Tests of the ledger of robots that may be moving.
+
+A robot is added by a command and removed by a confirmed stop, the end of its program or a user.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ OLD, NEW = Identity("old", "driver"), Identity("new", "driver")
 
 
 class Ledger(MovedRobots):
-    """A ledger of robots whose program is ``now``; those in ``ended`` do not run any more."""
+    """Ledger of robots whose current program is ``now``; programs in ``ended_programs`` have ended."""
 
     def __init__(self) -> None:
         self.now, self.ended_programs = OLD, set[Identity]()
@@ -106,7 +109,7 @@ def test_recorded_motions_are_limited_without_removing_a_moving_robot(ledger: Le
 
 
 def newcomer_after(ledger: Ledger, graphs: int) -> None:
-    """Command a robot, which finishes; a twin appears in the graph after ``graphs`` others."""
+    """Complete an action of a robot, then add a second program of its name after this many other graphs."""
     ledger.record_command(["Pepper"], "form", id="1")
     ledger.end_motion("Pepper", "1", OLD)
     for _ in range(graphs):

@@ -1,6 +1,6 @@
-"""Pause while the robot drives: it stands still at once, its heartbeat goes on, and go on does the rest.
+"""Tests of Pause while a robot drives: it stops at once, its heartbeat goes on, Resume ends the walk.
 
-Everything is real: the virtual robot's process, the program's process, the network between them.
+The virtual robot and the program are real processes with a real network between them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ HELD_S = 1.6  # longer than the robot's patience with a program that says nothin
 
 
 class Pose:
-    """Where the robot says that it is."""
+    """Poses that the robot reports, with the time at which each was received."""
 
     def __init__(self, node: nep.Node) -> None:
         self.changed = threading.Condition()
@@ -51,7 +51,7 @@ class Pose:
             assert self.changed.wait_for(ready, within_s), self.seen[-3:]
 
     def until_still(self) -> None:
-        """Wait until it says the same place again and again; it tells it eight times a second."""
+        """Wait until several consecutive poses are equal; the robot reports eight poses per second."""
         now = len(self.seen)
         self.until(
             lambda: (
@@ -62,7 +62,7 @@ class Pose:
         )
 
     def far(self) -> float:
-        """How far it is from where it was first."""
+        """Return the distance in metres between the first and the newest pose."""
         if not self.seen:
             return 0.0
         return math.dist(self.seen[0][1:], self.seen[-1][1:])

@@ -1,4 +1,4 @@
-"""A robot that says itself that it may still move: what it says stands everywhere, and nothing looks well."""
+"""Tests of a robot that reports that it may still move: the report is shown everywhere."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ SAID = "Arm may still move: the brake does not answer"
 
 
 class ArmBody:
-    """An arm whose brake does not answer while a test says so."""
+    """Robot arm whose stop fails while ``stuck`` is set."""
 
     stuck = True
 
     def __init__(self, link: Link) -> None:
-        """Nothing to connect to."""
+        """Ignore the link: there is no device."""
 
     @action("wave", category="Movement", icon="hand")
     def wave(self, call: Call) -> None:
@@ -41,7 +41,7 @@ class ArmBody:
 
     @safe_stop(watchdog_s=5)
     def stop(self) -> None:
-        """Refuse."""
+        """Raise `Failed` while the brake is stuck."""
         if self.stuck:
             raise Failed("the brake does not answer")
 
@@ -159,14 +159,14 @@ def test_run_prints_the_rejection_message_of_the_robot(master: Master, arm: Driv
 
 @pytest.fixture
 def patient(session: Session, monkeypatch: pytest.MonkeyPatch) -> Session:
-    """Waits for the answers to a stop as long as a test needs."""
+    """Session with stop timeouts longer than any test."""
     monkeypatch.setattr("app.core.robots.stop.stopper.STOP_TIMEOUT_S", 120.0)
     monkeypatch.setattr("app.core.robots.stop.stopper.MAX_STOP_TIMEOUT_S", 120.0)
     return session
 
 
 def answers(session: Session, robot: WireRobot, count: int = 1) -> None:
-    """It answers so many stops that it heard and kept silent about."""
+    """Wait until the robot has received ``count`` stops, then send the replies that it withheld."""
     tick_until(session, lambda: len(robot.heard("stop")) >= count, LONG_S)
     for command in robot.heard("stop"):
         robot._say(command, "succeeded")
@@ -187,7 +187,6 @@ def test_pending_stop_is_shown_as_not_ready_everywhere(patient: Session, pepper:
 
 
 def test_first_stop_replies_are_shown_while_others_are_pending(patient: Session, master: Master) -> None:
-    """One is proven, one refuses, one is silent: the first two are known before the third."""
     robots = {name: WireRobot(master.address, name) for name in ("Good", "Bad", "Deaf")}
     try:
         links = {name: the_link(patient, name) for name in robots}
@@ -233,7 +232,7 @@ def pepper(master: Master) -> Iterator[WireRobot]:
 
 
 def lives(pepper: WireRobot, *not_ended: str) -> None:
-    """A sign of life, as the kit gives it."""
+    """Publish a heartbeat with the robot parts that are still moving, in the format of the robot kit."""
     error = f"Pepper may still move: {', '.join(not_ended)} has not ended" if not_ended else None
     told = {"op": "alive", "id": "", "action": "", "state": "running"}
     pepper._answer.publish({**told, "not_ended": list(not_ended), "error": error})

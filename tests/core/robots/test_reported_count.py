@@ -1,4 +1,4 @@
-"""Counts in a robot's signs of life; a robot may send anything."""
+"""Tests of the counts in a robot's heartbeats, which may contain any value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Robots that die, hang, lie and flood: the block says so within seconds, Stop tells the truth, all recover.
+"""Tests of robots that die, hang, send false replies or flood the network, and of the recovery from it.
 
 The robots, the programs and the master are real processes and threads; only the window is missing.
 """
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="processes are frozen
 
 
 class Turtles:
-    """Turtles as processes."""
+    """Turtle robots in processes of their own."""
 
     def __init__(self, address: str) -> None:
         self.address = address
@@ -95,7 +95,7 @@ def says_so_at_the_block(session: Session) -> None:
 
 
 def well_again(session: Session, turtles: Turtles) -> None:
-    """A person says that it stands still; then it can be used as before."""
+    """Confirm as a user that the robot stands still, then check that it can be used again."""
     there(session)
     session.runs.confirm_stopped()
     runs(session, turtles)
@@ -141,7 +141,7 @@ def test_robot_that_hangs_during_an_action_is_reported(session: Session, turtles
 
 
 class Liar:
-    """Announces itself as a Turtle and answers as a test says."""
+    """Fake robot that announces itself as a Turtle and sends the replies of the test."""
 
     def __init__(self, address: str) -> None:
         self.node = nep.node("liar", master=address)
@@ -172,7 +172,7 @@ def liar(master: Master) -> Iterator[Liar]:
 
 @pytest.fixture
 def tried(session: Session, liar: Liar) -> Invocation:
-    """A move that the liar has got."""
+    """Start a move and wait until the fake robot has received its command."""
     there(session)
     made = session.fleet.invoke("Turtle", "move", {"distance": 0.5})
     tick_until(session, lambda: liar.commands)
@@ -206,11 +206,11 @@ def test_malformed_replies_are_ignored(session: Session, liar: Liar, tried: Invo
 
 
 MAX_CALLS_A_TICK = 64 * MAX_MESSAGES_PER_TOPIC
-"""Limit of function calls for the answers of a full topic, about 48 each; independent of the load."""
+"""Limit of function calls per tick for the replies of a full topic, about 48 each, on any machine."""
 
 
 def calls_of(function: Callable[[], object]) -> int:
-    """How many functions are called in this thread while ``function`` runs: work, whatever the time."""
+    """Return the number of function calls in this thread while ``function`` runs, a timeless measure."""
     count = 0
 
     def called(_frame: FrameType, event: str, _argument: object) -> None:

@@ -1,4 +1,4 @@
-"""Robots that go away are forgotten beyond a limit, except those that a Stop must name."""
+"""Tests of the eviction of robots that left; robots that a Stop must name are kept."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class CountingPublisher:
 
 
 class Strangers:
-    """A fleet whose network is made of the robots that a test invents."""
+    """Fleet with a fake network of invented robots."""
 
     def __init__(self) -> None:
         self.clock, self.watched, self.published = SimulatedClock(), set[str](), Counter[str]()
@@ -61,7 +61,7 @@ class Strangers:
             job(cast("Node", self))
 
     def come(self, name: str) -> RobotLink:
-        """A robot of this name is announced."""
+        """Announce a robot of this name and return its link."""
         topics = RobotTopics(*(topic_of(name, leaf) for leaf in ("description", "command", "answer")))
         made = replace(ANY, name=name, title=name, virtual=False, sensors=(), events=(), topics=topics)
         self.fleet.connect(made, topics.description, Identity(f"node of {name}", name, "elsewhere", 1))
@@ -70,13 +70,13 @@ class Strangers:
         return link
 
     def leave(self) -> None:
-        """Everybody is gone."""
+        """Remove all robots from the graph."""
         self.clock.move_to(self.clock.now() + 1)
         self._revision += 1
         self.fleet.update(GraphView(1, self._revision))
 
     def pass_by(self, count: int, *, runs_jobs: bool = True) -> None:
-        """So many robots under new names come, a hundred at a time, and go."""
+        """Connect ``count`` robots with new names and remove them, a hundred at a time."""
         for number in range(count):
             self.come(f"Invented{self._revision}x{number}")
             if number % 100 == 99:

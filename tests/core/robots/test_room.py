@@ -1,4 +1,4 @@
-"""The room as Studio has it: shared with the robots and other Studios, kept between starts."""
+"""Tests of the session's room: shared with robots and other Studios, restored at the next start."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from nep.protocol.graph_view import GraphView, TopicInfo
 
 
 class Studio:
-    """A room with a clock that goes on when a test says so, and what it publishes."""
+    """Room with a clock that the test sets, and the messages that it publishes."""
 
     def __init__(self, folder: Path) -> None:
         self.now = 100.0

@@ -1,4 +1,4 @@
-"""Who may prove a stop: the robot's own program. Strangers, twins and lines that fail prove nothing."""
+"""Tests of which replies confirm a stop: only those of the robot's own program."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def stopper(master: Master, pepper: WireRobot) -> Iterator[RobotStopper]:
 
 
 class Stranger:
-    """A program that answers every stop in Pepper's name."""
+    """Foreign program that replies to every stop in Pepper's name."""
 
     def __init__(self, address: str) -> None:
         self.node = nep.node("stranger", master=address)
@@ -75,7 +75,7 @@ def test_foreign_reply_does_not_confirm_stop_of_a_frozen_robot(stopper, pepper, 
 
 
 def test_foreign_node_that_only_replies_is_named(master, stopper, pepper) -> None:
-    """It has guessed the id of the stop: it read it on the command topic and left again."""
+    """The foreign node can read the id of the stop on the command topic without staying subscribed."""
     pepper.silent = {"stop"}
     with nep.node("liar", master=master.address) as liar:
         forged = liar.new_pub("/Pepper/answer", "robot/answer")
@@ -151,7 +151,7 @@ def test_first_program_that_announces_a_robot_counts_as_the_robot(master, stoppe
 
 
 def test_stop_is_also_sent_to_topics_of_earlier_descriptions(master, stopper, pepper) -> None:
-    """The robot says that its commands are elsewhere now, and still hears the old topic only."""
+    """A robot may announce new command topics while it still reads only the old one."""
     moved = RobotTopics("/Pepper/description", "/Pepper/other_command", "/Pepper/other_answer")
     changed = replace(pepper.described, topics=moved)
     stopper.set_robots([StopTarget(changed, earlier_topics=(pepper.described.topics,))])
@@ -171,7 +171,7 @@ def test_robot_that_did_not_receive_stop_is_named() -> None:
 
 
 class Broken:
-    """A node that has no room for publishers of some topics until it is fixed."""
+    """Node that fails to open publishers of the topics in ``full``."""
 
     def __init__(self, node: nep.Node) -> None:
         self._node = node
@@ -244,7 +244,7 @@ def test_late_stop_reply_is_accepted(stopper, pepper) -> None:
 
 
 def test_late_reply_callback_can_use_the_stopper(stopper, pepper) -> None:
-    """The answer waited until the master told whose it is: whoever hears that is told with no lock held."""
+    """A late reply waits until the master identifies its sender; the callback then runs without a lock."""
     pepper.silent = {"stop"}
     free: list[bool] = []
 

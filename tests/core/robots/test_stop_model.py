@@ -1,8 +1,8 @@
-"""A model of Stop: whatever happens to robots, links and strangers, a proven stop is true.
+"""Stateful tests of Stop: a confirmed stop is correct whatever robots, links and foreign programs do.
 
-Studio's session, its stopper and the robots' driver kit are the real code; time, network, bodies and people
-are simulated (`tests.core.robots.stop_model`). ``NEP_STOP_HISTORIES=100000`` searches that many random
-histories instead of the fixed ones.
+Studio's session, its stopper and the robots' driver kit are the real code; time, network, bodies and
+people are simulated (`tests.core.robots.stop_model`). ``NEP_STOP_HISTORIES=100000`` searches that many
+random histories instead of the fixed ones.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ FIXED_HISTORIES = 2000
 STEPS = 10
 NAMES = ("Arm", "Base")
 REACT_S = 0.5
-"""A robot that is reached stands still this long after Stop was pressed."""
+"""Seconds between a press of Stop and the standstill of a robot that receives it."""
 FINAL = {"succeeded", "failed", "canceled"}
 
 names = st.sampled_from(NAMES)
@@ -45,7 +45,10 @@ waits = st.sampled_from([0.0, 0.05, 0.6, 1.7])
 
 
 class StopModel(RuleBasedStateMachine):
-    """One history. What the test knows for itself (`told`, `answered`) is read off the network."""
+    """State machine of one history.
+
+    `told` and `answered` are read from the simulated network, not from Studio.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -72,7 +75,7 @@ class StopModel(RuleBasedStateMachine):
     # -- what is on the network
 
     def _follow_network(self) -> None:
-        """Read off the network who was told to move, who was asked to stop and whose answers arrived."""
+        """Read from the network which robots received commands and stops and which replies were delivered."""
         network = self.network
         for place, (publisher, message, reached) in enumerate(
             network.sent[self._read_sent :], self._read_sent
@@ -99,7 +102,7 @@ class StopModel(RuleBasedStateMachine):
         return value if isinstance(value, dict) else {}
 
     def _hear(self, robot: SimulatedRobot, answer: dict[str, object]) -> None:
-        """An answer of a robot reached Studio."""
+        """Record a reply that Studio received from a robot."""
         told, id, state = self.told.get(robot, {}), str(answer["id"]), answer["state"]
         if answer["op"] == "stop" and state == "succeeded" and id in self.stops:
             press, asked = self.stops[id]

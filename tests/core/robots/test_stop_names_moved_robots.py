@@ -1,4 +1,4 @@
-"""A real robot that was told to move is named by every Stop until it proves that it stands still."""
+"""Tests of Stop naming each commanded real robot until the robot confirms that it stands still."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def test_stop_is_not_delivered_late_after_the_user_confirmed(lab: SimulatedLab) 
 
 
 def flood(lab: SimulatedLab, topic: str) -> None:
-    """Let the stopper receive thousands of answers of programs that are not the robot."""
+    """Deliver 2000 replies of programs that are not the robot to the stopper."""
     deep = b'{"op":"stop","id":' + b"[" * 1000 + b"]" * 1000 + b',"state":"succeeded"}'
     publishers = (FIRST_UNKNOWN_PUBLISHER + number % 300 for number in range(2000))
     batch = [Message(topic, deep, "json", "json", publisher=publisher) for publisher in publishers]
@@ -185,7 +185,7 @@ def test_flood_of_foreign_replies_does_not_evict_the_reply_of_the_robot(lab: Sim
 
 
 class Undecodable(Message):
-    """A message that fails the test when it is decoded."""
+    """Message that fails the test when it is decoded."""
 
     @property
     def payload(self) -> object:

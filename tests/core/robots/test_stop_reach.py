@@ -1,4 +1,4 @@
-"""Whom a stop reaches: also a robot that went away while a program used it, and while a master begins."""
+"""Tests of the robots that a stop includes: also those that left during a run or while a master starts."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from tests.core.waiting import tick_until
 
 
 class Lamp:
-    """A robot with one action."""
+    """Robot with one action."""
 
     def __init__(self, link: Link) -> None:
-        """Nothing to connect to."""
+        """Ignore the link: there is no device."""
 
     @action("blink", category="Looks", icon="lightbulb")
     def blink(self, call: Call) -> None:
-        """Blinks at once."""
+        """Blink at once."""
 
     @safe_stop(watchdog_s=5)
     def stop(self) -> None:
-        """Stands still at once."""
+        """Stop at once."""
 
 
 LAMP = Kind("lamp", "Lamp", Lamp)
@@ -46,7 +46,7 @@ def blink_and_wait() -> dict[str, object]:
 
 @contextmanager
 def used_by_a_program(session: Session, node: nep.Node) -> Iterator[None]:
-    """A lamp is there, and a program that has used it goes on; at the end the lamp goes away."""
+    """Running program that has used a lamp; the lamp disconnects at the end."""
     driver = Driver(LAMP, "Lamp", node)
     driver.start()
     try:
@@ -60,7 +60,7 @@ def used_by_a_program(session: Session, node: nep.Node) -> Iterator[None]:
 
 
 def is_needed(session: Session) -> bool:
-    """Whether Studio says that the lamp, which the program uses, is away. That it has gone is no error."""
+    """Return whether an error alert reports the missing lamp; an unused lamp that leaves is no error."""
     return any(alert.id == "robot:Lamp" and alert.severity == "error" for alert in session.alerts.active)
 
 

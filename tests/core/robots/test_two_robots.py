@@ -1,4 +1,4 @@
-"""Two robots in one behaviour; and no way past the question before a real one moves."""
+"""Tests of two robots in one behaviour and of the permission before a real robot moves."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_real_robot_does_not_move_before_permission(session: Session, node: nep.
 def test_behaviour_that_publishes_on_a_robot_topic_needs_permission_and_is_stopped(
     session: Session, node: nep.Node, topic: str
 ) -> None:
-    """A command in the robot's own words: the block is not the robot's, and moves it all the same."""
+    """The publish block belongs to no robot, but its message can move one."""
     with Driver(REAL, "Turtle", node):
         there(session, "Turtle")
         heard: list[object] = []
@@ -223,7 +223,7 @@ def test_robot_stands_still_after_a_single_step(session: Session, node: nep.Node
 
 
 def test_slow_motion_does_not_lengthen_a_drive(session: Session, node: nep.Node) -> None:
-    """It drives for half a second, not also while the blocks behind it wait for their turn."""
+    """The pause before the next block must not extend the drive of half a second."""
     with Driver(turtle.ROBOT, "Turtle", node) as driver:
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""Virtual is what Studio started, or another virtual robot of this person on this computer; nobody else."""
+"""Tests of which robots count as virtual: those started by this Studio or by this user on this computer."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ with nep.node("stranger") as node:
 
 
 def waits(*more: str) -> subprocess.Popen[bytes]:
-    """A process that does nothing until its input ends."""
+    """Start a process that does nothing until its standard input is closed."""
     command = [sys.executable, "-c", "import sys; sys.stdin.read()", *more]
     return subprocess.Popen(command, stdin=subprocess.PIPE)
 
@@ -121,7 +121,7 @@ def turtle(*, virtual: bool = True) -> Robot:
 
 
 def asks(fleet: Fleet) -> bool:
-    """Whether a person is asked before it moves."""
+    """Return whether a move needs permission first."""
     try:
         fleet.invoke("Turtle", "move", {"distance": 0.1})
     except MayNotMoveError:
@@ -148,7 +148,7 @@ def test_real_robot_that_now_claims_to_be_virtual_needs_permission(fleet: Fleet)
 
 
 class World:
-    """Stands for the publisher of a robot's world."""
+    """Fake publisher of a robot's world."""
 
     def __init__(self) -> None:
         self.changes: list[object] = []
@@ -158,7 +158,7 @@ class World:
 
 
 def test_world_of_a_foreign_robot_is_not_changed_before_permission(fleet: Fleet) -> None:
-    """What it calls its world may be a topic that moves something real."""
+    """The topic that a foreign robot names as its world may move something real."""
     fleet.connect(turtle(), "/Turtle/description", STRANGE)
     link, world = fleet.link("Turtle"), World()
     assert link is not None

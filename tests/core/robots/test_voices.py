@@ -1,4 +1,4 @@
-"""Robots are heard one after the other, also where their panel does not show; Stop silences them at once."""
+"""Tests of robot speech: one robot at a time, without a visible panel, silenced at once by Stop."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ STATE = "/{}/state"
 
 
 class FakeSpeaker:
-    """Speaks until the test lets it end; notes what it is told."""
+    """Fake speaker that records its calls and is busy until the test ends the utterance."""
 
     def __init__(self) -> None:
         self.did: list[object] = []
@@ -39,7 +39,7 @@ class FakeSpeaker:
 
 
 class Case:
-    """A session with virtual robots that tell what they say."""
+    """Session with virtual robots that publish what they speak."""
 
     def __init__(self, *names: str) -> None:
         self.session = Session()

@@ -1,4 +1,4 @@
-"""The error at a block goes when the block is repaired, and stays for every other edit."""
+"""Tests of the error at a block: cleared when its block is fixed, kept after every other edit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.blocks.samples import block, number, started, text, workspace
 
 @pytest.fixture
 def document(tmp_path: Path) -> Iterator[Document]:
-    """Of a session that was never started: it has no sockets."""
+    """Document of a session that is never started and has no sockets."""
     made = Session(Settings(tmp_path), address="127.0.0.1:9", journal_folder=tmp_path, start_processes=False)
     yield made.document
     made.close()

@@ -1,4 +1,4 @@
-"""What is read of a program's process: the lines of its protocol, at a bounded rate, in a bounded space."""
+"""Tests of reading a program's output: protocol lines, read at a bounded rate into bounded memory."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LINE = b'{"is": "print", "text": "x"}\n'
 
 
 class Pipe:
-    """A pipe whose chunks a test chooses."""
+    """Fake pipe with the chunks of the test."""
 
     def __init__(self, chunks: Iterable[bytes]) -> None:
         self.chunks = iter(chunks)

@@ -1,4 +1,4 @@
-"""Order and errors of a stop, and runs of empty behaviours."""
+"""Tests of the order of a stop, of errors during it and of runs of empty behaviours."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def failing(*_given: object, **_named: object) -> object:
 
 @pytest.fixture
 def session(tmp_path) -> Iterator[Session]:
-    """Never started: it has no sockets."""
+    """Session that is never started and has no sockets."""
     made = Session(Settings(tmp_path), address="127.0.0.1:9", journal_folder=tmp_path, start_processes=False)
     yield made
     made.close()

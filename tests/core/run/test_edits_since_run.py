@@ -1,4 +1,4 @@
-"""An edit counts while the blocks say something else than what runs; robots that come are no edit."""
+"""Tests of edits since the last run: blocks that compile to another program; a connected robot is no edit."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from app.core.run.edits_since_run import EditsSinceRun
 
 
 class Document:
-    """A behaviour of which a test says what it compiles to."""
+    """Fake document with the compiled program of the test."""
 
     def __init__(self) -> None:
         self.edits = 0

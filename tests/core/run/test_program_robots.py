@@ -1,4 +1,4 @@
-"""A program that runs is told which topics move robots, also robots whose descriptions can't be read."""
+"""Tests of the robot topics sent to a running program, including robots without a readable description."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ROVER = RobotControls("Rover", frozenset({"/Rover/command"}))
 
 
 class Program:
-    """Keeps what it is told."""
+    """Fake program that records the topics sent to it."""
 
     def __init__(self) -> None:
         self.told: list[Mapping[str, Sequence[str]]] = []

@@ -1,4 +1,4 @@
-"""What is wanted to run: a behaviour, or one stack, which says at once why it can't be tried."""
+"""Tests of run requests: a behaviour or one stack, with the reason why it can't be tried."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m app run FILE``: with a robot on a real network, and with the virtual one in its own process."""
+"""Tests of ``python -m app run FILE`` with a robot on a real network and with a virtual robot process."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_interrupt_stops_the_run_with_a_confirmed_stop(pepper, saved):
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 @pytest.mark.parametrize("how", ["a file of Studio", "a program file"])
 def test_second_ctrl_c_does_not_interrupt_the_stop(pepper, saved, master, tmp_path, how):
-    """The second one comes while the robots' answers are waited for; it is not a robot's answer."""
+    """The second Ctrl+C arrives while the run waits for the replies of the robots."""
     pepper.silent, pepper.slow = {"stop"}, {"say"}
     path = saved(workspace(started(say("Hi"))))
     command = [sys.executable, "-m", "app", "run", str(path)]
@@ -250,15 +250,15 @@ SAID = {
     "A careful walk": ["I keep walking while the way is clear."],
     "Weather station": ["I am a weather station.", "It is cold, ", "It is warm, "],
 }
-"""What the robot says in each example. tests/test_readme.py runs the greeting."""
+"""Words that the robot speaks in each example. The greeting is run by tests/test_readme.py."""
 ENDLESS = set(SAID) - {"Tour guide", "The finder"}
-"""Those that are interrupted when all was said."""
+"""Examples that don't end by themselves; they are interrupted after their last words."""
 STROKED = {"Reaction to touch", "A quiz"}
 
 
 @contextmanager
 def virtual_pepper() -> Iterator[str]:
-    """A virtual robot on threads of this process, and the address of its own master.
+    """Address of the master of a virtual robot that runs on threads of this process.
 
     tests/test_readme.py and tests/robots/virtual run it as a process.
     """
@@ -271,7 +271,7 @@ def virtual_pepper() -> Iterator[str]:
 
 
 def example_runs(name: str) -> tuple[int, str]:
-    """Run an example; somebody strokes the robot where it asks for that, and tells the weather."""
+    """Run an example with the touches and the weather that it waits for; return its exit code and output."""
     (path,) = [
         each
         for each in resources.path("examples").glob("*.nepb")
@@ -306,7 +306,7 @@ def example_runs(name: str) -> tuple[int, str]:
 @pytest.mark.slow
 @pytest.mark.timeout(400)
 def test_examples_run_on_the_virtual_robot():
-    """All of them at once: they mostly wait for their robots."""
+    """The examples run concurrently because most of their time is waiting for a robot."""
     with ThreadPoolExecutor(len(SAID)) as pool:
         ended = dict(zip(SAID, pool.map(example_runs, SAID), strict=True))
     for name, (code, out) in ended.items():
@@ -334,7 +334,7 @@ def test_generated_program_runs_as_a_file(master, pepper, tmp_path):
 
 
 class Lost(io.StringIO):
-    """An output that takes nothing any more after some lines."""
+    """Output stream that raises `OSError` after ``lines`` lines."""
 
     def __init__(self, number: int, lines: int) -> None:
         super().__init__()

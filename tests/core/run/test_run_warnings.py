@@ -1,4 +1,4 @@
-"""A warning stands at its block; the Console has it once, then at powers of ten, and in the end."""
+"""Tests of run warnings: shown at their block; logged once, at powers of ten and at the end."""
 
 from __future__ import annotations
 

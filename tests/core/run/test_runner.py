@@ -43,7 +43,7 @@ TALKS = (sys.executable, "-c", TALKS_TEXT)
 
 
 class Heard:
-    """The events of a runner, and waiting for one."""
+    """Recorded events of a runner, with a method that waits for one."""
 
     def __init__(self) -> None:
         self.events: list[RunnerEvent] = []
@@ -97,10 +97,10 @@ def pepper(master):
 
 
 def stopping_s(begin: Callable[[], Runner]) -> float:
-    """How long Stop takes with a program that `begin` starts, which must have ended then.
+    """Return the seconds that Stop takes for the program that ``begin`` starts; check that it has ended.
 
-    Whatever a stop could wait for, beyond asking the program, takes a minute here: so a stop that waits for
-    it is told from one that does not, however busy the computer is.
+    Every timeout of a stop is raised to a minute, so a stop that waits for one is detected on a busy
+    computer too.
     """
     with pytest.MonkeyPatch.context() as slower:
         slower.setattr(runner_module, "EXIT_TIMEOUT_S", 60.0)
@@ -123,7 +123,7 @@ def program(*blocks):
 
 
 def endless():
-    """Pure computing, for ever."""
+    """Return a program that computes in an endless loop."""
     change = block("variables_change", VAR={"id": "n"}, BY=number(1))
     return compile_behaviour(
         workspace(started(block("control_forever", "loop", BODY=[change])), variables=("n",)), []
@@ -299,7 +299,7 @@ def test_runner_can_be_started_only_once(runner, heard, master):
 
 
 def test_robot_is_stopped_when_the_window_process_dies(runner, heard, master, pepper):
-    """The child notices that its parent is gone: its input ends."""
+    """The child detects the end of its parent by the end of its standard input."""
     pepper.slow = {"say"}
     made = runner()
     wanted = compile_behaviour(workspace(started(say("Hi"))), [pepper.described])

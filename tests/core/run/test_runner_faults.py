@@ -1,4 +1,4 @@
-"""Programs that behave badly: memory, floods, no ends of lines, closed pipes, processes left behind."""
+"""Tests of programs that exceed the memory limit, flood or close their output or leave processes behind."""
 
 from __future__ import annotations
 
@@ -154,7 +154,10 @@ def child_of(heard: Heard, runner: Runner) -> psutil.Process:
 
 
 def gone(process: psutil.Process) -> bool:
-    """Whether it has ended soon; in a container without an init nobody takes its last word from it."""
+    """Return whether a process ends in time.
+
+    A zombie counts as ended, because a container without an init never reaps it.
+    """
 
     def has_ended() -> bool:
         try:

@@ -93,7 +93,7 @@ def test_replies_for_another_robot_and_duplicate_replies_do_not_confirm_a_stop(s
     say_ = pepper._say
 
     def lies(command, state, error=""):
-        """Pepper answers on its own topic: first what Turtle was asked, then twice what it was asked."""
+        """Reply on Pepper's topic to the stop of Turtle, then twice to Pepper's own."""
         with turtle.changed:
             assert turtle.changed.wait_for(lambda: turtle.heard("stop"), LONG_S)
         for asked in (turtle.heard("stop")[0], command, command):
@@ -159,7 +159,7 @@ def test_two_simultaneous_stops_both_receive_replies(stopper):
 
 @pytest.mark.parametrize("how", ["obeys", "computes for ever", "was killed"])
 def test_robots_stay_stopped_regardless_of_the_program(master, stopper, robots, how):
-    """A program moves a robot, Stop is pressed, the robot has answered, and nothing moves it again."""
+    """A program whose robot has confirmed the stop must not move it again."""
     robots[0].slow = {"say"} if how == "obeys" else set()
     power = number(9)
     for _ in range(3):

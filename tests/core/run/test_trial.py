@@ -1,4 +1,4 @@
-"""A stack that is tried: its words, and what its program writes as its value."""
+"""Tests of the trial of a stack: its description and the value that its program prints."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ BATTERY = Stack("bat", "value", block("robot_pepper_get_battery", "bat", ROBOT="
 
 
 def began(stack: Stack | None) -> tuple[Trial, str]:
-    """A trial whose program runs, and the words of its block."""
+    """Return a started trial and the description of its block."""
     document = Document()
     document.set_connected([robot("Pepper")])
     document.apply_edit(workspace(started(say("Hi") | {"id": "hi"})))

@@ -1,4 +1,4 @@
-"""The six states of the run bar, to the letter of the design."""
+"""Tests of the six states of the run bar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The self-test's report and watch: true at any moment, and the end of a process in which nothing moves."""
+"""Tests of the self-test's report and of its watchdog, which ends a process that hangs."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ def test_home_and_open_log_are_deleted_after_success(tmp_path: Path) -> None:
 
 @dataclass
 class ItsProgram:
-    """A process as far as its program is known: by itself, or only by the words that started it."""
+    """Fake process whose executable may be readable, or only its command line."""
 
     program: str
     words: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""From messages to curves: every message counts, by its own time; what is missing is a gap."""
+"""Tests of curves: every message is a point at its own time, missing values are gaps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ORIGIN = 1_795_000_000 * 10**9
 
 
 class Watching:
-    """A watch that is written down."""
+    """Fake watch that records its topic while it is open."""
 
     def __init__(self, topic: str, open_ones: list[str]) -> None:
         self.topic, self.open_ones = topic, open_ones
@@ -41,7 +41,7 @@ class Watching:
 
 
 class Case:
-    """A plot over a feed; `send` lets one tick bring messages."""
+    """Plot with a feed; `send` delivers messages in one tick."""
 
     def __init__(self) -> None:
         self.watched: list[str] = []

@@ -1,4 +1,4 @@
-"""Samples against a list that does the same naively: nothing is lost, invented or put across a gap."""
+"""Tests of `Samples` against a naive reference implementation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ODD = [math.nan, math.inf, -math.inf, float(2**64 - 1), 1.7e308, -1.7e308, 0.0, 
 
 
 class Naive:
-    """The same rules, one number at a time."""
+    """Reference implementation that stores one sample at a time."""
 
     def __init__(self) -> None:
         self.rows: list[Row] = []
@@ -120,7 +120,7 @@ def test_future_time_stamp_is_removed_by_next_valid_one() -> None:
 
 @st.composite
 def series(draw) -> tuple[Samples, list[Row]]:
-    """Some thousands of numbers at uneven times, with some gaps."""
+    """Return up to 5000 samples at irregular times with some gaps, and the same samples as rows."""
     seed, count = draw(st.integers(0, 2**32 - 1)), draw(st.sampled_from([1, 2, 15, 16, 17, 900, 5000]))
     random = np.random.default_rng(seed)
     times = np.cumsum(random.exponential(0.01, count))

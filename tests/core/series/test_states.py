@@ -1,4 +1,4 @@
-"""States that change often: what is asked of them is as their runs say, and the pixels are enough."""
+"""Tests of states that change often: statistics match the runs, drawing is limited by the pixels."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from app.core.series.states import States
 
 
 def dense(count: int) -> States:
-    """No and yes a thousand times a second, so many changes, then yes for long."""
+    """Return states that change ``count`` times, a thousand times per second, then stay true for 50 s."""
     states = States()
     for place in range(count):
         states.add(place / 1000, "true" if place % 2 else "false")

@@ -1,4 +1,4 @@
-"""Atomic writing: the old file or the new one, never a part."""
+"""Tests of atomic writes: a file has its old or its new content, never a part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""JSON as deep as a long stack of blocks."""
+"""Tests of JSON as deeply nested as a long stack of blocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The lock that Studios share: one at a time, free when its process dies, never in the way for long."""
+"""Tests of the lock that Studios share: exclusive, released when its process dies, with a timeout."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ with locked(Path(sys.argv[1])) as held:
 
 @pytest.fixture
 def holder(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
-    """Another process that holds the lock until its input ends."""
+    """Other process that holds the lock until its standard input is closed."""
     root = str(Path(__file__).parents[3])
     process = subprocess.Popen(
         [sys.executable, "-c", HOLDER, str(tmp_path / "file")],

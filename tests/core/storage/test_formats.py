@@ -1,4 +1,4 @@
-"""Files of a newer Studio lose nothing here and are told in one sentence; those of an older one are read."""
+"""Tests of files in other formats: newer ones are kept and reported once, older ones are read."""
 
 from __future__ import annotations
 

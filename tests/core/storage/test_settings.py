@@ -1,4 +1,4 @@
-"""Settings survive restarts and damage."""
+"""Tests of settings that persist across restarts and after damage of their file."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def test_unsaved_changes_are_tracked_until_the_file_is_writable(tmp_path: Path) 
 def test_recent_file_with_non_utf_8_name_is_saved_with_the_other_settings(
     tmp_path: Path,
 ) -> None:
-    """A disk of another system has such names; Python gives them as lone surrogates."""
+    """Disks of other systems contain such names; Python decodes them to lone surrogates."""
     name = "Begr\udcfc\udcdfung.nepb"
     settings = Settings(tmp_path / "home")
     settings.add_recent(tmp_path / name)

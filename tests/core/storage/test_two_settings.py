@@ -1,4 +1,4 @@
-"""Two Studios with the same settings file: nothing that one keeps is lost by the other."""
+"""Tests of two Studios with the same settings file: neither overwrites the values of the other."""
 
 from __future__ import annotations
 

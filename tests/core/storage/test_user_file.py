@@ -1,4 +1,4 @@
-"""What a person made is read as far as it can be, and what can't be is kept beside."""
+"""Tests of reading user files: the valid part is used, and an invalid file is backed up."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from nep.errors import NepError
 
 
 class NewerError(NepError):
-    """Of a newer Studio."""
+    """Error for a file of a newer Studio."""
 
 
 def words(data: bytes) -> tuple[list[str], str]:
-    """Letters, apart from figures; "!" is nothing at all, "9" is newer."""
+    """Parse letters; report digits as damage and raise for "!" (no text) and "9" (a newer version)."""
     if data == b"!":
         raise NepError("it is no text")
     if data == b"9":

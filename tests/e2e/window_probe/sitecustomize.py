@@ -23,7 +23,7 @@ _looked = [0.0, 0.0]  # the seconds that these eyes took, and their work in them
 
 
 def _spent() -> tuple[float, float]:
-    """Seconds of the clock and of this thread's work, without those of these eyes."""
+    """Return the elapsed time and this thread's CPU time in seconds, without those of the probe."""
     return time.monotonic() - _looked[0], time.thread_time() - _looked[1]
 
 
@@ -91,11 +91,11 @@ def _looker(reply):
 
 
 def _reactions(application):
-    """Measures how long after each press of a key or button the window has answered it on the screen.
+    """Measure the time from each press of a key or button to its result on the screen.
 
-    From the time that the X server gave the event (its clock is the monotonic one) until the window has
-    handled it and painted what it asked for, without the time that these eyes took. The page of the editor
-    measures its own (Event Timing API).
+    The time starts when the X server sends the event (its clock is the monotonic one) and ends when
+    the window has handled the event and painted the updates; the time of the probe is subtracted. The
+    page of the block editor measures its own events (Event Timing API).
     """
     from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt
 
@@ -115,7 +115,7 @@ def _reactions(application):
             self.watched: list = []
 
         def watch(self) -> None:
-            """Watch the windows that are open: an event comes to them first, then to the widgets in them."""
+            """Install the filter on the open windows, which receive an event before their widgets."""
             for window in application.topLevelWindows():
                 if not any(window is each for each in self.watched):
                     self.watched.append(window)
@@ -144,7 +144,7 @@ def _reactions(application):
 
 
 def _script(request, reply) -> None:
-    """What a script that only reads finds in the page of the block editor."""
+    """Reply with the result of a read-only script in the page of the block editor."""
     view = _web_view_that_shows()
     if view is None:
         reply(request["n"], None)
@@ -156,7 +156,7 @@ _known: list = []  # the view that showed the last time: looking for it takes lo
 
 
 def _web_view_that_shows():
-    """The page that can be seen; None when there is none."""
+    """Return the visible page, or None."""
     import shiboken6
     from PySide6.QtWidgets import QApplication
 
@@ -168,12 +168,12 @@ def _web_view_that_shows():
 
 
 def _web_view():
-    """The class of such a page; None before the first."""
+    """Return the class of the block editor's view, or None before the first one is created."""
     return getattr(sys.modules.get("PySide6.QtWebEngineWidgets"), "QWebEngineView", None)
 
 
 class _Wanted(NamedTuple):
-    """Which widgets the tests ask for; with nothing said, all."""
+    """Filter for the widgets of a request; without values, every widget matches."""
 
     kind: str = ""
     named: str = ""  # its name or its text
@@ -194,14 +194,14 @@ class _Wanted(NamedTuple):
 
 
 class _Around:
-    """What a widget and those around it leave of the screen, and the panel they are in; found when asked."""
+    """Visible part and panel of a widget, computed from its ancestors on demand."""
 
     def __init__(self, widget, outer: _Around | None) -> None:
         self._widget, self._outer = widget, outer
 
     @cached_property
     def shown(self):
-        """The part of the screen, a QRect."""
+        """Visible part of the widget as a QRect in screen coordinates."""
         from PySide6.QtCore import QPoint, QRect
 
         place = QRect(self._widget.mapToGlobal(QPoint(0, 0)), self._widget.size())
@@ -217,7 +217,7 @@ class _Around:
 
     @cached_property
     def is_fresh(self) -> bool:
-        """In a banner that has just come and lets presses through: nobody aimed at it."""
+        """True inside a banner that has just appeared and still lets clicks through to the window."""
         from PySide6.QtCore import Qt
 
         if type(self._widget).__name__ == "AlertBanner":
@@ -226,9 +226,9 @@ class _Around:
 
 
 def _widgets(application, wanted: _Wanted) -> list[dict]:
-    """Every widget that can be seen and is wanted, windows first.
+    """Return the visible widgets that match, windows first.
 
-    Quick: the window can do nothing else meanwhile.
+    The window is blocked meanwhile, so this must be fast.
     """
     from PySide6.QtWidgets import QWidget
 
@@ -302,7 +302,7 @@ def _text(widget) -> str:
 
 
 def _rows(view) -> list[dict]:
-    """The rows of a table or a tree that is shown, as far as they are open."""
+    """Return the expanded rows of a visible table or tree."""
     from PySide6.QtCore import QAbstractListModel, Qt
 
     model = view.model()
@@ -317,7 +317,7 @@ def _rows(view) -> list[dict]:
                 {
                     "texts": [_cell(cell, index) for cell, index in zip(cells, indexes, strict=True)],
                     "spoken": str(indexes[0].data(Qt.ItemDataRole.AccessibleTextRole) or ""),
-                    "struck": bool(getattr(cells[0], "struck", False)),
+                    "struck": bool(getattr(cells[0], "is_struck_out", False)),
                     "chip": getattr(cells[0], "chip", None),
                     "rect": _at(view.viewport(), view.visualRect(indexes[0])),
                 }

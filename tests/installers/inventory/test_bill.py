@@ -1,4 +1,4 @@
-"""The bill of materials, the licences and the notice of what is in this very environment."""
+"""Tests of the bill of materials, the licence folder and the notice, made from the current environment."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ QT = Part("qt", "6", "MIT")
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where all was written of a folder as PyInstaller makes it, with one extension module."""
+    """Output folder of the inventory for a PyInstaller folder with one extension module."""
     frozen, out = tmp_path_factory.mktemp("frozen"), tmp_path_factory.mktemp("out")
     (module,) = (file for file in metadata.files("orjson") or () if file.suffix in {".so", ".pyd"})
     shutil.copy(str(module.locate()), frozen / module.name)

@@ -1,4 +1,4 @@
-"""Each shared library of a frozen program is of something whose licence is told."""
+"""Tests that each shared library of a frozen program is matched to a component with a known licence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Python, Qt and the block editor bring into a package, each with its licence."""
+"""Tests of the inventory of Python, Qt and the block editor, each part with its licence."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from installers.inventory.parts import (
 
 RESOURCES = Path(__file__).parents[3] / "resources"
 WITHOUT_TEXT = {"pyside6", "pyside6-addons", "pyside6-essentials", "shiboken6"}
-"""Qt's text is under `qt`."""
+"""Distributions without a licence text of their own; Qt's text is in the folder `qt`."""
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""What is compiled into wheels: read from what is installed, and what nobody knows is said."""
+"""Tests of the detection of components that are compiled into wheels, and of the report of unknown ones."""
 
 from __future__ import annotations
 

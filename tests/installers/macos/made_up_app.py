@@ -1,4 +1,4 @@
-"""An application as PyInstaller lays one out on a Mac, of headers instead of code; tools that only note."""
+"""Fake application bundle in PyInstaller's layout, with Mach-O headers for code, and fake signing tools."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def link(path: Path, target: str) -> None:
 
 
 def framework(folder: Path, name: str) -> Path:
-    """As PyInstaller fixes those of PySide6's wheels."""
+    """Create a framework with the layout that PyInstaller gives those of PySide6's wheels."""
     root = folder / f"{name}.framework"
     put(root / "Versions" / "A" / name, fat(header(), header(machine="x86_64")), 0o755)
     put(root / "Versions" / "A" / "Resources" / "Info.plist", plistlib.dumps({"CFBundleIdentifier": name}))
@@ -120,7 +120,7 @@ def context(folder: Path) -> Context:
 
 
 def noting_tools(folder: Path, python: str, status: str = "Accepted", fails: str = "", code: int = 3) -> Path:
-    """Put codesign and its kin into a folder; the file that they note their arguments in."""
+    """Install fake codesign, xcrun, ditto and spctl in a folder. Return the log file of their arguments."""
     folder.mkdir()
     log = folder / "calls.jsonl"
     log.touch()

@@ -1,4 +1,4 @@
-"""The disk image's window: what dmgbuild is told on a Mac, and the same window read back from an image."""
+"""Tests of the disk image's window: the settings for dmgbuild, and the window read back from an image."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_dmgbuild_settings_place_application_and_applications_link(tmp_path: Pat
 
 
 def test_dmgbuild_supports_every_generated_setting(tmp_path: Path) -> None:
-    """Its options are read from its source: it can be imported on a Mac only, and takes what it knows not."""
+    """dmgbuild can be imported only on macOS and ignores unknown options, so its source is searched."""
     found = find_spec("ds_store")
     if found is None or found.origin is None:
         pytest.skip("needs dmgbuild")

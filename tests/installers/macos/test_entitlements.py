@@ -1,4 +1,4 @@
-"""What the hardened runtime must allow: documented keys alone, and as few as can be."""
+"""Tests that the hardened runtime gets only documented entitlements, and as few as possible."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A framework goes into the package as a whole or not at all: codesign refuses what is left of one."""
+"""Tests that a framework is packaged completely or not at all, because codesign rejects an incomplete one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PARTS = (
     "Resources",
     "Resources/Info.plist",
 )
-"""What PyInstaller collects of one."""
+"""Paths that PyInstaller collects from a framework."""
 
 
 def wanted(name: str) -> set[bool]:

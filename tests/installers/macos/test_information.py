@@ -1,4 +1,4 @@
-"""What the application tells macOS about itself."""
+"""Tests of the application's Info.plist."""
 
 from __future__ import annotations
 

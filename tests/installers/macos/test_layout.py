@@ -1,4 +1,4 @@
-"""The check of an application's folder: it passes what PyInstaller makes, and finds what is wrong."""
+"""Tests of the layout check of an application bundle: PyInstaller's output passes, errors are detected."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def link_out(app: Path) -> None:
 
 
 def library_without_program(app: Path) -> None:
-    """What is left of a framework when its library is not wanted, but the rest is."""
+    """Add a framework without its library, as is left when only the library is excluded."""
     root = framework(app / QT, "QtXml")
     (root / "Versions/A/QtXml").unlink()
     (root / "QtXml").unlink()

@@ -1,4 +1,4 @@
-"""FFmpeg leaves OpenCV: what is linked with it finds empty libraries, and what only FFmpeg needed is gone."""
+"""Tests of the removal of FFmpeg from OpenCV: stubs replace it, and its own dependencies are removed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.installers.macos.made_up_app import VERSION, context, header, link, m
 NEEDED = ("clang", "ld.lld", "llvm-nm")
 CV2 = Path("Contents/Frameworks/cv2")
 SYSTEM = 'void binder(void) __asm__("dyld_stub_binder"); void binder(void) {}'
-"""What the linker asks macOS' own library for."""
+"""C source of the symbol that the linker requires from the system library of macOS."""
 
 
 def library(path: Path, source: str, *linked: Path) -> Path:

@@ -1,4 +1,4 @@
-"""What a compiled file of macOS is, read from its first bytes."""
+"""Tests of the detection of Mach-O files by their first bytes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The package as a whole, with tools that only note: what is made before freezing, and what comes after."""
+"""Tests of the macOS packer as a whole, with fake tools: the inputs of freezing and the steps after it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The icons and the ground of the disk image's window."""
+"""Tests of the icons and of the background of the disk image's window."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def entries(icon: bytes) -> Iterator[tuple[str, bytes]]:
 
 
 def raw(content: bytes) -> bytes:
-    """The channels of an entry that is no PNG."""
+    """Decompress the channels of an icon entry that is not a PNG."""
     assert content[:4] == b"ARGB"
     place, out = 4, bytearray()
     while place < len(content):

@@ -1,4 +1,4 @@
-"""Signing and notarising: what is signed when and how, told by tools that only note what they are asked."""
+"""Tests of signing and notarisation: order and options, recorded by fake tools."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def finished(folder: Path, identity: signing.Identity) -> Path:
 
 
 def signed(log: Path, app: Path) -> list[tuple[str, str]]:
-    """What was signed, in turn, and the file with its entitlements."""
+    """Return the signed paths in order, each with the name of its entitlements file or an empty text."""
     found = []
     for name, *words in calls(log):
         if name == "codesign" and "--sign" in words:

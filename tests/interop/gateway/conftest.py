@@ -1,4 +1,7 @@
-"""The gateway alone: raw sockets play the originals, a fake plays the native network."""
+"""Fixtures for tests of the gateway alone.
+
+Raw sockets act as programs of the original NEP, a fake as the native network.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ LONG_MS = 30_000
 
 
 class FakeNative:
-    """Remembers what the gateway does, and lets a test wait for it."""
+    """Fake native network that records the gateway's calls and lets a test wait for them."""
 
     def __init__(self):
         self._news = threading.Condition()
@@ -72,7 +75,7 @@ class FakeNative:
 
 
 class Original:
-    """Raw sockets, used as programs of the original NEP use them."""
+    """Raw ZeroMQ sockets, used as programs of the original NEP use them."""
 
     def __init__(self):
         self.context = zmq.Context()
@@ -106,7 +109,7 @@ class Original:
         return opened
 
     def publish_until(self, publisher, frame, done):
-        """Publish until the slow joiner has joined."""
+        """Publish a frame repeatedly until `done` returns true, because the subscriber joins late."""
         waited = threading.Event()
         for _ in range(1200):
             publisher.send(frame)
@@ -116,7 +119,7 @@ class Original:
         pytest.fail("nothing arrived")
 
     def waiting(self, subscriber):
-        """All frames that have arrived."""
+        """Return all frames that have arrived."""
         frames = []
         while subscriber.poll(0):
             frames.append(subscriber.recv())
@@ -125,7 +128,7 @@ class Original:
 
 @pytest.fixture
 def new_native():
-    """Makes further native networks."""
+    """Factory of further fake native networks."""
     return FakeNative
 
 
@@ -136,7 +139,7 @@ def native():
 
 @pytest.fixture
 def gateway_at(fixed_ports, native, tmp_path):
-    """Starts gateways that share one file, one after the other."""
+    """Function that starts gateways, one after the other, which share a file."""
     running = []
 
     def start(outside=native, **more):

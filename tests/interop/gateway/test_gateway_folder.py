@@ -1,4 +1,4 @@
-"""The gateway where its file cannot be written: originals are served all the same, and an alert says so."""
+"""Test of the gateway in an unwritable folder: it serves programs of the original NEP and raises an alert."""
 
 from __future__ import annotations
 

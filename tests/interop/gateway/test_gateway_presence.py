@@ -1,4 +1,4 @@
-"""Who is there, and who is gone; gateways and programs that come back."""
+"""Tests of the gateway's list of programs, and of gateways and programs that restart."""
 
 from __future__ import annotations
 

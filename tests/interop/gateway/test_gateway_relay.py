@@ -1,4 +1,4 @@
-"""What enters on one line leaves on the others."""
+"""Tests of the forwarding of frames between original and native programs."""
 
 from __future__ import annotations
 

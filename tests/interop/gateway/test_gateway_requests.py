@@ -1,4 +1,4 @@
-"""What the gateway answers, and the ports that it binds."""
+"""Tests of the gateway's replies to requests and of the ports that it binds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A native program, driven by a test over its pipes: see python_peer.py."""
+"""Native program that a test controls through pipes; see python_peer.py."""
 
 import json
 import sys

@@ -1,9 +1,9 @@
-"""A program of the original NEP (any Python version of it), driven by a test over its pipes.
+"""Program of the original NEP (any Python version) that a test controls through pipes.
 
-Arguments: ROLE TOPIC TYPE MODE NAME. A publisher publishes each line of JSON that comes in; a subscriber
-writes each message as a line of JSON; a client asks what comes in and writes the answer; a server answers.
-A client_at and a server_at do so without a master: TOPIC is the port.
-A picture is told as the colour that fills it: {"bgr": [b, g, r], "shape": [height, width, 3]}.
+Arguments: ROLE TOPIC TYPE MODE NAME. A publisher publishes each line of JSON that it reads. A
+subscriber writes each message as a line of JSON. A client calls with each line and writes the reply. A
+server replies. `client_at` and `server_at` do the same without a master: TOPIC is the port. An image is
+represented by the colour that fills it: {"bgr": [b, g, r], "shape": [height, width, 3]}.
 """
 
 import json
@@ -21,7 +21,7 @@ def say(value):
 
 
 def painted(told):
-    """The value that a line of JSON stands for."""
+    """Return the value that a line of JSON represents; for image types, an image filled with its colour."""
     if not msg_type.startswith("image"):
         return told
     import numpy as np
@@ -32,7 +32,7 @@ def painted(told):
 
 
 def seen(value):
-    """What a value is told as."""
+    """Return the JSON representation of a value; for images, the mean colour and the shape."""
     if not msg_type.startswith("image"):
         return value
     return {"bgr": [round(float(each)) for each in value.mean(axis=(0, 1))], "shape": list(value.shape)}

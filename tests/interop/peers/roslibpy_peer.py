@@ -1,4 +1,4 @@
-"""roslibpy as its examples use it, driven by a test over its pipes: see python_peer.py."""
+"""Program that uses roslibpy as its examples do; a test controls it through pipes. See python_peer.py."""
 
 import json
 import sys

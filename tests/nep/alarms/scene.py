@@ -1,4 +1,4 @@
-"""An alarm in a made-up network: messages, graphs and time come when a test says so."""
+"""Simulated network for tests of alarms, with messages, graphs and a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MIDNIGHT_S = 1_790_000_000.0
 
 
 class Scene:
-    """Alarms whose clock stands still; `now` is monotonic."""
+    """Alarms with a fake clock; `now` is in monotonic seconds."""
 
     def __init__(self, *rules: AlarmRule, carriers: dict[str, ActionStarter] | None = None) -> None:
         self.now = 100.0
@@ -23,7 +23,7 @@ class Scene:
         self.revision = 0
 
     def wait(self, seconds: float) -> list[tuple[str, object]]:
-        """Time goes by in tenths of a second; what happened: (kind, what was seen)."""
+        """Advance the clock in steps of 0.1 s. Return the events as (kind, value)."""
         events = []
         for _ in range(round(seconds * 10)):
             self.now += 0.1
@@ -31,11 +31,11 @@ class Scene:
         return events
 
     def happened(self) -> list[tuple[str, object]]:
-        """What happened since the last time."""
+        """Return the events since the last call as (kind, value)."""
         return [(event.kind, event.value) for event in self.alarms.tick()]
 
     def send(self, topic: str, *payloads: object) -> list[tuple[str, object]]:
-        """A batch of messages arrives."""
+        """Deliver a batch of messages. Return the events."""
         made = [each if isinstance(each, Message) else message(topic, each) for each in payloads]
         self.alarms.evaluator.evaluate(topic, made)
         return self.happened()
@@ -48,7 +48,7 @@ class Scene:
         losses: dict[str, tuple[int, int]] | None = None,
         epoch: int = 1,
     ) -> list[tuple[str, object]]:
-        """The master tells a graph; ``losses`` are (lost, received) of each topic's subscriber."""
+        """Deliver a graph. ``losses`` has (lost, received) of each topic's subscriber. Return the events."""
         self.revision += 1
         publisher = PublisherInfo(1, "a", (), False, 0, 0, 0, None, None, None)
         told = {}
@@ -64,17 +64,17 @@ class Scene:
         return self.happened()
 
     def state(self) -> str:
-        """How the first alarm is."""
+        """Return the phase of the first alarm."""
         return self.alarms.evaluator.state(self.alarms.rules[0]).phase
 
 
 def message(topic: str, payload: object) -> Message:
-    """One message; bytes are sent as they are."""
+    """Return a message with the payload as JSON; bytes are used unchanged."""
     data = payload if isinstance(payload, bytes) else orjson.dumps(payload)
     return Message(topic, data, "json", "json", seq=1, stamp_ns=1)
 
 
 def rule(kind: str, name: str, *does: AlarmAction, id: str = "r", **more: object) -> AlarmRule:
-    """A rule; what is not of its condition is its own."""
+    """Return a rule. Keyword arguments that belong to the rule go to it, all others to its condition."""
     own = {key: more.pop(key) for key in ("calm_s", "is_enabled", "snoozed_until_s") if key in more}
     return AlarmRule(id, AlarmCondition(kind, name, **more), does, **own)  # type: ignore[arg-type]

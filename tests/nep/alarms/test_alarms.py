@@ -1,4 +1,4 @@
-"""What is done when an alarm comes on, what came of it, snooze and history."""
+"""Tests of the actions of an alarm and their results, and of snooze and history."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ CALL = AlarmAction("call", "restart", {})
 
 
 class Hands:
-    """Carries out actions as a test says: ``well`` or not, ``later`` or at once."""
+    """Fake carrier that records actions and reports success or failure, as `well` determines."""
 
     def __init__(self) -> None:
         self.done = []

@@ -1,4 +1,4 @@
-"""What brings an alarm on, and what does not."""
+"""Tests of the conditions that trigger and clear an alarm."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The file of alarms: what is written is read again, and what is wrong is a sentence with its line."""
+"""Tests of the alarm file: rules round-trip, and errors are reported with their line."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ FLAT = st.sampled_from(
     [None, True, False, math.nan, -math.inf, -0.0, 1e300, 0, -1, 2**64 - 1, 10**400, "", "\ud800", "“",
      "topic", "is", "silent", "when", "banner", "/t", "below", "call", [], {}]
 )  # fmt: skip
-"""From a list: `hypothesis` needs far longer to find deep values of every kind than they take to be read."""
+"""Scalars to choose from; `hypothesis` takes far longer to generate deep values than they take to parse."""
 DEEPER = FLAT | st.lists(FLAT, max_size=2) | st.dictionaries(KEYS, FLAT, max_size=4)
 VALUES = DEEPER | st.lists(DEEPER, max_size=2) | st.dictionaries(KEYS, DEEPER, max_size=4)
 

@@ -1,8 +1,9 @@
-"""A program with Cyclone DDS alone that serves or calls as rmw_cyclonedds does: `serve|call NAME TYPE`.
+"""Program that serves or calls as rmw_cyclonedds does, with Cyclone DDS alone: `serve|call NAME TYPE`.
 
-TYPE is SetBool, Trigger or AddTwoInts. It shares no code with nep: each struct is written out. As a server it
-prints what it was asked; as a client it prints the answers to the lines that it is given (JSON, a list of the
-fields). It shows no type information but the types' names, as ROS 2 does.
+TYPE is SetBool, Trigger or AddTwoInts. The program shares no code with nep: each struct is written out.
+A server prints its requests. A client prints the replies to the requests that it reads as lines (JSON,
+a list of the fields). The program publishes no type information except the names of the types, as ROS 2
+does.
 """
 
 import json

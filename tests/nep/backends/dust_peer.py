@@ -1,6 +1,6 @@
-"""A program with another vendor's DDS: `dust_peer.py hear|say TOPIC [latched]`.
+"""Program that uses another vendor's DDS: `dust_peer.py hear|say TOPIC [latched]`.
 
-Every line it prints is a text that it heard; every line it is given is a text that it says.
+`hear` prints each received text as a line. `say` publishes each line that it reads.
 """
 
 import os
@@ -18,7 +18,7 @@ class String:
 String.__name__ = "std_msgs::msg::dds_::String_"  # its name in DDS
 WAIT = dust_dds.Duration(sec=60, nanosec=0)
 KEPT = dust_dds.HistoryQosPolicy(dust_dds.HistoryQosPolicyKind.KeepLast(100))
-"""Else a reader has the last one alone, and a writer waits for each to be confirmed."""
+"""History depth; with the default, readers keep one message and writers wait for acknowledgements."""
 
 
 def tell(line: str) -> None:

@@ -1,6 +1,7 @@
-"""A program with another vendor's DDS that serves or calls as rmw_cyclonedds does: `serve|call NAME TYPE`.
+"""Program that serves or calls as rmw_cyclonedds does, with another vendor's DDS: `serve|call NAME TYPE`.
 
-As a server it prints what it was asked; as a client the answers to the lines that it is given: JSON, [a, b].
+A server prints its requests. A client prints the replies to the requests that it reads as lines: JSON,
+[a, b].
 """
 
 import json

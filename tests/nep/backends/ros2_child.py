@@ -1,4 +1,4 @@
-"""ROS 2's conventions over real sockets. Run by test_ros2.py in a network of its own: see there."""
+"""Tests of ROS 2's conventions over real sockets. Run by test_ros2.py in a separate network namespace."""
 
 from __future__ import annotations
 
@@ -222,7 +222,7 @@ sys.stdin.read()
 
 
 def discovered(topic: str) -> tuple[object, object]:
-    """A participant of its own, and what it finds of a topic's only writer."""
+    """Return a new participant and the only writer of a topic that it discovers."""
     library = load_dds()
     participant = library.domain.DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
     reader = library.builtin.BuiltinDataReader(participant, library.builtin.BuiltinTopicDcpsPublication)
@@ -271,7 +271,7 @@ def test_discovery_topic_has_the_type_hash_of_ros_2(make: Make) -> None:
 
 
 def test_ros_discovery_info_lists_nodes_with_their_readers_and_writers(make: Make) -> None:
-    """The bytes of `ros_discovery_info`, read by hand as they are laid down by ROS 2's message."""
+    """Decodes the bytes of `ros_discovery_info` by hand, in the layout of ROS 2's message."""
     first, second = make("talker"), make("arm/left/grip per")
     pub, sub = first.new_pub("t", "std_msgs/String"), second.new_sub("t", "std_msgs/String")
     writer, readers = pub._transport._writer.guid.bytes, sub._transport.gids
@@ -303,7 +303,7 @@ def test_ros_discovery_info_lists_nodes_with_their_readers_and_writers(make: Mak
 
 
 def udp_sockets() -> dict[int, tuple[str, bytes]]:
-    """The UDP sockets of this process: at each port the address, and the device that is heard alone."""
+    """Return the address and the bound device of each UDP socket of this process, by port."""
     found = {}
     for each in Path("/proc/self/fd").iterdir():
         if not each.is_socket():
@@ -338,7 +338,7 @@ def test_sockets_are_bound_to_loopback_unless_configured(
 
 
 def test_missing_participant_index_is_reported() -> None:
-    """In a program of its own: Cyclone DDS leaves its sockets behind."""
+    """Runs in a separate process, because Cyclone DDS leaks its sockets on this error."""
     code = """
     from nep.backends.ros2 import environment
     environment._MAX_PARTICIPANT_INDEX = 0

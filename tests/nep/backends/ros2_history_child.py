@@ -1,6 +1,6 @@
-"""Histories over ROS 2: the contract. Run by test_ros2.py in a network of its own: see there.
+"""Contract tests of histories over ROS 2. Run by test_ros2.py in a separate network namespace.
 
-DDS keeps a number of messages, whatever their size, so the bound in bytes is left out.
+DDS keeps a number of messages of any size, so the bound in bytes is left out.
 """
 
 from __future__ import annotations

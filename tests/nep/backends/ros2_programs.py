@@ -1,4 +1,4 @@
-"""What the tests of ros2 in a network of their own share: domains, nodes, other programs."""
+"""Fixtures and helpers of the ROS 2 tests in a separate network namespace: domains, nodes and programs."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ _domains = count(1)
 
 @pytest.fixture(autouse=True)
 def a_domain_for_each_test(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Programs that were killed are there for ten seconds more."""
+    """New domain for each test, because others see a killed program for ten more seconds."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(next(_domains)))
 
 
 @pytest.fixture(autouse=True)
 def all_are_patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However busy the computer is, programs find each other in time."""
+    """Longer handshake timeouts, so that programs find each other on a busy computer."""
     for module in ("participant", "publisher"):
         monkeypatch.setattr(f"nep.backends.ros2.{module}.HANDSHAKE_TIMEOUT_S", GREETINGS_S)
 
 
 def knows(node: nep.Node, topic: str) -> nep.Node:
-    """The node, when it has found the topic."""
+    """Wait until the node has discovered the topic. Return the node."""
     eventually(lambda: topic in {each.strip("/") for each in node.graph().topics})
     return node
 
@@ -64,21 +64,21 @@ def knows(topic):
 
 @contextmanager
 def nep_program(code: str, **environment: str) -> Iterator[Program]:
-    """A program with a node, which is asked to end by the end of its input."""
+    """Run a program with a node; at the end of the block, it stops because its standard input is closed."""
     with running(BEGIN + textwrap.dedent(code), **environment) as other:
         yield other
         other.end()
 
 
 def killed_soon() -> dict[str, str]:
-    """For a program that is to be killed: others see after a second that it is gone, not after ten."""
+    """Return an environment in which others notice after 1 s instead of 10 s that a program was killed."""
     settings = cyclonedds_config({})
     assert settings is not None
     return {"CYCLONEDDS_URI": settings.replace("<Discovery>", "<Discovery><LeaseDuration>1s</LeaseDuration>")}
 
 
 class Bytes:
-    """CDR that is read by hand."""
+    """Minimal CDR decoder."""
 
     def __init__(self, data: bytes) -> None:
         self.data, self.at = data, 0

@@ -1,7 +1,7 @@
-"""Services over ROS 2: the contract of services, and programs that have DDS alone.
+"""Contract tests of services over ROS 2, and tests with programs that use plain DDS.
 
-Run by test_ros2.py in a network of its own: see there. What DDS has no room for is left out of the contract:
-a request goes to all servers of a name.
+Run by test_ros2.py in a separate network namespace. Parts of the contract that DDS can't provide are
+left out: a request goes to all servers of a name.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ globals().update({
 
 @pytest.fixture(scope="module", autouse=True)
 def there() -> Iterator[None]:
-    """A node that stays: the program looks around once, not for each test."""
+    """Node that stays open, so that this process discovers the domain only once and not for each test."""
     os.environ["ROS_DOMAIN_ID"] = "200"
     with nep.node("there", "ros2") as node:
         node.graph()
@@ -61,7 +61,7 @@ def make() -> Iterator[Make]:
 
 @pytest.fixture
 def registered(make: Make) -> Make:
-    """DDS knows all of them."""
+    """Same as `make`: with DDS, nodes discover each other without a master."""
     return make
 
 
@@ -147,7 +147,7 @@ def test_unknown_service_types_are_rejected(make: Make, tmp_path, monkeypatch) -
 
 @pytest.fixture(params=["cyclone", "dust"])
 def peer(request: pytest.FixtureRequest):
-    """Starts a program with Cyclone DDS, or another vendor's, alone, that shares no code with nep."""
+    """Function that starts a program with plain Cyclone DDS or another vendor's DDS, without nep."""
     if request.param == "dust":
         pytest.importorskip("dust_dds", reason="needs another vendor's DDS: pip install dust-dds==0.15.0")
         if "AddTwoInts" not in request.node.name:

@@ -1,4 +1,7 @@
-"""ROS 2's conventions with other vendors' DDS. Run by test_ros2.py in a network of its own: see there."""
+"""Tests of ROS 2's conventions with other vendors' DDS.
+
+Run by test_ros2.py in a separate network namespace.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +25,12 @@ from tests.nep.programs import Program, eventually, running
 
 DUST = "needs another vendor's DDS: pip install dust-dds==0.15.0"
 Start = Callable[..., AbstractContextManager[Program]]
-"""Starts a peer: "hear" or "say", a topic, "latched" or nothing."""
+"""Function that starts a peer, given `hear` or `say`, a topic and optionally `latched`."""
 
 
 @pytest.fixture(scope="module")
 def fast_dds(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A program with Fast DDS."""
+    """Path of the compiled peer that uses Fast DDS."""
     made = tmp_path_factory.mktemp("fast_dds") / "peer"
     source = Path(__file__).with_name("fastdds_peer.cpp")
     command = ["g++", "-std=c++17", str(source), "-o", str(made), "-lfastrtps", "-lfastcdr"]
@@ -59,7 +62,7 @@ def test_other_vendor_receives_messages_from_nep(make: Make, start: Start) -> No
 
 
 def test_nep_receives_messages_from_other_vendor(make: Make, start: Start) -> None:
-    """What is said before both have found each other may be lost, and is said again."""
+    """Messages before discovery is complete may be lost, so the first ones are repeated."""
     node = make("a")
     text, data = node.new_sub("chatter", "std_msgs/String"), node.new_sub("chatter", "json")
     with start("say", "rt/chatter") as other:

@@ -1,8 +1,8 @@
-"""The contract of back ends over ROS, in a process of its own: see `test_ros.py`, which runs this file.
+"""Contract tests of back ends over ROS, in a separate process that `test_ros.py` starts.
 
-rospy lives as long as its process, with threads and sockets, and there is one ROS node for all tests. What
-ROS has no room for is left out: the publisher's id and number of a message without a header, how many were
-lost of those, letters such as "ü" in topics, and bytes that are wrong for their type.
+rospy keeps threads and sockets until its process ends, and all tests share one ROS node. Features that
+ROS lacks are left out: publisher ID and sequence number of a message without a header, the number of
+lost ones of those, letters such as "ü" in topics, and bytes that are invalid for their type.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ for _name in (
 
 @pytest.fixture(autouse=True)
 def _nothing_is_left() -> None:
-    """rospy's threads and sockets stay until the process ends."""
+    """Disable the check for leaks: rospy's threads and sockets stay until the process ends."""
 
 
 @pytest.fixture(scope="module")

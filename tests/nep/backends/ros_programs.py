@@ -1,4 +1,4 @@
-"""Debian's ROS for tests: a master in a process of its own, and whether there is one at all."""
+"""Helpers for tests with Debian's ROS: a ROS master in its own process, and a check that ROS is there."""
 
 from __future__ import annotations
 
@@ -26,11 +26,14 @@ HAS_ROS = shutil.which("rosmaster") is not None and any(
     all((Path(place) / each).is_dir() for each in NEEDED) for place in SEARCH_FOLDERS
 )
 FIND_ROS = "from nep.backends.ros.library import get_rospy; get_rospy()\nimport rospy\n"
-"""With what a program begins that is one of ROS and none of nep."""
+"""First lines of a program that uses ROS and not nep."""
 
 
 def skip_without_ros() -> None:
-    """All skips come from this line, so that pytest tells of them in one."""
+    """Skip the test when ROS is not installed.
+
+    All skips come from this line, so pytest reports them as one.
+    """
     if not HAS_ROS:
         pytest.skip(NO_ROS)
 
@@ -50,7 +53,7 @@ def answers(uri: str) -> bool:
 
 
 def told(address: str) -> dict[str, str]:
-    """The environment of a program of ROS."""
+    """Return the environment variables of a ROS program."""
     return {
         "ROS_MASTER_URI": f"http://{address}",
         "ROS_IP": "127.0.0.1",
@@ -60,7 +63,7 @@ def told(address: str) -> dict[str, str]:
 
 @contextmanager
 def ros_master(folder: Path, address: str = "") -> Iterator[str]:
-    """The address of a running ROS master; it is killed at the end."""
+    """Run a ROS master and yield its address; the master is killed at the end."""
     address = address or f"127.0.0.1:{free_port()}"
     environment = {
         **os.environ, "ROS_MASTER_URI": f"http://{address}", "ROS_IP": "127.0.0.1", "ROS_LOG_DIR": str(folder)

@@ -1,7 +1,7 @@
-"""The contract of services over ROS, in a process of its own: see `test_ros_services.py`, which runs it.
+"""Contract tests of services over ROS, in a separate process that `test_ros_services.py` starts.
 
-What ROS has no room for is left out: answers that come late, for a client closes its connection when it waits
-no longer, and two servers of one name in one program.
+Features that ROS lacks are left out: late replies, because a client closes its connection after its
+timeout, and two servers of one name in one program.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ globals().update({
 
 @pytest.fixture
 def registered(make: Make) -> Make:
-    """The master knows all of them."""
+    """Same as `make`: the ROS master knows all nodes."""
     return make
 
 

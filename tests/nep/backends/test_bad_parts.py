@@ -1,7 +1,9 @@
-"""Truncated, random and huge parts on every native port: it serves on, counts and names them, loses nothing.
+"""Tests of truncated, random and huge parts on every native port.
 
-Each example sends some bad messages, then a good one behind them on the same connection: when the good one
-has come, the bad ones have been dealt with, so nothing here has to wait for a time.
+Bad parts are counted, and valid messages arrive.
+
+Each example sends bad messages and then a good one on the same connection. When the good one has
+arrived, the bad ones have been processed, so no test waits for a fixed time.
 """
 
 from __future__ import annotations
@@ -76,7 +78,7 @@ def context() -> Iterator[zmq.Context[zmq.Socket[bytes]]]:
 
 
 class Rogue:
-    """A publisher that sends what it likes, beside good messages of its own."""
+    """Publisher of arbitrary parts and of valid messages."""
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]]) -> None:
         self.socket = context.socket(zmq.XPUB)
@@ -84,7 +86,7 @@ class Rogue:
         self.seqs = itertools.count(1)
 
     def good(self, told: bool = True, one: bool = False) -> bytes:
-        """Send a good message, perhaps in one part; its payload."""
+        """Send a valid message, optionally as a single part. Return its payload."""
         payload = b"good %d" % next(self.seqs)
         head = wire.Header(3, 0, int(payload[5:]), 0, 42, len(payload) if told else 0)
         parts = [TOPIC, head.pack(), payload]
@@ -176,7 +178,7 @@ SUBSCRIPTIONS = (
 
 
 def shake_hands(port: int) -> socket.socket:
-    """A bare connection to a publisher, with ZMTP's greeting done: whoever sends more than libzmq would."""
+    """Return a raw connection to a publisher after the ZMTP handshake, to send more than libzmq would."""
     made = socket.create_connection(("127.0.0.1", port), timeout=5.0)
     made.sendall(b"\xff" + bytes(8) + b"\x7f\x03\x00" + b"NULL".ljust(20, b"\0") + bytes(32))
     left = 64
@@ -372,7 +374,7 @@ def test_node_survives_invalid_replies_of_a_master(
         answered: list[object] = []
 
         def serve(until: str) -> bytes:
-            """Answer requests properly, until one of this name came; who asked."""
+            """Reply to requests properly until one of this name arrives. Return the sender's routing ID."""
             while True:
                 assert router.poll(5000), "the node says nothing any more"
                 sender, body = router.recv_multipart()

@@ -1,4 +1,4 @@
-"""Small messages that follow each other at once travel together: nobody can tell but by a shorter time."""
+"""Tests of batches: small messages published in quick succession are sent together."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def node(master: Master) -> Iterator[nep.Node]:
 
 @pytest.fixture
 def stranger(node: nep.Node) -> Iterator[Callable[..., zmq.Socket[bytes]]]:
-    """A subscriber of plain ZeroMQ that says this hello; what it is sent can be seen part by part."""
+    """Function that opens a plain ZeroMQ subscriber with a given hello, to inspect the received parts."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     context.linger = 0
     sockets = []
@@ -64,7 +64,7 @@ def able(topic: str) -> bytes:
 
 
 def heard(socket: zmq.Socket[bytes], count: int) -> list[tuple[int, int]]:
-    """How many messages each of the next parts has, until there are `count`; with the seq of its first."""
+    """Receive `count` messages. Return the number of messages in each part and the `seq` of its first."""
     said = []
     while sum(each for each, _seq in said) < count:
         parts = socket.recv_multipart()
@@ -202,7 +202,7 @@ def test_subscriber_that_joins_during_a_burst_counts_correctly(node: nep.Node) -
     heard: list[object] = []
 
     def is_all_heard() -> bool:
-        """On a busy computer it also gets some that were published before it came and still waited."""
+        """Return whether the last 50 messages arrived; earlier ones may still have been queued."""
         while (message := late.receive(0.01)) is not None:
             heard.append(message.payload)
         return heard[-50:] == list(range(50))

@@ -1,4 +1,4 @@
-"""Publishers of this computer are reached without TCP where there is such a way, and with it where not."""
+"""Tests of connections between programs of one computer: local sockets, with TCP as the fallback."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def endpoint(node: nep.Node, topic: str) -> str:
 
 
 def ends(sub: nep.Subscriber) -> list[str]:
-    """Where a subscriber is connected."""
+    """Return the endpoints that a subscriber is connected to."""
     return [source.endpoint for _id, source in sub._transport._readable.sources.items()]  # type: ignore[attr-defined]
 
 

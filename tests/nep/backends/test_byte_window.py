@@ -1,4 +1,4 @@
-"""How many bytes may be under way: the counting alone, without sockets."""
+"""Tests of the limit for bytes in flight, without sockets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from nep.backends.zeromq.byte_window import (
 
 
 class Held:
-    """A tracked message that libzmq holds until told otherwise."""
+    """Tracked message that libzmq holds until the test sets `done`."""
 
     done = False
 

@@ -1,4 +1,4 @@
-"""Bounds in bytes of real processes: what one does not read grows nowhere, and every loss is counted."""
+"""Tests of the limits in bytes with real processes: unread data grows nowhere, and every loss is counted."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from tests.nep.programs import Program, eventually, running
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows cannot stop a process")
 
 HUGE = 6_220_800
-"""A picture of 1920 x 1080."""
+"""Size of a 1920 x 1080 image in bytes."""
 MB = 2**20
 MAX_COUNT = WINDOW_BYTES + 64 * MB
-"""What a process may grow by; the second part is for one batch of a sink, or what Python does beside."""
+"""Maximum growth of a process in bytes; the second summand is for a batch of a sink and Python's overhead."""
 
 SUBSCRIBER = """
 import sys, threading, nep
@@ -63,7 +63,7 @@ def subscribed(program: Program) -> Program:
 
 
 def publish_huge(publisher: nep.Publisher, count: int) -> int:
-    """Publish so many, each in memory of its own; the most that this process grew by."""
+    """Publish `count` images in separate memory. Return the maximum growth of this process in bytes."""
     before = most = rss(os.getpid())
     for number in range(count):
         publisher.publish(bytes([number % 256]) * HUGE)
@@ -72,7 +72,7 @@ def publish_huge(publisher: nep.Publisher, count: int) -> int:
 
 
 def told(program: Program) -> tuple[int, int]:
-    """What it received, and what it lost."""
+    """Return the numbers of received and lost messages that a program reports."""
     program.say("tell")
     received, lost = program.line().split()
     return int(received), int(lost)
@@ -155,7 +155,7 @@ def test_burst_of_thirty_images_is_not_lost_with_a_late_reader(
 def test_subscriber_without_hello_that_reads_nothing_does_not_affect_others(
     node: nep.Node, publisher: nep.Publisher, master: Master
 ) -> None:
-    """It could be asked nothing: what libzmq holds for it is counted."""
+    """This subscriber can't acknowledge; the publisher counts what libzmq holds for it."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     with context.socket(zmq.SUB) as other, running(SUBSCRIBER, master.address, "quick") as quick:
         subscribed(quick)

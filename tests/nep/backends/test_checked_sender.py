@@ -1,4 +1,4 @@
-"""An answer of a robot counts only over the connection to the publisher that it names."""
+"""Tests that a robot's reply counts only when it arrives on the connection to the publisher that it names."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def master() -> Iterator[Master]:
 
 
 def forge(own: nep.Publisher, named: int, seq: int, payload: object, *, in_parts: bool) -> None:
-    """Send on the socket of one publisher what names another one."""
+    """Send a message on one publisher's socket that names another publisher."""
     data = json.dumps(payload).encode()
     head = Header(codec_for(TYPE).number, 0, seq, 1, named, len(data)).pack()
     first = TOPIC.encode() + b"\0"

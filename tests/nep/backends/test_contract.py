@@ -1,4 +1,4 @@
-"""The contract of back ends: the same tests over every one of them."""
+"""Contract tests that run with every back end."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from tests.nep.meeting import BACKENDS, Make, meeting, place_for
 from tests.nep.programs import eventually
 
 _has_ros2 = bool(os.environ.get("NEP_TEST_ROS2"))
-"""tests/nep/backends/test_ros2.py sets it in a network of its own, and runs this file there."""
+"""Set by tests/nep/backends/test_ros2.py, which runs this file in a separate network namespace."""
 _back_ends = ["ros2"] if _has_ros2 else list(BACKENDS)
 _DOMAIN = "5"
 _topics = ["test", "/a/b"] if _has_ros2 else ["test", "/a/b", "ü"]
-"""ROS 2 has no names with other letters."""
+"""Topics of the tests; ROS 2 allows no non-ASCII letters in names."""
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _somebody_who_knows_the_domain() -> Iterator[None]:
-    """The first node of a program takes a third of a second to look around in its domain."""
+    """Node that stays open: the first node of a program takes a third of a second for discovery."""
     if not _has_ros2:
         yield
         return
@@ -38,19 +38,19 @@ def _somebody_who_knows_the_domain() -> Iterator[None]:
 
 @pytest.fixture(params=_back_ends)
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Callable[[str], nep.Node]]:
-    """Makes nodes that can meet; closes them."""
+    """Factory of nodes on one network; they are closed after the test."""
     where = _DOMAIN if _has_ros2 else place_for(request.param, master.address)
     with meeting(request.param, where) as new:
         yield new
 
 
 def names(view: GraphView) -> set[str]:
-    """All nodes that the test has made."""
+    """Return the names of all nodes that the test has created."""
     return {each.name for each in view.nodes.values()} - {"knows"}
 
 
 def seq(number: int) -> int | None:
-    """A message's number; DDS counts too and tells nobody."""
+    """Return the expected sequence number of a message, or None for DDS, which doesn't expose its own."""
     return None if _has_ros2 else number
 
 
@@ -205,7 +205,7 @@ def test_payload_of_a_wrong_type_raises_with_and_without_a_subscriber(
 
 
 class Treacherous:
-    """Raises whatever one asks it, as a class of a user may."""
+    """Payload whose methods raise, as those of a user's class may."""
 
     def tolist(self) -> object:
         raise RuntimeError(self)

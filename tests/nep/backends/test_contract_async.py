@@ -1,4 +1,4 @@
-"""The contract of back ends: reading and spinning in a loop of asyncio."""
+"""Contract tests of back ends: receiving and spinning in an asyncio event loop."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.nep.programs import eventually, running
 
 @pytest.fixture(autouse=True)
 def _as_on_windows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A loop that takes no descriptors, as Windows' usual one."""
+    """Event loop without `add_reader`, as the default loop on Windows."""
 
     def add_reader(*_args: object) -> None:
         raise NotImplementedError
@@ -29,7 +29,7 @@ def _as_on_windows(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def run(task: Coroutine[Any, Any, Any]) -> Any:
-    """Run it, in a loop that is closed after; an error when that takes half a minute."""
+    """Run a coroutine in a new event loop; raise an error after 60 s."""
 
     async def bounded() -> Any:
         return await asyncio.wait_for(task, 60.0)
@@ -38,7 +38,7 @@ def run(task: Coroutine[Any, Any, Any]) -> Any:
 
 
 async def armed(sub: nep.Subscriber) -> None:
-    """Until the loop's thread waits for this one."""
+    """Wait until the event loop's thread waits for this subscriber."""
     while sub._transport not in loop_wait()._wait._armed:
         await yield_to_loop()
 
@@ -355,7 +355,7 @@ def test_cancelled_async_spin_releases_all_resources(make: Make) -> None:
 
 
 def test_loop_is_woken_once_per_batch_of_messages(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A message that comes alone rings once; those of a burst are read without it."""
+    """The first message of a burst wakes the loop; the others are read without another wake."""
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
     rings: list[int] = []

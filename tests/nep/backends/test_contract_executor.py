@@ -1,4 +1,4 @@
-"""The contract of back ends: several nodes that are spun together, also of different back ends."""
+"""Contract tests of back ends: several nodes, also of different back ends, that are spun together."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.nep.programs import eventually, running
 
 
 class Nodes:
-    """Makes nodes of any back end that can meet; they are closed at the end."""
+    """Factory of nodes of any back end on one network; they are closed at the end."""
 
     def __init__(self, master: Master) -> None:
         self._places = {each: place_for(each, master.address) for each in BACKENDS}
@@ -67,7 +67,7 @@ def test_nodes_of_one_back_end_spin_in_one_thread(make: Nodes, backend: str) -> 
 
 
 def test_nodes_of_all_back_ends_exchange_messages_in_one_thread(make: Nodes) -> None:
-    """A message goes from back end to back end, a hundred times around: each hop is a wait that was woken."""
+    """A message passes through all back ends a hundred times; every hop must wake the waiting thread."""
     nodes = [make(f"n{n}", backend) for n, backend in enumerate(BACKENDS)]
     subs = []
     hops: list[int] = []
@@ -134,7 +134,7 @@ def test_stopped_node_leaves_the_spin_and_the_others_continue(make: Nodes, backe
 def test_servers_answer_calls_during_a_spin_of_several_nodes(
     make: Nodes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A wait without a wake takes an hour."""
+    """A wait that isn't woken lasts an hour, so a missing wake fails the test."""
     monkeypatch.setattr("nep.nodes.executor.WAIT_SLICE_S", 3600.0)
     nodes = [make("a", "zeromq"), make("b", "memory")]
     thread = threading.Thread(target=nep.spin, args=nodes)
@@ -267,7 +267,7 @@ def test_spin_rejects_coroutine_callback_without_losing_its_message(make: Nodes)
 
 
 def test_back_end_without_poll_support_is_polled_periodically(make: Nodes) -> None:
-    """Also a back end of somebody else, that is older than `enter_wait`."""
+    """This includes third-party back ends that are older than `enter_wait`."""
 
     class Older:
         is_closed = False

@@ -1,4 +1,4 @@
-"""The contract of back ends: whoever subscribes later gets the last messages, then those that follow."""
+"""Contract tests of back ends: a late subscriber receives the history, then the following messages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.nep.programs import eventually, running
 
 
 def read(sub: nep.Subscriber, most: int) -> list[object]:
-    """What comes, `most` messages or until nothing comes for a moment."""
+    """Receive exactly `most` payloads; fail if another message follows."""
     got: list[object] = []
     while len(got) < most:
         ok, payload = sub.listen(timeout_s=30.0)
@@ -73,7 +73,7 @@ def test_latched_is_a_history_of_one(make: Make) -> None:
 
 
 def test_history_has_no_duplicates_or_gaps_during_continuous_publishing(make: Make) -> None:
-    """Subscribers come in the middle of a stream: what each gets begins `history` before, without a gap."""
+    """Subscribers join during a stream; each receives the last `history` messages and all later ones."""
     pub = make("a").new_pub("topic", history=50)
     others = make("b")
     is_over = threading.Event()

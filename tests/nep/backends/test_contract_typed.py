@@ -1,4 +1,4 @@
-"""The contract of back ends: typed messages, and programs that know nothing of types on the other side."""
+"""Contract tests of back ends: typed messages, also with programs that use no types."""
 
 from __future__ import annotations
 

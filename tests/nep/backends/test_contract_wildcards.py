@@ -1,4 +1,4 @@
-"""The contract of back ends: subscribers whose topic has wildcards hear all topics that match."""
+"""Contract tests of back ends: subscribers with a pattern receive all matching topics."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from tests.nep.programs import eventually, running
 
 
 def read(sub: nep.Subscriber, most: int) -> list[tuple[str, object]]:
-    """Topics and payloads of what comes."""
+    """Receive `most` messages. Return their topics and payloads."""
     got = []
     while len(got) < most:
         message = sub.receive(30.0)

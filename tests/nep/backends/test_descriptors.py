@@ -1,4 +1,4 @@
-"""A program that may open no more files gets a sentence; libzmq does not end it; nothing is half made."""
+"""Tests of programs at their file limit: a clear error, no crash in libzmq, and nothing half created."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ print(sub.listen(timeout_s=30.0))
 
 
 def test_existing_endpoints_survive_without_free_file_descriptors(master: Master) -> None:
-    """The program itself has opened all that it may; what is there goes on, the rest is refused."""
+    """The program itself has used all its descriptors."""
     code = (
         FEW
         + """
@@ -111,7 +111,7 @@ print(node.new_sub("own").listen(), [each for each in node.graph().topics])
 
 
 def test_publisher_with_a_low_file_limit_survives_a_hundred_subscribers(master: Master) -> None:
-    """libzmq accepts what it can; the publisher is not ended, and goes on with those who reach it."""
+    """libzmq accepts as many connections as it can; the publisher keeps serving those."""
     code = (
         FEW
         + """
@@ -160,7 +160,7 @@ sys.stdin.read()
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has local names")
 def test_publisher_closes_its_local_socket_when_file_descriptors_run_out(master: Master) -> None:
-    """libzmq ends the program when it cannot accept there; by TCP it only makes others wait."""
+    """libzmq aborts the program if it can't accept on a local socket; with TCP, others only wait."""
     code = (
         FEW
         + """

@@ -1,4 +1,4 @@
-"""Direct connections: who binds, both generations of the original wire, and the native one."""
+"""Tests of direct connections: which side binds, both generations of the original wire, the native wire."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from nep.errors import WireError
 
 @pytest.fixture
 def port() -> int:
-    """A port that was free just now, and the next one too."""
+    """Return a free port whose next port is free, too."""
     while True:
         with zmq.Context() as context, context.socket(zmq.REP) as one, context.socket(zmq.REP) as two:
             found = int(one.bind_to_random_port("tcp://127.0.0.1"))
@@ -176,7 +176,7 @@ def test_invalid_direct_connections_are_rejected() -> None:
 
 @pytest.mark.usefixtures("frequent_switching")
 def test_opening_while_another_thread_closes_the_last_node_raises_closed_error() -> None:
-    """The context of ZeroMQ ends with the last node, but not while another thread opens a socket in it."""
+    """The ZeroMQ context ends with the last node, but not while another thread opens a socket in it."""
     raised: list[BaseException] = []
 
     def subscribe(node: nep.Node, has_begun: threading.Event) -> None:

@@ -1,4 +1,4 @@
-"""The connections of subscribers on other computers; that old ones are ended is tested in tests/faults."""
+"""Tests of connections to subscribers on other computers; tests/faults covers how stale ones are closed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WANTED, GONE = b"\1", b"\0"
 
 @pytest.fixture
 def ends() -> Iterator[tuple[socket.socket, socket.socket]]:
-    """Both ends of a connection."""
+    """Both ends of a TCP connection."""
     with ExitStack() as stack:
         listener = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
         near = stack.enter_context(socket.create_connection(listener.getsockname()))

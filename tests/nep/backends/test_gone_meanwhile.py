@@ -1,4 +1,7 @@
-"""Who goes while somebody comes is not waited for: the master's two answers may overtake each other."""
+"""Test that a publisher that closes during a subscription causes no delay.
+
+The master's reply and its notification may be processed in either order.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,7 @@ def test_publisher_that_closes_before_its_subscriber_connects_does_not_delay_sub
         def slow(
             self: MasterSession, record: SubscriberRecord, made: NativeSubscriber, wait_s: float | None
         ) -> FoundReply:
-            """The thread that subscribes goes on only when the master's next words have been read."""
+            """Delay the subscribing thread until the master's later messages have been processed."""
             told.append(known(self, record, made, wait_s))
             closing.close(0.0)
             eventually(lambda: not comes.graph().topics["topic"].publishers)

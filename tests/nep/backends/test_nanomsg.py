@@ -1,4 +1,4 @@
-"""What is nanomsg's alone: direct connections, programs of libnanomsg, a missing pynng, other back ends."""
+"""Tests of the nanomsg back end: direct connections, libnanomsg programs, a missing pynng."""
 
 from __future__ import annotations
 

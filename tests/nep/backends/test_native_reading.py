@@ -1,4 +1,4 @@
-"""The short ways of the native wire: what they skip is still seen, and nobody is kept waiting for them."""
+"""Tests of the fast paths of the native wire: they skip no handshake or message and delay no reader."""
 
 from __future__ import annotations
 
@@ -181,14 +181,14 @@ print("stands")
 
 @pytest.mark.parametrize("size", [1000, 20_000])
 def test_frequent_subscribing_and_unsubscribing_does_not_crash_the_program(master: Master, size: int) -> None:
-    """It did: libzmq does not stand another high-water mark while a connection is closing."""
+    """Regression test: libzmq crashes if the high-water mark is changed while a connection is closing."""
     for _ in range(2):
         with running(COMING_AND_GOING, master.address, str(size)) as program:
             assert program.line() == "stands"
 
 
 def test_stream_of_large_messages_does_not_stall(node: nep.Node, master: Master) -> None:
-    """More than may be under way, over several renewals: nothing that happens then may stop it."""
+    """Sends more than the window for bytes in flight, during several renewals."""
     with nep.node("other", master=master.address) as other:
         pub, sub = node.new_pub("on", "bytes"), other.new_sub("on", "bytes")
         data = os.urandom(20_000)
@@ -237,7 +237,7 @@ def test_subscription_without_hello_receives_three_part_messages(
 
 
 def test_publisher_with_a_changed_port_is_reconnected(context: zmq.Context[zmq.Socket[bytes]]) -> None:
-    """So after a master's `--listen` was off and on again: the same address, another port."""
+    """Happens when a master is restarted without and then with `--listen`: same address, other port."""
     spec = SubscriberSpec(5, "t", "bytes", Hybrid("x", "many2many"), None)
     sub = SubSocket(context.socket(zmq.SUB), spec)
     first, second = context.socket(zmq.XPUB), context.socket(zmq.XPUB)

@@ -1,4 +1,7 @@
-"""Small messages travel in one part to those who read that, and in three as soon as somebody else listens."""
+"""Tests of the number of parts of small messages.
+
+They have one part while all subscribers support that, and three as soon as another subscriber joins.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ def node(master: Master) -> Iterator[nep.Node]:
 
 @pytest.fixture
 def stranger(node: nep.Node) -> Iterator[Stranger]:
-    """A subscriber that is no nep's: connects to the topic's publisher and sets these filters."""
+    """Function that connects a plain ZeroMQ subscriber with these filters to the topic's publisher."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     context.linger = 0
     sockets = []
@@ -45,7 +48,7 @@ def stranger(node: nep.Node) -> Iterator[Stranger]:
 
 
 def heard(pub: nep.Publisher, socket: zmq.Socket[bytes], payload: bytes, parts: int) -> None:
-    """Publishes until the socket hears it in so many parts."""
+    """Publish until the socket receives the payload in this number of parts."""
 
     def comes() -> bool:
         pub.publish(payload)

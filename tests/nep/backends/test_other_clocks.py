@@ -1,4 +1,4 @@
-"""Latency between two computers: programs of this one, of which one has another clock."""
+"""Tests of latency between two computers, simulated by programs of which one has another clock."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Place:
 
 
 def heard(sub: Subscriber, is_wanted: Callable[[Message], bool]) -> Message:
-    """The next message that is as wanted; looked at as soon as it comes."""
+    """Wait for the first message that meets a condition, evaluated on receipt."""
     until = time.monotonic() + LONG_S
     while time.monotonic() < until:
         message = sub.receive(1.0)

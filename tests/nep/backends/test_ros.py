@@ -1,4 +1,4 @@
-"""The back end `ros` with real programs of ROS; the contract runs in a process of its own."""
+"""Tests of the back end `ros` with real ROS programs; its contract tests run in a separate process."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.nep.programs import ROOT, running
 
 @pytest.fixture
 def debian() -> None:
-    """There is ROS."""
+    """Skip the test without ROS."""
     skip_without_ros()
 
 

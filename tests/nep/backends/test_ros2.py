@@ -1,7 +1,7 @@
-"""ROS 2: what needs no network here, and ros2_child.py and the contract in a network of their own.
+"""Tests of ROS 2 without a network, and a run of the other tests in a network namespace.
 
-Cyclone DDS listens at every address of a computer (0.0.0.0), whatever it is told, so tests that open it run
-in a network namespace that has loopback and nothing else.
+Cyclone DDS listens on all addresses of a computer (0.0.0.0) in any configuration. Tests that open it
+(ros2_child.py and the contract tests) run in a network namespace that has only the loopback interface.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ NAMESPACE = [
 
 
 def why_not() -> str:
-    """What is missing for a network of its own; empty when nothing is."""
+    """Return why a network namespace can't be created, or "" if it can."""
     missing = [each for each in ("unshare", "bash", "ip") if shutil.which(each) is None]
     if missing:
         return f"a network of its own needs {', '.join(missing)} (Linux: util-linux, iproute2)"
@@ -58,7 +58,7 @@ def why_not() -> str:
 
 
 def why_no_fast_dds() -> str:
-    """What is missing for a program with Fast DDS; empty when nothing is."""
+    """Return why no Fast DDS program can be built, or "" if one can."""
     if shutil.which("g++") is not None:
         header = "#include <fastdds/dds/domain/DomainParticipant.hpp>\n"
         command = ["g++", "-E", "-xc++", "-"]
@@ -282,7 +282,7 @@ def test_every_known_type_round_trips(types: MessageTypes) -> None:
 
 
 def test_type_hashes_match_those_of_ros_2(types: MessageTypes) -> None:
-    """As real ROS 2 told them; `Gid` has a `char`, which rosbags takes for a type of its own."""
+    """The hashes come from ROS 2; `Gid` has a `char` field, which rosbags treats as its own type."""
     string = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
     info = "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"
     assert types.type_hash("std_msgs/msg/String") == string
@@ -450,7 +450,7 @@ def test_multidimensional_array_is_rejected(types: MessageTypes, shape: tuple[in
 
 
 def test_corrupted_bytes_are_decoded_or_raise_decode_error(types: MessageTypes) -> None:
-    """What is said of the graph, and a few others, with all kinds of damage."""
+    """Damages the graph information and two other message types in random places."""
     chance = random.Random(1)
     names = ["rmw_dds_common/msg/ParticipantEntitiesInfo", "sensor_msgs/msg/Image", "tf2_msgs/msg/TFMessage"]
     gid = {"data": bytes(16)}

@@ -1,4 +1,4 @@
-"""Topics of nep's own wire and of ROS, joined by a bridge that runs in a process of its own."""
+"""Test of a bridge process between the native wire and ROS."""
 
 from __future__ import annotations
 

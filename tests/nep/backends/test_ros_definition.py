@@ -1,4 +1,4 @@
-"""Bytes of ROS messages, without ROS; and the same bytes as genpy makes, where it is installed."""
+"""Tests of the ROS message codec without ROS, and of its equality with genpy where that is installed."""
 
 from __future__ import annotations
 

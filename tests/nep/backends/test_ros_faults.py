@@ -1,4 +1,4 @@
-"""The back end `ros` when things go wrong: masters, nodes and subscribers that die, hang or lie."""
+"""Tests of the back end `ros` with masters, nodes and subscribers that die, hang or send wrong data."""
 
 from __future__ import annotations
 
@@ -301,7 +301,7 @@ def test_default_master_address_is_localhost(monkeypatch: pytest.MonkeyPatch) ->
 
 
 class Connection:
-    """As rospy's QueuedConnection, with nobody who takes anything."""
+    """Fake of rospy's QueuedConnection that never sends from its queue."""
 
     def __init__(self, queue_size: int, queue: list[bytes]) -> None:
         import threading

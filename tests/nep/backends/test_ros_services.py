@@ -1,4 +1,7 @@
-"""Services of the back end `ros` with real programs of ROS; the contract runs in a process of its own."""
+"""Tests of services of the back end `ros` with real ROS programs.
+
+The contract tests run in a separate process.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Large payloads between programs of one computer: in shared memory where that can be, and always whole."""
+"""Tests of large payloads between programs of one computer, in shared memory where possible."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def node(master: Master) -> Iterator[nep.Node]:
 
 
 def readers(publisher: nep.Publisher) -> int:
-    """How many subscribers read its shared memory."""
+    """Return the number of subscribers that read the publisher's shared memory."""
     transport = publisher._transport
     assert isinstance(transport, NativePublisher)
     shared = transport._subscriptions.shared
@@ -65,7 +65,7 @@ def readers(publisher: nep.Publisher) -> int:
 
 
 def begin(publisher: nep.Publisher, *, count: int = 1, size: int = LARGE) -> int:
-    """Publish until so many subscribers share; how many messages that took."""
+    """Publish until `count` subscribers use shared memory. Return the number of published messages."""
     sent = itertools.count(1)
     number = 0
 
@@ -82,7 +82,7 @@ def begin(publisher: nep.Publisher, *, count: int = 1, size: int = LARGE) -> int
 
 
 def in_memory(message: nep.Message) -> bool:
-    """Whether its payload still lies where the publisher put it."""
+    """Return whether the payload is still in the shared memory that the publisher wrote."""
     return hasattr(message.data.obj, "held")
 
 
@@ -384,7 +384,7 @@ def test_memory_of_a_killed_publisher_is_removed_by_the_next_program() -> None:
 
 
 def _files() -> list[str]:
-    """What programs share here, but for this one."""
+    """Return the names of nep's shared memory files on this computer, without the global one."""
     return [each.name for each in Path(_MEMORY).glob("nep_*") if "global" not in each.name]
 
 
@@ -494,7 +494,7 @@ def test_invalid_runtime_folder_is_rejected(monkeypatch: pytest.MonkeyPatch, tmp
 
 @pytest.mark.parametrize("part", [b"", b"\0" * 7, struct.pack("<Q", 2**64 - 1), struct.pack("<Q", 1)])
 def test_reference_to_a_missing_payload_is_counted(node: nep.Node, part: bytes) -> None:
-    """Somebody sends the flag, and there is no memory: refused, or lost, and the next one is heard."""
+    """The reference is rejected or counted as lost, and the next message is received."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     stranger = context.socket(zmq.PUB)
     try:

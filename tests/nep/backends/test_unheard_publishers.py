@@ -1,4 +1,4 @@
-"""Losses of publishers that a subscriber has not heard yet: counted from the first message of a new one."""
+"""Tests of the losses of publishers not received from yet, counted from a new publisher's first message."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ KEY = "a publisher behind a closed port"
 
 
 def new_publisher(history: int = 0) -> PublisherTracker:
-    """Losses of a subscriber that was registered when publisher 5 was created."""
+    """Return the losses of a subscriber that was registered when publisher 5 was created."""
     sources = PublisherTracker()
     sources.expect_all_messages(5)
     sources.add_listed(RemotePublisher(PublisherRecord(5, "t", "json", "json", history=history), "n", "name"))
@@ -145,14 +145,14 @@ def test_impossible_first_number_is_rejected_and_not_counted() -> None:
 
 @pytest.fixture
 def closed_port() -> Iterator[str]:
-    """An endpoint that rejects connections and stays reserved."""
+    """Endpoint that rejects connections and stays reserved."""
     with socket.socket() as held:
         held.bind(("127.0.0.1", 0))
         yield f"tcp://127.0.0.1:{held.getsockname()[1]}"
 
 
 class UnreachablePublisher:
-    """A publisher that no subscriber can connect to."""
+    """Publisher that no subscriber can connect to."""
 
     def __init__(self, master: Attacker, endpoint: str) -> None:
         self._master = master

@@ -1,4 +1,4 @@
-"""What is zenoh's alone: programs that meet without a master, a router between them, places, forks."""
+"""Tests of the zenoh back end: discovery without a master, a router, configuration files and forks."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def port() -> int:
 
 
 def trouble(node: nep.Node) -> str:
-    """Why its graph cannot be had, or ""."""
+    """Return the error of a request for the graph, or "" when it succeeds."""
     try:
         node.graph()
     except nep.NepError as error:

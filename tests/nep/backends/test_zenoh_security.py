@@ -1,4 +1,4 @@
-"""Zenoh's TLS and access control: a router that asks for certificates, and what nodes are told."""
+"""Tests of Zenoh's TLS and access control with a router that requires certificates."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ _MESSAGES = [
     "liveliness_query", "declare_liveliness_subscriber",
 ]  # fmt: skip
 OPEN = ["nep/v1/live/**", "nep/v1/call/**", "nep/v1/hello/**", "nep/v1/data/open", "nep/v1/serve/open/**"]
-"""What guests may: see each other, the topic "open", the service "open"."""
+"""Key expressions allowed to guests: discovery, the topic `open` and the service `open`."""
 
 
 @dataclass(frozen=True)
 class Lab:
-    """A router, and where certificates lie: of "robot" and "guest", and of "stranger", whom nobody signed."""
+    """Router with the certificates of `robot` and `guest`, and of `stranger`, which is self-signed."""
 
     folder: Path
     endpoint: str
 
     def master(self, certificate: str, authority: str = "authority") -> str:
-        """The configuration file of a node with this certificate; "": with none."""
+        """Return the configuration file of a node with this certificate; "" means without one."""
         tls: dict[str, object] = {"root_ca_certificate": str(self.folder / f"{authority}.pem")}
         if certificate:
             tls |= {
@@ -92,7 +92,10 @@ def rule(name: str, keys: list[str]) -> dict[str, object]:
 
 
 def router(folder: Path, endpoint: str) -> str:
-    """The router's configuration file: robots may everything, guests what is open, others nothing."""
+    """Return the router's configuration file.
+
+    Robots may do everything, guests only what is open, others nothing.
+    """
     told = {
         "mode": "router",
         "listen": {"endpoints": [endpoint]},
@@ -169,7 +172,7 @@ def test_messages_are_exchanged_with_certificates(make: Make) -> None:
 
 
 def test_traffic_is_encrypted(lab: Lab) -> None:
-    """Who looks at what a node sends before it is answered sees a handshake of TLS."""
+    """The first bytes that a node sends are a TLS handshake."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
         listening.settimeout(LONG_S)
         file = Path(lab.master("robot"))
@@ -196,7 +199,7 @@ def test_traffic_is_encrypted(lab: Lab) -> None:
     ("certificate", "authority"), [("", "authority"), ("stranger", "authority"), ("robot", "stranger")]
 )
 def test_untrusted_peer_is_rejected_with_a_message(lab: Lab, certificate: str, authority: str) -> None:
-    """Without a certificate, with one that nobody signed, and where the router's own is not trusted."""
+    """Covers no certificate, a self-signed one, and an untrusted certificate of the router."""
     with nep.node("a", "zenoh", master=lab.master(certificate, authority), wait_s=1.0) as node:
         for make in (lambda: node.new_pub("open"), lambda: node.new_client("open"), node.graph):
             with pytest.raises(nep.NepError, match=r"\.json5': .*trusts the certificate"):
@@ -222,7 +225,7 @@ def test_missing_certificate_files_are_reported(lab: Lab) -> None:
 
 
 def test_denied_topic_delivers_nothing_and_its_losses_are_known_at_the_end(make: Make) -> None:
-    """As docs/zenoh.md says: a router tells nobody that it denies something."""
+    """As docs/zenoh.md explains, a router reports to no node that it denies something."""
     robot, guest = make("robot"), make("guest", "guest")
     secret, opened = guest.new_sub("secret"), guest.new_sub("open")
     pub, other = robot.new_pub("secret"), robot.new_pub("open")

@@ -1,4 +1,4 @@
-"""A blackboard by itself: no node, and a clock that stands still until it is told."""
+"""Tests of a blackboard without a node, with a fake clock."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nep.programs.blackboard.keys import key_text, parse_key
 
 
 class Clock:
-    """Tells the seconds that it is set to."""
+    """Fake clock that returns `now` in seconds."""
 
     def __init__(self) -> None:
         self.now = 1000.0

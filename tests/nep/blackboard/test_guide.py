@@ -1,4 +1,4 @@
-"""docs/blackboard.md: its programs run and print what it says, and what it names is there."""
+"""Tests of docs/blackboard.md: its programs print the documented output, and the methods it names exist."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SAID = re.compile(r"It prints `([^`]+)`")
 
 
 def _programs() -> dict[str, tuple[str, list[str]]]:
-    """By the head of its section: a program, and the lines that it is said to print."""
+    """Return the program and the expected output lines of each section, by its heading."""
     found = {}
     for section in _GUIDE.split("\n## ")[1:]:
         before, fence, after = section.partition("```python\n")

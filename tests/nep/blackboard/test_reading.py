@@ -1,4 +1,4 @@
-"""What messages become on a blackboard, and from when their age counts. No node."""
+"""Tests of the conversion of messages to blackboard values and of the start of their ages, without a node."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_age_counts_from_the_time_stamp_or_the_arrival(
 
 
 class Walls:
-    """A wall clock that is set, beside one that goes on."""
+    """Fake clocks: a wall clock that can be set, and a monotonic one."""
 
     def __init__(self) -> None:
         self.now, self.wall_ns = 100.0, WALL_NS

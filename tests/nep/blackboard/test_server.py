@@ -1,4 +1,4 @@
-"""One blackboard that other programs ask: its services, and the topic of its changes."""
+"""Tests of the services of a blackboard for other programs and of its topic of changes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Ask = Callable[..., Any]
 
 @pytest.fixture(params=["memory", "zeromq"])
 def where(request: pytest.FixtureRequest, master: Master) -> tuple[str, str]:
-    """A back end, and its master."""
+    """Back end and master address."""
     return request.param, f"served-{next(_names)}" if request.param == "memory" else master.address
 
 
@@ -32,7 +32,7 @@ def other(where: tuple[str, str]) -> Iterator[nep.Node]:
 
 @pytest.fixture
 def board(where: tuple[str, str]) -> Iterator[nep.Blackboard]:
-    """Served by a node that spins in a thread of its own."""
+    """Blackboard that is served by a node spinning in its own thread."""
     with (
         nep.node("blackboard", where[0], master=where[1]) as node,
         nep.Blackboard(node) as board,
@@ -149,7 +149,7 @@ def test_changes_are_published(ask: Ask, board: nep.Blackboard, other: nep.Node)
 def test_wildcard_watch_ignores_change_topics_of_blackboards(
     ask: Ask, board: nep.Blackboard, other: nep.Node
 ) -> None:
-    """Two that watch everything would tell each other of each other for ever."""
+    """Otherwise two blackboards that watch everything would forward each other's changes endlessly."""
     second = nep.Blackboard(other)
     with BlackboardServer(other, second, "second"):
         second.watch("/**")

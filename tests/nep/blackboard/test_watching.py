@@ -1,4 +1,4 @@
-"""A blackboard and the topics that it watches, in memory and by ZeroMQ."""
+"""Tests of a blackboard that watches topics, over the memory and ZeroMQ back ends."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Make = Callable[[str], nep.Node]
 
 @pytest.fixture(params=["memory", "zeromq"])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that can meet; closes them."""
+    """Factory of nodes on one network; they are closed after the test."""
     made: list[nep.Node] = []
     where = f"blackboard-{next(_names)}" if request.param == "memory" else master.address
 

@@ -1,4 +1,4 @@
-"""Networks of every kind for the tests of bridges, and what they ask of all of them."""
+"""Networks of every back end for the tests of bridges, and helper functions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _names = itertools.count()
 
 
 class Net:
-    """A network of one back end, with nodes of its own; a context manager."""
+    """Network of one back end, with its own nodes. Usable as a context manager."""
 
     def __init__(self, backend: str) -> None:
         self.backend = backend
@@ -64,7 +64,7 @@ def configured(a: Net, b: Net, *topics: BridgeTopic, name: str = "test") -> Brid
 
 
 def topic(a: str, b: str = "", direction: str = "both", **more: object) -> BridgeTopic:
-    """Also a_type, b_type, max_rate_hz."""
+    """Return a topic of a bridge. Keyword arguments include a_type, b_type and max_rate_hz."""
     a_end = TopicEnd(a, str(more.pop("a_type", "")))
     b_end = TopicEnd(b or a, str(more.pop("b_type", "")))
     return BridgeTopic(a_end, b_end, direction, **more)  # type: ignore[arg-type]
@@ -78,13 +78,13 @@ def bridged(a: Net, b: Net, *topics: BridgeTopic, name: str = "test") -> Iterato
 
 
 def route(bridge: Bridge, origin: str, name: str) -> Route:
-    """The route of the topic of that side."""
+    """Return the route that starts at the topic of a side."""
     (found,) = [each for each in bridge.routes if (each.origin.side, each.origin.topic) == (origin, name)]
     return found
 
 
 def settled(found: Route, received: int) -> RouteCounts:
-    """Its counts when so many have been received and none waits; each is accounted for once."""
+    """Wait until `received` messages have arrived and none waits. Check that each is counted once."""
     eventually(lambda: found.counts().received >= received and not found.counts().waiting)
     counts = found.counts()
     assert counts.received == counts.sent + counts.thinned + counts.failed + counts.dropped
@@ -92,10 +92,10 @@ def settled(found: Route, received: int) -> RouteCounts:
 
 
 def taken(subscriber: nep.Subscriber, count: int) -> list[object]:
-    """So many payloads."""
+    """Receive `count` payloads."""
     return [subscriber.listen(timeout_s=30.0)[1] for _ in range(count)]
 
 
 def silent(subscriber: nep.Subscriber) -> bool:
-    """Whether nothing comes for a moment."""
+    """Return whether no message arrives within 0.3 s."""
     return subscriber.receive(0.3) is None

@@ -1,4 +1,4 @@
-"""Bridges beside nodes of ROS 2; run by test_ros2_bridge.py in a network of its own."""
+"""Tests of bridges with ROS 2 nodes. Run by test_ros2_bridge.py in a separate network namespace."""
 
 from __future__ import annotations
 

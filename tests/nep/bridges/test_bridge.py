@@ -1,4 +1,4 @@
-"""Bridges with real nodes on every pair of back ends: names, types, both ways, latched, and exact counts."""
+"""Tests of bridges between every pair of back ends: names, types, directions, latched topics, counts."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_named_type_is_preserved():
 
 @pytest.mark.parametrize("soon_s", [0.05, 0.5])
 def test_bridge_adopts_the_type_of_other_publishers_of_the_topic(monkeypatch, soon_s):
-    """However lately the bridge has looked who is there: the type is decided by a look after the message."""
+    """The bridge polls the topics again after the message to determine the type, at any polling interval."""
     monkeypatch.setattr("nep.programs.bridges.side._EARLY_POLL_S", soon_s)
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")) as bridge:
         on_b = b.node("b")
@@ -235,7 +235,7 @@ def test_unknown_target_type_is_reported_once_and_its_messages_wait(twist_side, 
 
 
 class Typed(memory.MemoryTransport):
-    """Its messages are read by their publisher's codec, whoever else knows it."""
+    """Memory transport whose messages are decoded by the publisher's codec, even if others don't know it."""
 
     def create_publisher(self, spec):
         made = super().create_publisher(spec)
@@ -247,7 +247,7 @@ class Typed(memory.MemoryTransport):
 
 @pytest.fixture
 def twist_side(monkeypatch):
-    """A back end with a type and codec of its own, as those of ROS have them."""
+    """Bridge side whose back end has its own type and codec, as the ROS back ends have."""
 
     def encode(payload):
         if not isinstance(payload, dict) or "x" not in payload:
@@ -517,7 +517,7 @@ def test_messages_beyond_the_backlog_limit_are_dropped_and_counted(monkeypatch):
 
 def test_failed_route_does_not_stop_the_others(caplog):
     class Bad:
-        """A node of whom one topic is refused."""
+        """Node that raises for one topic."""
 
         def __init__(self, node):
             self._node = node

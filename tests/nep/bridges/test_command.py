@@ -1,4 +1,4 @@
-"""`nep bridge` as a process: what it joins, what it shows, and how it ends."""
+"""Tests of the command `nep bridge`: forwarding, output, and exit."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def place():
 
 @pytest.fixture
 def file(tmp_path, master, place):
-    """A file that joins the master's network with one of zenoh; more may be put behind it."""
+    """Function that writes a configuration file that joins the master's network with a Zenoh network."""
 
     def write(topics, address=master.address):
         path = tmp_path / "lab.toml"
@@ -48,13 +48,13 @@ def nodes(master, place):
 
 
 def reports(program):
-    """The JSON texts that it writes."""
+    """Yield the JSON reports that the command prints."""
     while True:
         yield json.loads(program.line())
 
 
 def when(program, is_met):
-    """The first report of which this is so."""
+    """Return the first report that meets a condition."""
     return next(each for each in reports(program) if is_met(each))
 
 
@@ -176,7 +176,7 @@ def test_bridge_command_waits_for_a_master_that_starts_later(file, place):
 
 
 class OnTerminal:
-    """The command on a terminal of its own, with all that it has written there."""
+    """Command that runs on its own pseudo-terminal, with all its output."""
 
     def __init__(self, *words):
         self._keys, terminal = os.openpty()
@@ -191,7 +191,7 @@ class OnTerminal:
         self.text = ""
 
     def shows(self, word):
-        """Read on until it has written this."""
+        """Read output until it contains this text."""
         while word not in self.text:
             self.text += self._read()
 
@@ -204,7 +204,7 @@ class OnTerminal:
         return said
 
     def end(self):
-        """What it wrote after Ctrl+C, and its exit code."""
+        """Press Ctrl+C. Return the output that follows and the exit code."""
         self.process.send_signal(signal.SIGINT)
         before = len(self.text)
         with pytest.raises(AssertionError, match="it ended"):

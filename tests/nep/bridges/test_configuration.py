@@ -1,4 +1,4 @@
-"""The file of a bridge: what it may say, and a sentence with line and key for all else."""
+"""Tests of the bridge configuration file: valid options, and errors with line and key."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_default_name_is_the_file_name(tmp_path):
 
 
 def test_example_file_is_valid(monkeypatch):
-    """ROS may not be there: the words are looked at, not what is installed."""
+    """ROS may not be installed, so only the text is parsed."""
     text = EXAMPLE.replace('backend = "ros"', 'backend = "zenoh"')
     told = read(text)
     assert [each.direction for each in told.topics] == ["both", "a->b", "b->a", "b->a"]
@@ -196,7 +196,7 @@ values = st.recursive(
 
 
 def toml(value):
-    """A value as TOML."""
+    """Return a value in TOML format."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):

@@ -1,4 +1,4 @@
-"""No message goes round for ever: rings of bridges, both ways, and networks that tell nothing of origins."""
+"""Tests that no message loops: rings of bridges, both directions, and networks without trails of origins."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.nep.programs import eventually
 
 
 def quiet(*bridges: Bridge) -> None:
-    """Nothing moves any more; what moved in the ring has an end."""
+    """Wait until the message counts of the bridges no longer change."""
     before: list[tuple[int, int]] = []
 
     def is_still() -> bool:
@@ -122,7 +122,7 @@ def test_chain_of_bridges_forwards_messages():
 
 
 def test_loop_is_stopped_by_bridge_id_if_network_names_differ():
-    """Both bridges call each network another name, as two computers do."""
+    """Each bridge has its own name for every network, as on two computers."""
     with nets("memory", "zeromq") as (a, b):
 
         def named(name):
@@ -149,7 +149,7 @@ def test_loop_is_stopped_by_bridge_id_if_network_names_differ():
 
 
 class Nameless(memory.MemoryTransport):
-    """As ROS 1: who hears its own messages, without a publisher, and no room for an extension."""
+    """Transport like ROS 1: it delivers own messages, without a publisher, and can't carry extensions."""
 
     def create_publisher(self, spec):
         made = super().create_publisher(spec)

@@ -1,4 +1,4 @@
-"""Bridges carry nothing that would move a robot which nobody has allowed to move, either way."""
+"""Tests that a bridge forwards no message that would move a robot without permission, in either direction."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ORDER = {"op": "invoke", "action": "walk"}
 
 
 def describe(robot: nep.Node, name: str, command: str) -> nep.Subscriber:
-    """A robot that names its command topic itself; what it is told."""
+    """Publish a robot description with its own command topic. Return a subscriber of that topic."""
     description = {"title": name, "rb:topics": {"command": command}}
     robot.new_pub(f"/{name}/description", "robot/description", latched=True).publish(description)
     return robot.new_sub(command)
@@ -24,7 +24,7 @@ def describe(robot: nep.Node, name: str, command: str) -> nep.Subscriber:
 
 @pytest.mark.parametrize("direction", ["a->b", "b->a"])
 def test_bridge_blocks_messages_that_move_a_robot_under_another_topic_name(direction):
-    """The robot was not there when the bridge began: each message is checked."""
+    """The robot joins after the bridge has started, so each message is checked."""
     with nets("zeromq", "memory") as (a, b):
         near, far = (a, b) if direction == "a->b" else (b, a)
         names = ("/innocent", "/orders") if direction == "a->b" else ("/orders", "/innocent")

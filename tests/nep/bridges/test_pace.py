@@ -1,4 +1,4 @@
-"""A rate limit: the newest is kept, what it replaced is counted apart from what was lost."""
+"""Tests of the rate limit: it keeps the newest message and counts replaced ones separately from lost ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bridges beside ROS 2, in a network of their own: see tests/nep/backends/test_ros2.py."""
+"""Tests of bridges with ROS 2 in a separate network namespace; see tests/nep/backends/test_ros2.py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""A bridge beside a robot of ROS 1: `nep bridge` and a program of rospy as processes, nodes of nep here."""
+"""Tests of `nep bridge` with ROS 1.
+
+The bridge and a rospy program run as processes; the nep nodes run in the test process.
+"""
 
 from __future__ import annotations
 

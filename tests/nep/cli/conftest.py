@@ -1,6 +1,6 @@
-"""Commands that are typed in the process of the test: a tenth of the time of a process of their own.
+"""Fixtures that run commands in the test process, in a tenth of the time of a separate process.
 
-What a process of its own shows (both streams as pipes, exit codes, Ctrl+C, terminals) is in `test_command`,
+Standard streams as pipes, exit codes of processes, Ctrl+C and terminals are tested in `test_command`,
 `test_streams`, `test_interrupts` and `test_terminal`.
 """
 
@@ -17,7 +17,7 @@ from nep.cli.app import run
 
 
 class Typed(NamedTuple):
-    """How a command ended, and what it wrote."""
+    """Exit code and output of a command."""
 
     returncode: int
     stdout: str
@@ -29,7 +29,7 @@ TypeIn: TypeAlias = Callable[..., Typed]
 
 @pytest.fixture
 def type_in(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> TypeIn:
-    """Types the words behind `nep` of a command that ends."""
+    """Function that runs `nep` with the given arguments and returns its exit code and output."""
 
     def typed(*words: str) -> Typed:
         monkeypatch.setattr("sys.argv", ["nep", *words])

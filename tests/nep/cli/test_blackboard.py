@@ -1,4 +1,4 @@
-"""`nep blackboard` as a person uses it."""
+"""Tests of the command `nep blackboard`."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ ENVIRONMENT = {"PYTHONPATH": str(REPOSITORY), "COLUMNS": "160"}
 
 @pytest.fixture
 def run(type_in: TypeIn, monkeypatch: pytest.MonkeyPatch) -> TypeIn:
-    """Types the words behind `nep blackboard`."""
+    """Function that runs `nep blackboard` with the given arguments."""
     monkeypatch.setenv("COLUMNS", "160")
     return lambda *words: type_in("blackboard", *words)
 
 
 @contextmanager
 def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """A blackboard that running blackboard."""
+    """Start `nep blackboard` as a process and wait until it runs."""
     process = subprocess.Popen(
         [sys.executable, "-m", "nep", "blackboard", *arguments],
         stdout=subprocess.PIPE,

@@ -1,4 +1,7 @@
-"""Commands in a terminal that takes nothing, by Ctrl+S or because nobody reads it: they and others go on."""
+"""Tests of commands whose terminal accepts no output, because of Ctrl+S or because no process reads it.
+
+Neither the command nor other nodes may block.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ if sys.platform == "win32":
 LONG_S = 50.0
 STOP, GO_ON, INTERRUPT = b"\x13", b"\x11", b"\x03"  # Ctrl+S, Ctrl+Q, Ctrl+C
 QUIET = 20
-"""Looks at a terminal, one behind the other, that show nothing new."""
+"""Number of consecutive reads without new output after which the output counts as paused."""
 IN_ITS_TERMINAL = """
 import fcntl, os, sys, termios
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
@@ -31,7 +34,7 @@ os.execv(sys.argv[1], sys.argv[1:])
 
 
 class Shown:
-    """A command in a terminal of its own, and what that shows when it is looked at."""
+    """Command in its own pseudo-terminal, with the text that it has printed."""
 
     def __init__(self, *words: str, master: str) -> None:
         self.keys, terminal = os.openpty()
@@ -48,7 +51,7 @@ class Shown:
         self.text = ""
 
     def look(self) -> str:
-        """What it shows, from the beginning."""
+        """Read the available output and return all text since the start."""
         with suppress(BlockingIOError, OSError):  # there is nothing; it has ended
             while data := os.read(self.keys, 65536):
                 self.text += data.decode("utf-8", "replace")
@@ -58,7 +61,7 @@ class Shown:
         os.write(self.keys, keys)
 
     def stop_it(self) -> None:
-        """Ctrl+S, until nothing comes any more."""
+        """Press Ctrl+S and wait until no more output arrives."""
         self.press(STOP)
         lengths: list[int] = []
 
@@ -82,7 +85,7 @@ def shown(*words: str, master: str) -> Iterator[Shown]:
 
 @contextmanager
 def talking(node: nep.Node) -> Iterator[None]:
-    """It publishes and logs, some hundred times a second, for others who must hear all of it."""
+    """Publish and log about 300 times a second; check that a subscriber received the first message."""
     pub, ended = node.new_pub("flood"), threading.Event()
     heard = node.new_sub("flood")
     node.log.propagate = False  # the test's own output needs none of it

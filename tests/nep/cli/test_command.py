@@ -1,4 +1,4 @@
-"""The command `nep` as a person uses it: exit codes, both streams, and what only processes show."""
+"""Tests of the command `nep` as a process: exit codes, both output streams and signals."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def run(*arguments, given=""):
 
 
 class Running:
-    """A command that goes on, with what it says."""
+    """Running command with pipes for its output."""
 
     def __init__(self, *arguments):
         own_group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP} if sys.platform == "win32" else {}
@@ -52,14 +52,14 @@ class Running:
         )
 
     def wait_says(self, word):
-        """The line of the error stream that holds `word`."""
+        """Return the next line of the error stream that contains `word`."""
         for line in self.process.stderr:
             if word in line:
                 return line
         raise AssertionError(f"it ended with {self.process.wait(LONG_S)} and never said '{word}'")
 
     def interrupt(self):
-        """Ctrl+C; its exit code and what else it wrote on both streams."""
+        """Press Ctrl+C; return the exit code and the remaining output of both streams."""
         self.process.send_signal(signal.CTRL_BREAK_EVENT if sys.platform == "win32" else signal.SIGINT)
         out, err = self.process.communicate(timeout=LONG_S)
         return self.process.returncode, out, err
@@ -86,7 +86,7 @@ def start():
 
 @pytest.fixture
 def address(monkeypatch):
-    """A free address for a master; no master is there yet."""
+    """Free address for a master that is not started yet."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         chosen = f"127.0.0.1:{probe.getsockname()[1]}"

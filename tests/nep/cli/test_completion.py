@@ -1,4 +1,4 @@
-"""Tab in the shell: what is there now, within a moment, and never a word of an error."""
+"""Tests of shell completion: current names are offered quickly and errors are never printed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NEP = "import sys; sys.argv[0] = 'nep'; from nep.cli import main; main()"
 
 
 def complete(shell: str, line: str) -> list[str]:
-    """What the shell is offered for the last word of `line`."""
+    """Return the completions that the shell receives for the last word of `line`."""
     words = {
         "bash": {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split(" ")) - 1)},
         "zsh": {"_TYPER_COMPLETE_ARGS": line},

@@ -1,6 +1,6 @@
-"""Bad days of the command line: no network, the port taken, no port free, a folder that takes no file.
+"""Tests of commands in a faulty environment: no network, a port in use, no free port, unwritable folders.
 
-Each ends in a sentence with the next step, never in a traceback.
+Each command must end with an error that names the next step, never with a traceback.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ UP = "ip link set lo up"
 
 
 def alone(script: str, *, up: bool) -> subprocess.CompletedProcess[str]:
-    """Run a shell script in a network of its own: nothing there but the loopback, up or down.
+    """Run a shell script in its own network namespace, with the loopback interface up or down.
 
-    Skips when this computer does not permit that.
+    Skip the test where network namespaces are not available.
     """
     unshare = shutil.which("unshare")
     if unshare is None or shutil.which("ip") is None:

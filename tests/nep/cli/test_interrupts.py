@@ -1,4 +1,4 @@
-"""Ctrl+C at any moment of a command: it ends quietly, with 130."""
+"""Tests of Ctrl+C at any moment of a command: it exits without a traceback, with code 130."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def python(code, *words, **more):
 
 
 def imports_of(*words):
-    """How many there are while the command begins."""
+    """Return the number of imports during the start of a command."""
     done = python(AT, "1000000", *words)
     return 1_000_000 - int(done.stdout.rpartition(b"left ")[2])
 
@@ -186,7 +186,7 @@ def test_missing_package_is_named():
 
 
 def test_interrupt_during_a_finalizer_is_raised_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Python prints what a finalizer raises, and goes on: the command would not end."""
+    """Python prints an exception raised in a finalizer and continues, so the command would not end."""
 
     class Interrupted:
         def __del__(self) -> None:

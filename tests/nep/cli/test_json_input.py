@@ -1,4 +1,4 @@
-"""JSON on the command line: errors name the position and the reason, and their advice works."""
+"""Tests of JSON on the command line: errors name the position and the reason, and their advice works."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`nep log`, and what the master logs."""
+"""Tests of `nep log` and of the master's own log records."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.nep.programs import eventually
 
 @pytest.fixture
 def busy(master):
-    """A robot and another node that log as soon as somebody listens."""
+    """Master with a robot and another node that log as soon as the log topic has a subscriber."""
     with nep.node("Pepper") as robot, nep.node("other") as other, nep.node("raw") as raw:
         pub = raw.new_pub(LOG_TOPIC, LOG_TYPE)
 

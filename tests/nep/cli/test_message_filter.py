@@ -1,4 +1,4 @@
-"""Filter expressions of `nep topic echo --filter`."""
+"""Tests of the filter expressions of `nep topic echo --filter`."""
 
 from __future__ import annotations
 

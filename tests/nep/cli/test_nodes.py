@@ -1,4 +1,4 @@
-"""`nep node info`."""
+"""Tests of `nep node info`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`--backend`: topic and node commands over a back end that has no master."""
+"""Tests of `--backend`: topic and node commands over a back end without a master."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.nep.meeting import place_for
 
 @pytest.fixture
 def there(monkeypatch):
-    """A node that publishes /odom again and again; the words that name its place."""
+    """Command-line options of a network over the memory back end in which a node publishes /odom."""
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")  # of another back end: no place of this one
     place, ended = place_for("memory", ""), threading.Event()
 

@@ -1,4 +1,4 @@
-"""`nep param` as a person uses it."""
+"""Tests of `nep param`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.nep.cli.test_command import LONG_S, Running
 
 @pytest.fixture
 def run(type_in: TypeIn, monkeypatch: pytest.MonkeyPatch) -> TypeIn:
-    """Types the words behind `nep param`."""
+    """Function that runs `nep param` with the given arguments."""
     monkeypatch.setenv("COLUMNS", "120")
     return lambda *words: type_in("param", *words)
 

@@ -1,4 +1,4 @@
-"""`nep topic hz` and `bw`: the figures, and the commands over real topics."""
+"""Tests of the measurements and the output of `nep topic hz`, `bw` and `delay`."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_interval_is_formatted_with_a_suitable_unit():
 
 @pytest.fixture
 def published(master):
-    """Two topics, published 50 times a second until the end."""
+    """Address of a master with two topics that are published 50 times a second."""
     end = threading.Event()
     with nep.node("talker") as node:
         pubs = [node.new_pub("/odom"), node.new_pub("words", "string")]
@@ -186,7 +186,7 @@ def test_negative_age_within_the_uncertainty_is_shown_as_less_than_the_uncertain
 
 
 class _Told:
-    """A report of one topic, without a master."""
+    """Delay report of one topic with the given latencies, without a master."""
 
     def __init__(self, *ages):
         self.report = _DelayReport(["t"], 10.0)

@@ -1,4 +1,4 @@
-"""`nep service list`, `info` and `call`, as a person types them."""
+"""Tests of `nep service list`, `info` and `call`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SERVICE = "/arm/move"
 
 @pytest.fixture
 def arm(master):
-    """A server that was called once by "page", without success the second time."""
+    """Server that the node "page" has called twice: one call succeeded, the other failed."""
 
     def answer(request):
         if request == "bad":

@@ -1,4 +1,4 @@
-"""The commands in every terminal and pipe: letters that it does not have, full disks, readers that leave."""
+"""Tests of the standard streams of commands: code pages, full disks and closed pipes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def environment(**more):
 
 @pytest.fixture
 def talkers(master):
-    """Nodes and topics with letters that few code pages have, and such that a terminal obeys."""
+    """Node with topics and payloads that contain control sequences and characters missing in code pages."""
     with nep.node("Pépper 😀 “x”") as node:
         pubs = [node.new_pub(TOPIC, latched=True), node.new_pub("text", "string", latched=True)]
         pubs[0].publish({"said": NASTY, "ключ": [1, 2]})
@@ -102,7 +102,7 @@ def test_arguments_in_another_encoding_are_read_as_utf_8(monkeypatch):
 
 
 def command(*words, env=None, **more):
-    """The command as a shell starts it."""
+    """Start a command as a process, as a shell does."""
     return subprocess.Popen(
         [sys.executable, "-m", "nep", *words],
         stdin=subprocess.DEVNULL,

@@ -1,4 +1,4 @@
-"""A terminal that takes nothing: whoever writes to it goes on, and so does who serves others."""
+"""Tests of output to a terminal that blocks: neither the writer nor the node's other work waits for it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ON_LINUX = pytest.mark.skipif(sys.platform != "linux", reason="pipes of a chosen
 
 
 class Stuck(io.StringIO):
-    """A stream whose `write` waits until somebody lets it go on."""
+    """Stream whose `write` blocks until `may_go_on` is set."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -130,10 +130,10 @@ def test_control_characters_in_log_records_are_escaped() -> None:
 
 
 def master_writing_to(writing: int, state: Path, reading: int) -> tuple[subprocess.Popen[bytes], str]:
-    """`nep master` in a process of its own, which serves, and where.
+    """Start `nep master` as a process that writes to `writing`; return it and its address when it replies.
 
-    On another port when somebody else took the one that was free a moment ago. What one that ended has
-    said is read from `reading`.
+    The start is repeated at another port if the free one is taken in the meantime. `reading` is the
+    other end of `writing`; the output of failed attempts is read from it for the error message.
     """
     ended: list[str] = []
     while len(ended) < 5:
@@ -187,7 +187,7 @@ def test_master_with_a_blocked_terminal_keeps_serving_and_exits(tmp_path: Path) 
 def test_output_is_kept_if_no_writer_thread_can_be_started(
     monkeypatch: pytest.MonkeyPatch, ends: bool
 ) -> None:
-    """As at the interpreter's end from 3.12 on; whoever writes, or ends it, must not be hit."""
+    """From Python 3.12 on, no thread can be started while the interpreter shuts down."""
     given = io.StringIO()
     terminal = Terminal(given)
 
@@ -205,7 +205,7 @@ def test_output_is_kept_if_no_writer_thread_can_be_started(
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows has no fork")
 def test_forked_child_can_write_to_the_terminal() -> None:
-    """Its parent's thread is not there: what it says would wait for ever."""
+    """The writer thread of the parent does not exist in the child, so its output would wait forever."""
     code = """
     import os, sys
     from nep.system.terminal import Terminal

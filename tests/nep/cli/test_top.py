@@ -1,4 +1,4 @@
-"""`nep top`: what stands in its tables, in which order, and how it ends."""
+"""Tests of `nep top`: the content and order of its tables, and how it ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`nep topic info`, `type`, `find` and `delay`, as a person types them."""
+"""Tests of `nep topic info`, `type`, `find` and `delay`."""
 
 from __future__ import annotations
 

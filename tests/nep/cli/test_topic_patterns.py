@@ -1,4 +1,4 @@
-"""Patterns of topics: what matches, and what `nep topic echo` shows of topics that come later."""
+"""Tests of topic patterns: which topics match, and how `nep topic echo` shows topics that appear later."""
 
 from __future__ import annotations
 

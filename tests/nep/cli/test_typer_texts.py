@@ -1,4 +1,4 @@
-"""What typer says itself is in the language of now, too: its help, and what is wrong with a command line."""
+"""Tests of the translation of typer's own texts: its help and its command-line errors."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_unknown_message_is_not_translated() -> None:
 
 @pytest.mark.parametrize("line", ["--help", "topic --help", "topic echo --help"])
 def test_entire_help_is_translated_to_spanish(line: str) -> None:
-    """As a program: typer makes some of its words when it is imported."""
+    """Runs as a process because typer creates some of its texts when it is imported."""
     environ = {**os.environ, "NEP_LANG": "es", "COLUMNS": "200", "PYTHONIOENCODING": "utf-8"}
     done = subprocess.run(
         [sys.executable, "-m", "nep", *line.split()],

@@ -1,4 +1,7 @@
-"""What commands show of payloads: whole for programs, and for people what fits; nothing ends them."""
+"""Tests of payloads in the output of commands: complete as JSON, abbreviated in a terminal.
+
+No payload may end a command.
+"""
 
 from __future__ import annotations
 
@@ -103,7 +106,7 @@ def test_multiline_text_cannot_forge_another_message(capsys):
 
 
 class Terminal(io.StringIO):
-    """A standard output that is a terminal."""
+    """Standard output that reports to be a terminal."""
 
     encoding = "utf-8"
 

@@ -1,4 +1,4 @@
-"""`nep watch`: alarms in a terminal."""
+"""Tests of `nep watch`, which reports alarms in a terminal."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.nep.programs import eventually, running
 
 @pytest.fixture
 def file(tmp_path):
-    """Writes alarms into a file; its name."""
+    """Function that writes alarms to a file and returns its path."""
 
     def write(*alarms: object) -> str:
         path = tmp_path / "alarms.json"
@@ -33,7 +33,7 @@ BELOW = {"topic": "/distance", "value": "range", "is": "below", "than": 0.4}
 
 
 class Talker:
-    """Publishes a payload until it is told to end."""
+    """Publisher that repeats a payload until it is closed."""
 
     def __init__(self, master: str, topic: str, payload: object) -> None:
         self._node = nep.node("talker", master=master)
@@ -117,7 +117,7 @@ def test_message_is_published_and_a_misspelt_topic_reported(master, type_in, fil
 
 
 def describe(robot: nep.Node, command: str) -> list[object]:
-    """A robot that names its command topic itself; what it is told."""
+    """Publish a robot's description with a command topic; return the list that receives its messages."""
     description = {"title": "Rover", "rb:topics": {"command": command}}
     robot.new_pub("/Rover/description", "robot/description", latched=True).publish(description)
     told: list[object] = []

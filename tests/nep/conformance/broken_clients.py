@@ -20,7 +20,7 @@ BROKEN: dict[str, type[Client]] = {}
 
 
 def breaks(rule: str) -> Callable[[type[Client]], type[Client]]:
-    """Register the client that breaks a rule."""
+    """Decorator that registers the client that breaks a rule."""
 
     def register(client: type[Client]) -> type[Client]:
         assert rule not in BROKEN

@@ -1,7 +1,7 @@
 """Small client of the native wire that passes every rule; subclasses override single methods.
 
-It is an adapter at the same time: it runs in a thread and reads its requests from a queue. All times but the
-bound of the handshake are shortened by `SCALE`.
+It is also an adapter: it runs in a thread and reads its requests from a queue. All durations except the
+handshake timeout are multiplied by `SCALE`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ GAP_MAX = 2**32
 
 
 class Client(Connections, Services):
-    """See the module."""
+    """Conforming client and adapter; see the module."""
 
     def __init__(self, master: str) -> None:
         self.output, self.input = Stream(), Stream()

@@ -1,4 +1,4 @@
-"""Connections of the small client, and what it does when libzmq gives one up after a failed handshake."""
+"""Connections of the small client, which recover when libzmq gives one up after a failed handshake."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Connections", "Handshakes"]
 
 
 class Connections:
-    """Mixin of `Client`."""
+    """Mixin of `Client` for its connections."""
 
     master: zmq.Socket[bytes]
     master_endpoint: str

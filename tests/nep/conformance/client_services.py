@@ -15,12 +15,12 @@ from tests.nep.conformance.client_state import Handshakes, Pub
 
 
 class Services:
-    """Mixin of `Client`."""
+    """Mixin of `Client` for servers and calls."""
 
     node: dict[str, Any]
     servers: list[zmq.Socket[bytes]]
     counted: list[Pub]
-    """Servers, for the counts in renewals."""
+    """Servers whose counts are sent in renewals."""
     _context: zmq.Context[Any]
     ask: Callable[..., dict[str, Any]]
     tell: Callable[..., int]

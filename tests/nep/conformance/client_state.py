@@ -1,4 +1,4 @@
-"""State of the small client of these tests: streams, publishers and subscribers."""
+"""State of the small client: streams, publishers and subscribers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nep.protocol import wire
 
 
 class Stream:
-    """AdapterStreams between two threads."""
+    """Stream of lines between the tester's thread and the client's."""
 
     def __init__(self) -> None:
         self._lines: queue.Queue[bytes] = queue.Queue()
@@ -69,14 +69,14 @@ class Source:
 
 
 class Handshakes:
-    """Monitor of a socket for ended connections, which libzmq may not make again."""
+    """Monitor of a socket for closed connections, which libzmq may not reopen."""
 
     def __init__(self, socket: zmq.Socket[bytes]) -> None:
         self._socket = socket
         self._monitor = socket.get_monitor_socket(zmq.EVENT_DISCONNECTED)
 
     def failed(self) -> set[str]:
-        """Return the endpoints whose connection has ended since the last call."""
+        """Return the endpoints whose connection has closed since the last call."""
         found = set()
         while self._monitor.poll(0):
             found.add(recv_monitor_message(self._monitor)["endpoint"].decode())
@@ -96,7 +96,7 @@ class Sub:
     handshakes: Handshakes
     sources: dict[int, Source] = field(default_factory=dict)
     topics: list[str] = field(default_factory=list)
-    """Matching topics of a subscriber with wildcards."""
+    """Topics that match a subscriber's wildcard pattern."""
     received: int = 0
     lost: int = 0
     problem: str = ""

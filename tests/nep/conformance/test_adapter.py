@@ -1,4 +1,4 @@
-"""The adapter of nep passes every rule, also by the command `nep wire check`."""
+"""Tests of nep's own adapter, which must pass every rule, and of the command `nep wire check`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The conformance tester: a correct client passes every rule, one with an error fails by its rule."""
+"""Tests of the conformance rules: a correct client passes all; each broken client fails its rule."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def judged(rule: str) -> Outcome:
 
 @pytest.fixture(scope="module")
 def outcomes() -> Mapping[str, Outcome]:
-    """Outcomes of all broken clients, checked in parallel because they mostly wait."""
+    """Outcomes of all broken clients, checked in parallel because most of the time is spent waiting."""
     with ThreadPoolExecutor(12) as pool:
         return dict(zip(BROKEN, pool.map(judged, BROKEN), strict=True))
 

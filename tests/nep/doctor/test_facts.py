@@ -1,4 +1,4 @@
-"""Gathering facts on the real computer, and `nep doctor` itself."""
+"""Tests of the facts that `nep doctor` collects on the real computer, and of the command itself."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 
 @pytest.fixture
 def foreign():
-    """A port that this program holds and that is no master's."""
+    """Port on which the test process listens without being a master."""
     with socket.socket() as held:
         held.bind(("127.0.0.1", 0))
         held.listen(1)

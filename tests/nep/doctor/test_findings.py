@@ -1,4 +1,4 @@
-"""The doctor's judgement over made-up facts."""
+"""Tests of the findings that the doctor derives from constructed facts."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ HEALTHY = Facts(
 
 
 def found(severity=None, **changes):
-    """The findings of healthy facts with these changes, by id."""
+    """Return the findings for healthy facts with these changes, by id; with `severity`, only those."""
     made = findings(replace(HEALTHY, **changes))
     return {each.id: each for each in made if severity is None or each.severity == severity}
 

@@ -1,4 +1,4 @@
-"""Why nothing is seen of one topic: the judgement over made-up facts, and a real master's topics."""
+"""Tests of the findings about a topic that is not received, from constructed facts and a real master."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MISSED = TopicFacts(
 
 
 def found(**changes):
-    """The findings of a silent camera with these changes, by id."""
+    """Return the findings about a silent camera with these changes, by id."""
     return {each.id: each for each in topic_findings(replace(MISSED, **changes))}
 
 

@@ -1,4 +1,4 @@
-"""Detection of other packages named nep and nep-js on this computer."""
+"""Tests of the detection of other packages named nep or nep-js on this computer."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_unreadable_package_of_node_is_skipped(tmp_path, described):
 
 @pytest.fixture
 def environment(tmp_path):
-    """Environment with a `python3` and a folder of packages."""
+    """Folder of a Python environment with `python3` and site-packages."""
     made = tmp_path / "env"
     (made / "bin").mkdir(parents=True)
     python = made / "bin" / "python3"

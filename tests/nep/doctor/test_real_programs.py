@@ -1,4 +1,4 @@
-"""What keeps messages away, made with real programs and real sockets as far as one computer can."""
+"""Tests of the diagnosis of undelivered messages, with real programs and sockets on one computer."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SENDER = """
 
 @pytest.fixture
 def own() -> str:
-    """An address of this computer in a network."""
+    """Network address of this computer; the test is skipped if it has none."""
     for addresses in psutil.net_if_addrs().values():
         for each in addresses:
             if each.family == socket.AF_INET and not each.address.startswith(("127.", "169.254.")):

@@ -16,7 +16,7 @@ EPOCH = 77
 
 
 class RequestServer:
-    """A graph that is asked without a master around it."""
+    """Graph that applies requests without a master."""
 
     def __init__(self):
         self.now = 100.0

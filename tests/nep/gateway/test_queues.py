@@ -1,4 +1,4 @@
-"""What the gateway keeps for an original that does not read: so many bytes, whatever the size of messages."""
+"""Tests of the gateway's buffers for original subscribers that do not read, which are bounded in bytes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def context() -> Iterator[zmq.Context[zmq.Socket[bytes]]]:
 
 
 def free_base() -> int:
-    """A port that is free now, and so is the next one."""
+    """Return a free port whose successor is free, too."""
     while True:
         with socket.socket() as first, socket.socket() as second:
             first.bind(("127.0.0.1", 0))
@@ -45,7 +45,7 @@ def pair(context: zmq.Context[zmq.Socket[bytes]]) -> Iterator[ProxyPair]:
 
 @pytest.fixture
 def subscriber(context: zmq.Context[zmq.Socket[bytes]], pair: ProxyPair) -> Iterator[Callable[..., Socket]]:
-    """Makes subscribers: one that has room for so many messages itself, with a filter that no other has."""
+    """Function that opens a subscriber that queues `keep` messages; each needs a filter of its own."""
     made: list[Socket] = []
 
     def subscribe(keep: int, filter_: bytes = b"t") -> Socket:
@@ -68,7 +68,7 @@ def numbered(number: int, size: int) -> bytes:
 
 
 def rest(of: Socket) -> list[bytes]:
-    """What still comes; less of it on a machine that is very busy, which no test here minds."""
+    """Receive messages until none arrives for 500 ms."""
     found = []
     while of.poll(500):
         found.append(of.recv())

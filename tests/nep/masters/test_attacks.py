@@ -1,7 +1,7 @@
-"""A hostile program at the master: it throws nobody out, speaks for nobody else, and registers no nonsense.
+"""Tests of a master against a hostile program that impersonates or evicts nodes or registers nonsense.
 
-Each attacker has what the graph shows to everybody: the ids of nodes, publishers and subscribers. The victims
-must go on as if it were not there.
+Each attacker knows what the graph shows to everyone: the ids of nodes, publishers and subscribers. The
+victims must not be affected.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ OWN_ID = derive_node_id(OWN_KEY)
 
 
 class Attacker:
-    """A connection to the master; with a `routing_id` of its choice."""
+    """Connection to the master, optionally with a chosen `routing_id`."""
 
     def __init__(self, master: Master, routing_id: bytes = b"") -> None:
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
@@ -64,13 +64,13 @@ class Attacker:
         self._call = 0
 
     def send(self, request: Request) -> int:
-        """Ask and do not wait."""
+        """Send a request without waiting for the reply; return the number of the call."""
         self._call += 1
         self.socket.send(encoding.encode_request(request, self._call))
         return self._call
 
     def ask(self, request: Request) -> Reply:
-        """The reply, which has to come."""
+        """Send a request and return the reply, which must arrive within 5 s."""
         call = self.send(request)
         while True:
             assert self.socket.poll(5000), "the master does not answer"
@@ -93,7 +93,7 @@ def attacker_at(master: Master, routing_id: bytes = b"") -> Iterator[Attacker]:
 
 
 class Victims:
-    """A publisher and a subscriber of one topic, each with a node of its own."""
+    """Publisher and subscriber of one topic, each in its own node."""
 
     def __init__(self, address: str) -> None:
         self.arm = nep.node("Arm", master=address)
@@ -103,7 +103,7 @@ class Victims:
         self._said = 0
 
     def go_on(self) -> None:
-        """What is published arrives, and nothing was lost."""
+        """Check that a published message is received and none was lost."""
         self._said += 1
         self.pub.publish(self._said)
         assert self.sub.listen(30.0) == (True, self._said)
@@ -166,7 +166,7 @@ def test_second_connection_with_a_used_routing_id_does_not_replace_the_first(mas
 
 
 def requests_for(victims: Victims) -> list[Request]:
-    """All that a node says of itself, said by somebody else."""
+    """Return every request that a node can send about itself, to be sent by another connection."""
     return [
         Leave(victims.arm.id),
         RemovePublisher(victims.arm.id, victims.pub.id, 0),
@@ -228,7 +228,7 @@ def test_id_of_a_publisher_or_subscriber_cannot_be_taken_over(
 
 
 def test_squatters_are_evicted_when_the_owner_joins_with_its_key() -> None:
-    """A master was started again, and the attacker is quicker than those who come back."""
+    """After a restart of the master, the attacker registers before the nodes join again."""
     with Master("127.0.0.1:0", learn_s=0.0) as master:
         address = master.address
         victims = Victims(address)
@@ -260,7 +260,7 @@ def test_one_connection_can_speak_for_only_one_node(master: Master) -> None:
 
 
 def test_node_with_a_hung_old_connection_can_rejoin(master: Master) -> None:
-    """Its computer lost the network and has it again; for the master the old connection is still there."""
+    """A node has lost and regained the network while its old connection still exists at the master."""
     with attacker_at(master) as old, attacker_at(master) as new:
         arm = PublisherRecord(derive_id(OWN_KEY, 1), "/arm", "json", "json", ("tcp://127.0.0.1:9",), number=1)
         assert isinstance(old.ask(AddPublisher(node(), arm)), AddedReply)
@@ -277,7 +277,7 @@ def test_node_with_a_hung_old_connection_can_rejoin(master: Master) -> None:
 def test_false_report_of_a_missing_subscriber_does_not_affect_other_publishers(
     master: Master, victims: Victims
 ) -> None:
-    """An attacker reports that it does not answer. Who publishes next waits for it all the same."""
+    """An attacker reports a subscriber as missing; the next publisher must wait for it nevertheless."""
     with attacker_at(master) as attacker:
         for n in range(3):
             own = publisher(id=100 + n)
@@ -405,7 +405,6 @@ def test_key_of_a_node_is_never_disclosed(master: Master, victims: Victims) -> N
 
 
 def test_eviction_of_a_squatter_is_announced_to_subscribers_before_the_owner(master: Master) -> None:
-    """Subscribers hear that the unproven publisher is gone before they hear of the proven one."""
     real = PublisherRecord(derive_id("k", 1), "/t", "json", "json", ("tcp://127.0.0.1:9",), number=1)
     with attacker_at(master) as ear, attacker_at(master) as squatter, attacker_at(master) as owner:
         listener = NodeRecord(derive_node_id("ear"), "Ear", "host", 1, key="ear")

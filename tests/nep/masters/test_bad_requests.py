@@ -1,4 +1,4 @@
-"""What comes to the master and is no request: answered, counted, logged rarely, shown as an alert."""
+"""Tests of malformed requests at the master: they are replied to, counted, logged and shown as an alert."""
 
 from __future__ import annotations
 

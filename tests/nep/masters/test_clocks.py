@@ -1,4 +1,4 @@
-"""The master passes on how clocks differ: to whom it matters, and nothing that no clock can be."""
+"""Tests of the clock differences between nodes that the master distributes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ S = 1_000_000_000
 
 
 def graph_of(*computers: str) -> Graph:
-    """A node on each of these: the first hears the topics of all others."""
+    """Return a graph with one node per computer; the first node subscribes to the topics of all others."""
     graph = Graph(EPOCH, 0.0, 0.0, computer=MASTERS)
     for number, computer in enumerate(computers):
         graph.apply(joining(number, computer, len(computers)), 1, 0.0, f"n{number}")

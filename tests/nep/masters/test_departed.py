@@ -1,4 +1,4 @@
-"""Publishers that ended are told of for a while, to those who were cut off then."""
+"""Tests of the master's memory of departed publishers, for subscribers that were disconnected meanwhile."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def node(name: str) -> NodeRecord:
 
 
 def renewed(graph: Graph, who: NodeRecord, now: float, *counts: PublisherCount) -> dict[int, int]:
-    """What a node is told with its renewal."""
+    """Renew a node; return the last sequence numbers in the reply, by publisher id."""
     heard = () if counts else (SubscriberCount(2, 0, 0), SubscriberCount(3, 0, 0))
     out = graph.apply(Renew(who.id, graph.epoch, 0, counts, heard), 1, now, who.id)
     (answer,) = (each.body for each in out if each.call == 1)

@@ -1,4 +1,4 @@
-"""The graph: requests in, pushes and replies out; no sockets, no clock."""
+"""Tests of the graph: requests in, pushes and replies out, without sockets or a clock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How often nodes renew: every second in small graphs, less often and together in large ones."""
+"""Tests of the renewal interval: 1 s in small graphs, longer and spread evenly in large ones."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def census_of(nodes: int, managed: int = 0) -> Registry:
 
 
 def told(nodes: int, managed: int = 0, rounds: int = 4, within_s: float = 1.0) -> list[list[float]]:
-    """When each node renewed, round by round, when all of them started `within_s`."""
+    """Return the renewal times of all nodes, round by round, if they start within `within_s` seconds."""
     registry = census_of(nodes, managed)
     found = Leases(registry, LEASE_DURATION_S)
     due = [within_s * n / nodes for n in range(nodes)]

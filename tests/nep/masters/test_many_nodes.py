@@ -1,4 +1,4 @@
-"""The short ways of a master with many nodes: they say what the long ones say, and nothing else."""
+"""Tests of the master's fast paths for many nodes: their results must equal those of the normal paths."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ EPOCH = 5
 
 
 def graph_of(nodes: int) -> Graph:
-    """Each node publishes one topic and hears the next one's."""
+    """Return a graph in which each node publishes one topic and subscribes to that of the next node."""
     graph = Graph(EPOCH, 0.0, learn_s=0.0)
     for n in range(nodes):
         graph.apply(joining(n, nodes), 1, 0.0, f"n{n}")
@@ -68,7 +68,7 @@ def renewal(n: int, graph: Graph, count: int = 10, problem: str = "", **more: An
 
 
 def renew(graph: Graph, request: Renew, now: float) -> bytes | None:
-    """The quick way, as the master's loop goes it."""
+    """Renew by the master's fast path; return the encoded reply, or None if the path does not apply."""
     said = parse_renewal(encoding.encode_request(request, 7))
     if said is None:
         return None
@@ -77,7 +77,7 @@ def renew(graph: Graph, request: Renew, now: float) -> bytes | None:
 
 
 def view(graph: Graph) -> GraphView:
-    """What somebody sees who looks for the first time."""
+    """Return a complete view, without reuse of an earlier one."""
     return GraphSnapshotBuilder(graph._registry).view(EPOCH)
 
 

@@ -1,4 +1,4 @@
-"""The master as a thread: nothing kills it, attachments live with it, it ends with its owner."""
+"""Tests of the master as a thread: robustness, attachments and the end of its life."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ORIGINAL = NodeRecord("original-1", "old", "host", 1, "JavaScript", "A")
 
 
 class Attached:
-    """An attachment that notes what happens to it."""
+    """Attachment that records its events."""
 
     def __init__(self, fails: bool = False) -> None:
         self.events: list[str] = []

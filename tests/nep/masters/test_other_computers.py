@@ -1,4 +1,4 @@
-"""A master that serves other computers, and nodes whose address changes: with loopback addresses for both."""
+"""Tests of a master that serves other computers and of address changes, both with loopback addresses."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from tests.nep.programs import eventually
 pytestmark = pytest.mark.skipif(sys.platform == "darwin", reason="macOS answers at one loopback address only")
 
 OTHER = "127.0.0.2"
-"""An address that counts as another computer's: no program expects the master's own computer there."""
+"""Loopback address that stands for another computer; no program expects the local master there."""
 HERE = (OwnAddress("192.168.1.20", "wlan0"), OwnAddress("10.8.0.2", "tun0"))
 WAIT_S = 30.0
 
 
 @pytest.fixture
 def far(master):
-    """The address of a master that serves other computers, as they know it."""
+    """Address at which other computers reach the master."""
     listen([OTHER], master.address)
     return f"{OTHER}:{master.address.rpartition(':')[2]}"
 
 
 def wait_for(node, wanted):
-    """The node's graph as soon as it is as wanted."""
+    """Poll the graph of a node until `wanted` is true of it, and return it."""
     pause = threading.Event()
     for _ in range(int(WAIT_S / 0.05)):
         view = node.graph()

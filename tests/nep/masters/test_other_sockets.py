@@ -1,4 +1,4 @@
-"""Another program's socket at the master's address: questions end in time, nodes find a later master."""
+"""Tests of another program's socket at the master's address: requests time out, nodes find a later master."""
 
 from __future__ import annotations
 

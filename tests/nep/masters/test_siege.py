@@ -1,4 +1,4 @@
-"""A master under siege: three honest nodes must not notice what a hostile program sends to it."""
+"""Tests of a master under attack: three honest nodes must not be affected by what a hostile program sends."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ MEMORY_MAX_BYTES = 400 * 2**20
 
 
 class Siege:
-    """Three honest nodes, each with a publisher and a subscriber of one topic, and sockets of an attacker."""
+    """Three honest nodes, each with a publisher and a subscriber of one topic, and an attacker's sockets."""
 
     def __init__(self, address: str, stack: ExitStack) -> None:
         self._address = address
@@ -49,7 +49,7 @@ class Siege:
         self._said = 0
 
     def attacker(self, routing_id: bytes = b"") -> zmq.Socket[bytes]:
-        """One more connection to the master."""
+        """Open another connection to the master."""
         socket = self._attackers.enter_context(self._context.socket(zmq.DEALER))
         socket.setsockopt(zmq.LINGER, 0)
         if routing_id:
@@ -58,11 +58,11 @@ class Siege:
         return socket
 
     def end_attack(self) -> None:
-        """Close what the attacker opened."""
+        """Close the attacker's sockets."""
         self._attackers.close()
 
     def go_on(self) -> None:
-        """What each publishes reaches all; the graph shows all; a new node joins."""
+        """Check that all publishers reach all subscribers, and that a new node can join and sees them."""
         self._said += 1
         for pub in self.pubs:
             pub.publish(self._said)
@@ -104,7 +104,7 @@ def say(socket: zmq.Socket[bytes], *requests: Request) -> None:
 
 
 def answers(socket: zmq.Socket[bytes], count: int) -> None:
-    """Wait until the master has dealt with so many requests."""
+    """Wait for `count` replies of the master."""
     for _ in range(count):
         assert socket.poll(10_000), "the master does not answer any more"
         socket.recv()
@@ -135,7 +135,7 @@ def huge_and_nested(siege: Siege) -> None:
 
 
 def many_topics(siege: Siege) -> None:
-    """A hundred thousand: most are refused, and what is taken is gone with who registered it."""
+    """Register 100 000 topics: most are rejected; the registered ones are removed with their nodes."""
     sockets = [siege.attacker() for _ in range(20)]
     for n, socket in enumerate(sockets):
         records = (

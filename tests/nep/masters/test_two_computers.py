@@ -1,4 +1,4 @@
-"""Two computers: network namespaces with a cable between them, and a third one's worth of bad luck."""
+"""Test of two computers, which are network namespaces joined by a virtual cable."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def ip(*words: str) -> None:
 
 
 class Computers:
-    """Two namespaces, `inside("a")` and `inside("b")`, with 10.77.0.1 and 10.77.0.2."""
+    """Two network namespaces, "a" and "b", with the addresses 10.77.0.1 and 10.77.0.2."""
 
     def __init__(self) -> None:
         self.names = {side: f"nep{side}{os.getpid()}" for side in "ab"}
@@ -68,16 +68,16 @@ class Computers:
             ip("-n", name, "link", "set", "cable", "up")
 
     def inside(self, side: str) -> list[str]:
-        """The words that start a program on that computer."""
+        """Return the command prefix that runs a program in that namespace."""
         return ["ip", "netns", "exec", self.names[side]]
 
     def change_address(self, side: str, old: str, new: str) -> None:
-        """What another Wi-Fi does."""
+        """Change the address, as a switch to another Wi-Fi network does."""
         ip("-n", self.names[side], "addr", "del", f"{old}/24", "dev", "cable")
         ip("-n", self.names[side], "addr", "add", f"{new}/24", "dev", "cable")
 
     def cable(self, state: str) -> None:
-        """Pull the plug ("down") or put it back ("up")."""
+        """Unplug the cable ("down") or plug it in ("up")."""
         ip("-n", self.names["b"], "link", "set", "cable", state)
 
     def remove(self) -> None:
@@ -98,7 +98,7 @@ def computers(tmp_path: Path) -> Iterator[Computers]:
 
 
 def hears(subscriber: Program, text: str) -> None:
-    """Read until that message came; an AssertionError when the subscriber ends instead."""
+    """Read the subscriber's output up to this message; raise AssertionError if the program exits."""
     for line in iter(subscriber.line, None):
         if json.loads(line) == text:
             return

@@ -1,4 +1,4 @@
-"""Codecs: round trips, and sentences for what does not fit."""
+"""Tests of the codecs: round trips and the errors for unsupported payloads."""
 
 from __future__ import annotations
 
@@ -224,7 +224,7 @@ SHAPES = ((3, 5), (3, 5, 1), (3, 5, 2), (3, 5, 3), (3, 5, 4), (1, 1), (1, 7, 3))
 
 
 def numbers_of(kind: str, shape: tuple[int, ...]) -> np.ndarray:
-    """The least, the largest and others between; of floats also those that are none."""
+    """Return an array with the extreme values of its type; for floats, with -infinity and NaN."""
     made = np.random.default_rng(1).integers(0, 100, shape).astype(kind)
     least, most = (np.iinfo(kind).min, np.iinfo(kind).max) if made.dtype.kind in "iu" else (-np.inf, np.nan)
     made.flat[0], made.flat[-1] = least, most
@@ -312,7 +312,7 @@ def test_corrupt_images_raise_decode_error(data: bytes, extension: dict[str, obj
 
 
 def test_encoding_an_unknown_value_does_not_import_numpy():
-    """orjson would, in the middle of `publish`: the publisher stalled for 0.1 s at its first subscriber."""
+    """orjson imports numpy inside `publish`, which stalled a publisher for 0.1 s at its first subscriber."""
     code = (
         "import sys\n"
         "from nep.messages.codecs import JSON, Encoded, fast_encoder\n"

@@ -1,4 +1,4 @@
-"""Field paths, and picked fields as a table."""
+"""Tests of field paths and of tables of selected fields."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Picture files are judged before anything decodes them: by their bytes, with one limit for all."""
+"""Tests of image files: their bytes are validated before decoding, with one pixel limit for all formats."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a publisher sends its pictures: their kind, quality and size."""
+"""Tests of a publisher's image format: file format, quality and size."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DEPTH = np.arange(60 * 80, dtype=np.uint16).reshape(60, 80)
 
 
 def back(image: ImageFormat, frame: Any) -> Any:
-    """The picture as a subscriber gets it."""
+    """Return the image as a subscriber decodes it."""
     made = image.encode(frame)
     return codec("image").decode(memoryview(made.data), made.extension or {})
 

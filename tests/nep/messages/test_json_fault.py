@@ -1,4 +1,4 @@
-"""Faults of JSON texts: where they are, what is wrong, and the edit that repairs them."""
+"""Tests of faults in JSON text: their position, their reason and the edit that fixes them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The limit of 64 levels, in every codec and both ways."""
+"""Tests of the limit of 64 nesting levels in every codec, when encoding and when decoding."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def test_utf16_json_does_not_bypass_the_depth_limit() -> None:
 
 @dataclass
 class Linked:
-    """A dataclass, which is sent as a map."""
+    """Dataclass, which is sent as a map."""
 
     next: object
     _previous: object = None

@@ -1,4 +1,4 @@
-"""NaN and infinity in JSON: sent as null, counted, and told, never silently."""
+"""Tests of NaN and infinity in JSON: sent as null, counted and logged."""
 
 from __future__ import annotations
 

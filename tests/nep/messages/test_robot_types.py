@@ -1,4 +1,4 @@
-"""`nep.geometry` and `nep.sensor`: fields as ROS has them, rotations, and times."""
+"""Tests of `nep.geometry` and `nep.sensor`: fields as in ROS, rotations and times."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from nep.messages.typed import TypedReader, message_type, typed_codec
 
 
 def through(payload: Any, codec: Codec = JSON) -> Any:
-    """What a typed subscriber reads of what a typed publisher sends."""
+    """Encode a payload as a typed publisher does and decode it as a typed subscriber does."""
     encoded = typed_codec(message_type(type(payload)), codec).encode(payload)
     return read(type(payload), encoded.data, codec)
 
@@ -77,7 +77,7 @@ def test_robot_types_round_trip_as_ros1_types(name: str) -> None:
 
 
 def _filled(declared: type) -> Any:
-    """An instance with other values than those that are there already; they keep in 32 bits."""
+    """Return an instance whose values differ from the defaults; all of them are exact in 32 bits."""
     values: dict[str, Any] = {}
     for number, each in enumerate(fields(declared), 1):
         value = getattr(declared(), each.name)

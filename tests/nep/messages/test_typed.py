@@ -1,4 +1,4 @@
-"""Typed messages: what fits, what does not and where, and the types that are there already."""
+"""Tests of typed messages: valid payloads, rejected ones with the path of the mismatch, and nep.geometry."""
 
 from __future__ import annotations
 
@@ -119,12 +119,12 @@ class Tree:
 
 
 def sent(payload: object) -> Any:
-    """What a typed publisher sends, as JSON has it."""
+    """Return the JSON value that a typed publisher sends."""
     return json.loads(bytes(typed_codec(message_type(type(payload)), JSON).encode(payload).data))
 
 
 def read(declared: type, plain: object, codec: str = "json") -> Any:
-    """What a typed subscriber reads."""
+    """Return the instance that a typed subscriber decodes."""
     return read_bytes(declared, CODECS[codec].encode(plain).data, codec)
 
 

@@ -1,4 +1,4 @@
-"""Types that can be messages, and those that are refused where a publisher or subscriber is made."""
+"""Tests of the declaration of message types: which are accepted, and which new_pub and new_sub reject."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""docs/types.md: its programs run and print what it says."""
+"""Tests of docs/types.md: its programs run and print the documented output."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Payloads that cannot be sent: counted, told rarely, and where in them. No sockets."""
+"""Tests of payloads that cannot be encoded: counted, logged rarely, with the path of the value.
+
+No sockets are used.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from nep.system.log_rarely import is_logged
 
 
 class Told:
-    """What was reported, and a clock that goes when it is told to."""
+    """Reported problems, a counting encoder and a clock that the test advances."""
 
     def __init__(self) -> None:
         self.problems: list[str] = []

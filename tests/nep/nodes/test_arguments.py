@@ -1,4 +1,7 @@
-"""Arguments that are none: refused at the call, in a sentence that names what is allowed; nothing is left."""
+"""Tests of invalid arguments: rejected at the call with an error that names the allowed values.
+
+A rejected call leaves nothing registered.
+"""
 
 from __future__ import annotations
 
@@ -247,7 +250,7 @@ def test_endpoint_formats_of_all_back_ends_are_valid(endpoint: str) -> None:
 
 
 def test_subscriber_whose_creation_is_interrupted_is_not_registered(master: Master) -> None:
-    """So with Ctrl+C while it waits for an echo: nobody has it, so nobody could close it."""
+    """Ctrl+C may interrupt the wait for an echo; the caller has no subscriber then that it could close."""
 
     class BrokenOff(BaseException):
         pass

@@ -1,4 +1,4 @@
-"""What the network can make grow has a bound: tables of the master, of a node's link and of the gateway."""
+"""Tests of the bounds on everything that the network can make grow: tables of master, nodes and gateway."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_malformed_requests_of_many_senders_are_logged_at_a_bounded_rate(
 
 @pytest.fixture
 def pair() -> Iterator[SimpleNamespace]:
-    """A node's calls, and the socket of its master."""
+    """RPC client of a node and the router socket of its master."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     router = context.socket(zmq.ROUTER)
     port = router.bind_to_random_port("tcp://127.0.0.1")
@@ -259,7 +259,7 @@ def test_unreadable_graph_raises_in_the_waiting_thread(pair: SimpleNamespace) ->
 
 
 class JustConnected:
-    """A socket that is connected between the first try to send and the look at what it can do."""
+    """Fake socket that becomes connected between the first attempt to send and the check of its events."""
 
     closed = False
 
@@ -284,7 +284,7 @@ class JustConnected:
 
 
 def test_request_is_sent_immediately_when_the_socket_connects_during_the_call() -> None:
-    """The look at the socket takes the only signal of it: without a second try it waits for half a second."""
+    """The check of the events consumes the only signal; without a second attempt the request waits 0.5 s."""
     socket = JustConnected()
     calls = RpcClient(socket, "127.0.0.1:9", lambda: None)  # type: ignore[arg-type]
     calls.send_request(Ping())

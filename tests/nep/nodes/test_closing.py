@@ -1,4 +1,4 @@
-"""Closing: what is closed is forgotten, in any order and from any thread, and costs nothing afterwards."""
+"""Tests of closing nodes, publishers and subscribers in any order and from any thread, without leaks."""
 
 from __future__ import annotations
 
@@ -123,7 +123,6 @@ def until_closed(do: Callable[[], object], begun: threading.Barrier, errors: lis
 def test_close_during_concurrent_publish_listen_and_spin_raises_closed_error_without_hang(
     node: nep.Node,
 ) -> None:
-    """Whoever is in the middle of it gets `ClosedError` or ends, and nobody hangs."""
     pub, sub = node.new_pub("topic"), node.new_sub("topic")
     node.new_callback("topic", "json", lambda _payload: None)
 
@@ -151,7 +150,7 @@ def test_close_during_concurrent_publish_listen_and_spin_raises_closed_error_wit
 
 
 def test_blocked_sink_of_one_node_does_not_block_other_nodes(master: Master) -> None:
-    """One has a sink that does not return, and one is being closed; a third comes, works and goes."""
+    """While the sink of one node blocks, a third node opens, exchanges a message and closes."""
     held, let_go = threading.Event(), threading.Event()
 
     def sink(_messages: object) -> None:
@@ -192,7 +191,7 @@ def test_sink_can_create_publishers_and_subscribers_and_query_the_graph(node: ne
 
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
 def test_all_nodes_flush_concurrently_at_interpreter_exit(master: Master) -> None:
-    """The first has a subscriber that hangs; what the second published arrives all the same."""
+    """The subscriber of the first node hangs; the messages of the second one must arrive nevertheless."""
     hung = """
     import sys, nep
     node = nep.node("hung")

@@ -1,6 +1,6 @@
-"""Forks: a child has closed nodes, makes new ones, ends at once, and disturbs its parent in nothing.
+"""Tests of forks: the child's inherited nodes are closed, new nodes work, and the parent is not affected.
 
-The programs fork for real. A child that hangs ends by an alarm after 20 s, which its parent then tells.
+The programs really fork. A child that hangs is ended by an alarm after 20 s, which its parent reports.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ print(sub.listen(timeout_s=30.0)[1], sub.lost)
 
 
 def test_fork_while_threads_use_the_node_does_not_deadlock(master: Master) -> None:
-    """Thirty forks while threads publish, listen, spin, log and make nodes: whatever lock is held then."""
+    """Fork while threads publish, listen, spin, log and open nodes, so that any lock may be held."""
     code = (
         CHILD
         + """
@@ -324,7 +324,7 @@ print("all", flush=True)
 
 
 def test_fork_keeps_blocking_mode_of_parent_sockets(master: Master) -> None:
-    """Also with a default time-out, as rospy sets one: blocking or not is shared with the child."""
+    """Also with a default timeout, as set by rospy: parent and child share the blocking mode of a socket."""
     code = (
         CHILD
         + """

@@ -1,4 +1,4 @@
-"""Log records on the bus: nothing for who never logs, bounded for who logs too much."""
+"""Tests of log records as messages: no cost for nodes that never log, bounded for those that log too much."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.nep.programs import eventually, running
 
 
 class Kept:
-    """A publisher that keeps; `opened` counts how often it was asked for."""
+    """Fake publisher that stores records; `opened` counts the attempts to open it."""
 
     def __init__(self, failures=()):
         self.records, self.opened, self._failures = [], 0, list(failures)
@@ -286,7 +286,7 @@ def test_queue_of_records_without_a_master_is_bounded():
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits memory as Linux does")
 def test_record_is_dropped_if_the_log_thread_cannot_start():
-    """As at the end of the interpreter from Python 3.12 on: the same error, here for want of memory."""
+    """From Python 3.12 on this happens at interpreter exit; here a memory limit causes the same error."""
     code = """
     import resource, threading
     from nep.nodes.log_handler import LogHandler

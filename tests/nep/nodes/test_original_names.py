@@ -1,4 +1,4 @@
-"""Programs written for the original module: its names work, or the error says what to write instead."""
+"""Tests of programs written for the original module: its names work, or the error names the replacement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The paper's listings, as they stand, as programs of their own."""
+"""Test of the unmodified listings of the paper, run as processes."""
 
 from __future__ import annotations
 

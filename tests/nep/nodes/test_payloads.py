@@ -1,4 +1,4 @@
-"""Who wants payloads gets them without messages, and nobody notices who reads in other ways between."""
+"""Tests of reading payloads without message objects, mixed with the other methods of reading."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def burst(publisher: nep.Publisher, *payloads: object) -> None:
 
 
 def next_by(way: str, sub: nep.Subscriber) -> int:
-    """The next payload, read in one of the ways there are; -1 when nothing is there yet."""
+    """Return the next payload, read with the given method; -1 if `poll` finds none."""
     if way == "listen":
         found, payload = sub.listen(timeout_s=GREETINGS_S)
         assert found
@@ -66,7 +66,7 @@ def test_mixed_read_methods_return_all_messages_in_order(nodes: tuple[nep.Node, 
 
 
 def test_payloads_are_delivered_without_message_objects(nodes: tuple[nep.Node, nep.Node]) -> None:
-    """Else the other tests here show nothing."""
+    """The other tests of this module are meaningful only if this one passes."""
     sender, reader = nodes
     sub, pub = reader.new_sub("t"), sender.new_pub("t")
     burst(pub, *range(FIRST))

@@ -1,4 +1,4 @@
-"""Real processes: started, killed, stopped, and ended at the wrong moment."""
+"""Tests with real processes that are started, killed, suspended and ended at critical moments."""
 
 from __future__ import annotations
 
@@ -322,7 +322,7 @@ def test_unlimited_wait_ends_when_a_master_starts() -> None:
 
 
 def test_suspended_process_registers_again_and_loses_no_messages(node: nep.Node) -> None:
-    """Its lease lapsed meanwhile; what it said before it fell asleep and after is all there."""
+    """The lease expires meanwhile; messages from before and after the suspension are all received."""
     sub = node.new_sub("topic")
     with running(ECHO, "topic") as program:
         program.line()

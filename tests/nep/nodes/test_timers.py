@@ -1,4 +1,4 @@
-"""Timers by a clock that the test moves: when they are due, and how long spin waits for them."""
+"""Tests of timers with a fake clock: when they are due, and how long spin waits for them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nep.nodes.timer import Timer, next_due
 
 
 class Clock:
-    """Tells the time that it is given."""
+    """Fake clock that the test advances; times in seconds."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -23,7 +23,7 @@ class Clock:
 
 
 class Waiting:
-    """The way of a node to the others; to wait is to move the clock."""
+    """Wrapper of a node's transport that advances the fake clock instead of waiting."""
 
     def __init__(self, real: Any, clock: Clock) -> None:
         self._real = real
@@ -69,7 +69,7 @@ def test_timer_fires_once_per_period_with_two_spinning_threads() -> None:
     now = 0.0
 
     def clock() -> float:
-        """Both threads have read the time before one of them looks whether the timer is due."""
+        """Return the time; both threads read it before either checks whether the timer is due."""
         if threading.current_thread() is not threading.main_thread():
             both.wait(30.0)
         return now

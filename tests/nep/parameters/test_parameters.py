@@ -1,4 +1,4 @@
-"""Parameters: a node declares them, others read and set them while it runs."""
+"""Tests of parameters: a node declares them; other nodes read and set them while it runs."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_parameters_are_declared_read_and_set(make: Make) -> None:
 
 
 def test_parameter_values_are_published_on_a_latched_topic(make: Make) -> None:
-    """Also where a back end has no services."""
+    """Other nodes can read them also over back ends without services."""
     node = make("robot")
     node.parameters.declare("speed", 0.5)
     node.parameters.declare("names", ["a"])

@@ -1,4 +1,4 @@
-"""Parameters of classes: instances for the node itself, plain values that have to fit for all others."""
+"""Tests of typed parameters: instances for the node itself, validated plain values for other nodes."""
 
 from __future__ import annotations
 

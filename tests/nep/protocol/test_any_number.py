@@ -1,4 +1,4 @@
-"""Whatever number, text or shape somebody sends: it ends no renewal, no reply and nobody's graph."""
+"""Tests of arbitrary numbers, texts and shapes in requests: they break no renewal, reply or graph view."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ ASKED = [each for each in get_args(Request) if each is not requests.ReportAlerts
 
 
 def of(hint: Any, ints: st.SearchStrategy[int] = INTS) -> st.SearchStrategy[Any]:
-    """Values of a type, also those that no honest program makes."""
+    """Return a strategy for values of a type, including values that no correct program sends."""
     simple: dict[Any, st.SearchStrategy[Any]] = {int: ints, float: FLOATS, str: TEXTS, bool: st.booleans()}
     if hint in simple:
         return simple[hint]
@@ -153,7 +153,7 @@ def test_arbitrary_requests_do_not_raise_in_the_graph_or_break_its_view(
 def test_message_with_implausible_sequence_number_raises_an_alert_and_counts_no_loss(
     master: Master, seq: int
 ) -> None:
-    """It comes over the connection of a publisher: straight into the socket, as any program can send it."""
+    """The message is written to the socket of a real publisher's connection, as any program can do."""
     with (
         nep.node("hearer", master=master.address) as hearer,
         nep.node("sayer", master=master.address) as sayer,
@@ -190,7 +190,7 @@ def test_message_with_implausible_sequence_number_raises_an_alert_and_counts_no_
 
 
 def eventually_alerts(node: nep.Node) -> list[str]:
-    """The sentences about messages, as soon as there are some."""
+    """Wait for alerts about messages and return their texts."""
     found: list[str] = []
 
     def look() -> bool:
@@ -204,7 +204,7 @@ def eventually_alerts(node: nep.Node) -> list[str]:
 def test_reply_that_cannot_be_encoded_fails_without_affecting_other_replies(
     master: Master, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """A mistake of ours: something attached to the master registers what has no form on the wire."""
+    """Stands for a bug in an attachment of the master that registers an unencodable value."""
     caplog.set_level(logging.CRITICAL, "nep.master")
     with (
         nep.node("honest", master=master.address) as honest,

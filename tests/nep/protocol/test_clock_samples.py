@@ -1,4 +1,4 @@
-"""Comparing two clocks: with clocks that a test moves, and with every answer that a master may give."""
+"""Tests of clock comparison, with clocks that the test moves and with every reply that a master may send."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ BEGIN_NS = 1_700_000_000 * S
 
 
 class Pair:
-    """Two computers: `samples` are of the one, whose clock is `apart_ns` ahead of the other's."""
+    """Two computers; `samples` belong to the one whose clock is `apart_ns` ahead of the master's."""
 
     def __init__(self, apart_ns: int) -> None:
         self.apart_ns = apart_ns
@@ -31,7 +31,7 @@ class Pair:
         return BEGIN_NS + self.steady_ns
 
     def renew(self, there_ns: int, back_ns: int, *, worked_ns: int = 0) -> bool:
-        """Ask the master: so long on the way there, at work, and on the way back."""
+        """Renew at the master with the given delays of the request, the master's work and the reply."""
         sent = self.samples.now()
         self.steady_ns += there_ns
         received_ns = self.master_ns
@@ -41,7 +41,7 @@ class Pair:
         return self.samples.add(sent, received_ns, answered_ns)
 
     def check(self) -> int:
-        """The truth lies within what is known; its uncertainty."""
+        """Check that the true offset lies within the uncertainty, and return the uncertainty in ns."""
         known = self.samples.offset()
         assert known is not None
         offset_ns, uncertainty_ns = known

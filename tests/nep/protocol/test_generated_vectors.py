@@ -1,4 +1,4 @@
-"""Generated vectors of the wire: they are up to date, and encoders and decoders agree with them."""
+"""Tests of the generated wire vectors: they are up to date, and encoders and decoders agree with them."""
 
 from __future__ import annotations
 

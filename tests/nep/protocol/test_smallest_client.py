@@ -1,4 +1,4 @@
-"""The smallest client of docs/smallest-client.md with nodes of nep, in both directions."""
+"""Tests of the smallest client of docs/smallest-client.md with nodes of nep, in both directions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXAMPLE = ROOT / "examples" / "smallest_client.py"
 
 @pytest.fixture(scope="module")
 def smallest() -> ModuleType:
-    """The example as a module."""
+    """Return the example as a module."""
     spec = importlib.util.spec_from_file_location("smallest_client", EXAMPLE)
     assert spec is not None
     assert spec.loader is not None

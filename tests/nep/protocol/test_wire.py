@@ -1,4 +1,4 @@
-"""The native wire: what is joined is split again, and nothing else is taken for a message."""
+"""Tests of the native wire: joined parts are split again, and invalid parts are rejected."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The vectors of the wire, through the sockets: what is sent and read here is what they say, byte by byte.
+"""Tests of the wire vectors through sockets: the bytes sent and received equal those of the vectors.
 
-`tests/data/wire` is what other implementations are written against; `test_wire.py` holds the pure functions
-against it. Here a plain ZeroMQ socket stands for the other implementation.
+Other implementations are written against `tests/data/wire`; `test_wire.py` tests the pure functions
+with it. Here a plain ZeroMQ socket stands for the other implementation.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def parts_of(vector: dict[str, Any]) -> list[bytes]:
 
 
 def meaning_of(means: dict[str, Any]) -> dict[str, Any]:
-    """Return the values of a vector with 64-bit numbers as integers: the files have them as text."""
+    """Return the values of a vector with 64-bit numbers as integers; the files store them as text."""
     return {**means, **{name: int(means[name]) for name in ("seq", "stamp_ns", "publisher")}}
 
 
@@ -56,7 +56,7 @@ def type_of(vector: dict[str, Any]) -> str:
 
 @pytest.fixture
 def their() -> Iterator[Callable[[int], zmq.Socket[bytes]]]:
-    """Makes plain sockets of a kind, and closes them."""
+    """Function that opens plain sockets of a kind; they are closed after the test."""
     with contextlib.ExitStack() as ended:
         context = ended.enter_context(zmq.Context())
 
@@ -229,7 +229,7 @@ def fixed_master() -> Iterator[Master]:
 def asks(
     fixed_master: Master, their: Callable[[int], zmq.Socket[bytes]]
 ) -> Callable[[str, str], tuple[bytes, zmq.Socket[bytes]]]:
-    """Send a request over the named connection; skip pushes and return the reply."""
+    """Function that sends a request over the named connection, skips pushes and returns reply and socket."""
     connections: dict[str, zmq.Socket[bytes]] = {}
 
     def ask(who: str, request: str) -> tuple[bytes, zmq.Socket[bytes]]:

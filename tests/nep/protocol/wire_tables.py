@@ -51,7 +51,7 @@ _OF_ALL = {"epoch", "revision"}
 
 
 def rows(name: str) -> list[tuple[str, str, str]]:
-    """Return field, type and default of each field; without `epoch` and `revision` of replies and pushes."""
+    """Return field, type and default of each field, without `epoch` and `revision` of replies and pushes."""
     kind = TABLES[name]
     hints = get_type_hints(kind)
     is_answer = {"epoch", "revision"} <= hints.keys() and name not in {"renew", "view"}

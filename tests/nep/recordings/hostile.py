@@ -1,4 +1,4 @@
-"""MCAP files that state sizes, counts and places that are not true, built record by record."""
+"""MCAP files with false sizes, counts and offsets, built record by record."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import zstandard
 
 MAGIC = b"\x89MCAP0\r\n"
 HUGE = 600 * 2**20
-"""More than any test may use; compressed it has 55 kB."""
+"""Size in bytes beyond the memory that a test may use; compressed it takes 55 kB."""
 TIMES = (10**9, 2 * 10**9)
 
 
@@ -75,7 +75,7 @@ def footer(summary_start: int) -> bytes:
 
 
 def closed(data: bytes, summary: Callable[[int], bytes] | bytes = b"") -> bytes:
-    """A file with this data, and a summary that is given where the data begins."""
+    """Return a complete file with this data; `summary` is called with the offset of the data."""
     start = MAGIC + HEADER
     made = start + data + record(15, bytes(4))
     told = summary(len(start)) if callable(summary) else summary
@@ -101,7 +101,7 @@ def _one_chunk(packed: bytes, size: int, compression: str = "zstd", crc: int = 0
 
 
 def files() -> dict[str, Callable[[], bytes]]:
-    """Each file by a name."""
+    """Return the function that builds each file, by name."""
     claims_12_gb = b"\x28\xb5\x2f\xfd" + bytes([0b11100000]) + struct.pack("<Q", 12 * 2**30) + b"\x01\0\0"
     begin = MAGIC + HEADER + channel()
     return {
@@ -156,7 +156,7 @@ def _many_metadata() -> bytes:
 
 
 def many_channels(count: int = 3_000) -> bytes:
-    """A file with so many topics and a message of each."""
+    """Return a file with `count` topics and one message on each."""
     numbers = range(1, count + 1)
     channels = b"".join(channel(number, f"/t{number}/{'x' * 200}") for number in numbers)
     data = chunk_of(b"".join(map(message, numbers)))
@@ -167,7 +167,6 @@ def many_channels(count: int = 3_000) -> bytes:
 
 
 def write_all(folder: Path) -> list[Path]:
-    """Write every file."""
     paths = []
     for name, make in files().items():
         paths.append(folder / f"{name}.mcap")

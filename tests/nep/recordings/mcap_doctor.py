@@ -1,7 +1,7 @@
-"""The rules of `mcap doctor`, as the specification has them, looked at record by record and by hand.
+"""Rules of `mcap doctor` as in the specification, checked record by record.
 
-It shares no code with what writes recordings: bytes are taken apart here, and compared with what the package
-`mcap` makes of them.
+No code is shared with the writer of recordings: bytes are parsed here and compared with the results of
+the package `mcap`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ KNOWN_PROFILES = {"", "ros1", "ros2"}
 
 
 class McapDoctor:
-    """What is wrong with a file, in `problems`."""
+    """Checker of one file; what is wrong with it is in `problems`."""
 
     def __init__(self, path: Path) -> None:
         self.data = path.read_bytes()

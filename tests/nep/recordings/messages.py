@@ -1,4 +1,4 @@
-"""Messages of every kind, and what a recording must keep of each."""
+"""Messages of every kind, and the attributes that a recording must preserve."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ STEP_NS = 10_000_000
 
 
 def limits(**changed: float) -> WriterLimits:
-    """The usual ones, on a disk that may be nearly full."""
+    """Return the default limits with changes, without a minimum of free disk space."""
     return replace(WriterLimits(min_free_bytes=0), **changed)
 
 
 class TestClock:
-    """Goes on by 10 ms each time that it is asked."""
+    """Fake clock that advances by `step_ns` (10 ms by default) at each call."""
 
     __test__ = False
 
@@ -37,7 +37,7 @@ class TestClock:
 
 
 def kept(message: Message) -> tuple[object, ...]:
-    """All that replay must give back."""
+    """Return everything that a replay must preserve of a message."""
     return (
         message.topic,
         bytes(message.data),
@@ -51,14 +51,14 @@ def kept(message: Message) -> tuple[object, ...]:
 
 
 def json_message(seq: int, topic: str = "/odom", publisher: int = 7, size: int = 100) -> Message:
-    """One that no two have the same bytes of, and that compresses badly."""
+    """Return a message with unique data that compresses badly."""
     noise = random.Random(seq).randbytes(size // 2).hex()
     data = f'{{"x":{seq},"noise":"{noise}"}}'.encode()
     return Message(topic, data, "json", "json", stamp_ns=START_NS + seq, seq=seq, publisher=publisher)
 
 
 def picture(seq: int, encoding: str = "jpeg", topic: str = "/camera") -> Message:
-    """A small picture as a publisher sends it."""
+    """Return a small image message as a publisher sends it."""
     frame = np.random.default_rng(seq).integers(0, 255, (12, 16, 3), dtype=np.uint8)
     made = {
         "jpeg": image_codec.encode,
@@ -78,7 +78,7 @@ def picture(seq: int, encoding: str = "jpeg", topic: str = "/camera") -> Message
 
 
 def odd_messages() -> list[Message]:
-    """What a network may bring: of every codec, with the extremes of every number, and broken."""
+    """Return messages of every codec, with extreme numbers and with malformed data."""
     whole = {"stamp_ns": 5, "seq": 1, "publisher": 3}
     return [
         json_message(1),
@@ -120,7 +120,7 @@ def odd_messages() -> list[Message]:
 
 
 def record(path: Path, parts: Sequence[Sequence[Message]]) -> None:
-    """A recording with a chunk for each part, 10 ms between messages."""
+    """Write a recording with one chunk per part and 10 ms between messages."""
     with RecordingWriter(path, clock=TestClock(), limits=limits()) as writer:
         for part in parts:
             for message in part:

@@ -1,4 +1,4 @@
-"""Bookmarks are found again, and the recording is never changed for them."""
+"""Tests of bookmarks, which are saved next to the recording and never change it."""
 
 from __future__ import annotations
 

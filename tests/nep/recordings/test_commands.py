@@ -1,4 +1,4 @@
-"""`nep record`, `nep play` and `nep recording`, as a person uses them."""
+"""Tests of `nep record`, `nep play` and `nep recording`."""
 
 from __future__ import annotations
 
@@ -240,7 +240,7 @@ def test_play_command_rejects_missing_or_unsafe_options(path, words, error, said
 
 
 def describe(robot: nep.Node, name: str, command: str) -> list[nep.Message]:
-    """A robot that names its command topic itself; what it is told."""
+    """Publish a robot's description with a command topic; return the list that receives its messages."""
     description = {"title": name, "rb:topics": {"command": command}}
     robot.new_pub(f"/{name}/description", "robot/description", latched=True).publish(description)
     told: list[nep.Message] = []

@@ -1,4 +1,4 @@
-"""Tables and pictures of a recording have what was in it."""
+"""Tests of exports of a recording as tables, images and videos."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def test_exported_video_has_the_duration_of_the_recording(tmp_path):
 
 
 def test_video_is_exported_as_avi_without_ffmpeg(tmp_path):
-    """As in a package, in a process of its own: OpenCV reads what it may use once."""
+    """Runs as a process because OpenCV reads its environment only once."""
     record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 31)]])
     program = f"""
         from pathlib import Path
@@ -200,7 +200,7 @@ def test_failed_video_export_raises_and_leaves_no_file(tmp_path, monkeypatch):
 
 
 def truncate(film):
-    """As a full disk does it: OpenCV says nothing."""
+    """Truncate the video as a full disk does; OpenCV reports no error."""
     film._film.release()
     with suppress(FileNotFoundError):
         os.truncate(film._written, 100)

@@ -1,4 +1,4 @@
-"""Files that other programs wrote, in every way that the specification allows, and damaged ones."""
+"""Tests of files that other programs wrote, in every variant of the specification, and of damaged files."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ COUNT = 50
 
 
 def written(path: Path, **options: object) -> Path:
-    """A file of another program: 50 messages on /wheel, the last one on /lamp, an attachment, metadata."""
+    """Write another program's file: 50 messages on /wheel, one on /lamp, an attachment and metadata."""
     with path.open("wb") as file:
         writer = Writer(file, **options)  # type: ignore[arg-type]
         writer.start(profile="ros2", library="another tool")
@@ -164,7 +164,7 @@ def test_exported_range_keeps_encodings_schemas_and_metadata_without_loss_counts
 
 
 def damaged(path: Path) -> Path:
-    """A recording of 40 messages in four chunks, of which the third is damaged."""
+    """Write a recording of 40 messages in four chunks, of which the third is damaged."""
     record(path, [[json_message(seq) for seq in range(at * 10, at * 10 + 10)] for at in range(4)])
     with Recording(path) as recording:
         chunk = recording.file.chunks()[2]  # type: ignore[attr-defined]

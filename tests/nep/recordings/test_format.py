@@ -1,4 +1,4 @@
-"""What a recording keeps: all of it, of every message; and others read it, too."""
+"""Tests of the recording format: messages are preserved completely, and other programs can read the files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""docs/recordings.md: its program runs and prints what it says, and the modules that it names are there."""
+"""Tests of docs/recordings.md: its program prints the documented output, and the named modules exist."""
 
 from __future__ import annotations
 

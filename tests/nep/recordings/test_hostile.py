@@ -1,4 +1,4 @@
-"""Files that want gigabytes or minutes: each command ends within its memory and its work, with a sentence."""
+"""Tests of files that claim gigabytes or minutes: commands stay within their limits and end with an error."""
 
 from __future__ import annotations
 
@@ -133,7 +133,6 @@ def test_overlapping_chunks_are_read_without_holding_all_messages(paths: list[Pa
 
 @pytest.mark.parametrize("kind", ["chunks", "no chunks", "no summary", "no message index"])
 def test_damaged_bytes_raise_only_recording_errors(tmp_path: Path, kind: str) -> None:
-    """Opening, reading, seeking and counting raise nothing but `RecordingError`."""
     whole = written(tmp_path / "whole.mcap", **KINDS[kind]).read_bytes()
     rnd, path = random.Random(kind), tmp_path / "damaged.mcap"
     for number in range(60):

@@ -1,4 +1,4 @@
-"""Each rule of the doctor that looks at recordings in these tests can fail, on a file that breaks it."""
+"""Tests of the test suite's own MCAP doctor: for each rule there is a file that breaks it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Damage = Callable[[Records], None]
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """A recording with two topics, their schemas, and chunks that have several messages."""
+    """Recording with two topics, their schemas, and a chunk with several messages."""
     path = tmp_path_factory.mktemp("whole") / "a.mcap"
     record(path, [[json_message(1), picture(1), json_message(2)], [json_message(3)]])
     assert McapDoctor(path).problems == []
@@ -44,7 +44,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 def taken_apart(data: bytes) -> Records:
-    """(opcode, content) of each record."""
+    """Return the opcode and content of each record."""
     at, found = len(MAGIC), []
     while at < len(data) - len(MAGIC):
         opcode, length = struct.unpack_from("<BQ", data, at)
@@ -59,12 +59,12 @@ def put_together(records: Records) -> bytes:
 
 
 def place(records: Records, opcode: int, nth: int) -> int:
-    """Where the nth record of a kind is; -1 is the last."""
+    """Return the index of the nth record of a kind; -1 is the last."""
     return [number for number, each in enumerate(records) if each[0] == opcode][nth]
 
 
 def changed(opcode: int, nth: int = 0, /, **fields: object) -> Damage:
-    """Other values in one record; a function is given the old one."""
+    """Return a damage that changes fields of one record; a callable receives the old value."""
 
     def damage(records: Records) -> None:
         at = place(records, opcode, nth)
@@ -102,7 +102,7 @@ def put_in(opcode: int, content: bytes, before: int) -> Damage:
 
 
 def in_chunk(change: Callable[[Records], Records]) -> Damage:
-    """Other messages in the first chunk, whose sizes and CRC are right."""
+    """Return a damage that changes the messages of the first chunk, with correct sizes and CRC."""
 
     def damage(records: Records) -> None:
         chunk = kinds.Chunk.read(ReadDataStream(io.BytesIO(records[place(records, CHUNK, 0)][1])))
@@ -119,7 +119,7 @@ def in_chunk(change: Callable[[Records], Records]) -> Damage:
 
 
 def cut_length(records: Records) -> None:
-    """A chunk that says that it has more bytes than it has."""
+    """Let a chunk state more bytes than it has."""
     at = place(records, CHUNK, 0)
     content = bytearray(records[at][1])
     (letters,) = struct.unpack_from("<I", content, 28)
@@ -128,7 +128,7 @@ def cut_length(records: Records) -> None:
 
 
 def first_of(change: Callable[[int], int]) -> Callable[[dict[int, int]], dict[int, int]]:
-    """The first value of a map, changed."""
+    """Return a function that changes the first value of a map."""
     return lambda known: {
         key: change(value) if not n else value for n, (key, value) in enumerate(known.items())
     }
@@ -215,7 +215,7 @@ DAMAGES: list[tuple[str, Damage]] = [
     ("the end time is wrong", changed(STATISTICS, message_end_time=more)),
 ]  # fmt: skip
 BYTES_AT = {"no magic": 0, "no magic at the end": -1, "a record is cut": len(MAGIC) + 8}
-"""In which byte of a file a wrong one breaks a rule."""
+"""Offset of the byte whose change breaks a rule, by problem."""
 
 
 @pytest.mark.parametrize(

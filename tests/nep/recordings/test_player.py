@@ -1,4 +1,4 @@
-"""Playing: the same messages in the same order and time, wherever and however fast."""
+"""Tests of playback: message order and times at any speed, seeking, stepping and loops."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STEP_S = STEP_NS / 1e9
 
 
 class Clock:
-    """Stands still until it is turned."""
+    """Fake clock that the test advances; times in seconds."""
 
     def __init__(self) -> None:
         self.now = 50.0
@@ -46,7 +46,7 @@ def times(recording):
 
 
 def run(playback: Playback, clock: Clock, seconds: float, step_s: float = 0.004) -> list[tuple[float, int]]:
-    """(seconds after the start, seq) of what came next while the clock went on."""
+    """Advance the clock and return (seconds since the start, seq) of each message that was played."""
     found, started = [], clock.now
     while clock.now < started + seconds - 1e-9:
         due = playback.advance()

@@ -1,4 +1,4 @@
-"""The reader gives what is there, from any time on, and asks the disk for no more than it needs."""
+"""Tests of the reader: messages from any time on, with bounded reads and memory."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ def test_reader_recovers_from_random_damage_near_the_end(path, tmp_path):
 
 
 def resummed(data: bytes, changed: dict[str, int]) -> bytes:
-    """A recording whose summary says something else of each chunk, and has no CRC that would tell."""
+    """Return a recording with changed chunk indexes in its summary and without a summary CRC."""
     made = bytearray(data)
     start = int.from_bytes(made[-28:-20], "little")
     places = {"offset": (9 + 16, 8), "length": (9 + 24, 8), "start": (9, 8), "end": (9 + 8, 8)}

@@ -1,4 +1,4 @@
-"""The recorder hears what is chosen, each message once, and topics that appear later from their first one."""
+"""Tests of the recorder: each selected message is recorded once, also the first one of a later topic."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tests.nep.recordings.messages import limits
 
 
 class Heard:
-    """Takes what a recorder gives."""
+    """Destination that stores the messages and entries of a recorder."""
 
     def __init__(self) -> None:
         self.messages: list[nep.Message] = []

@@ -1,4 +1,4 @@
-"""Recordings that are read in another process: the same messages, or a sentence when it dies."""
+"""Tests of reading recordings in another process: same messages, or an error when the process dies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is whole in a cut or damaged recording comes back, is counted, and is read back."""
+"""Tests of the repair of truncated or damaged recordings: every intact message is recovered and counted."""
 
 from __future__ import annotations
 

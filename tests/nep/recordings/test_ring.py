@@ -1,4 +1,4 @@
-"""The flight recorder: always the last seconds, never more on the disk than allowed."""
+"""Tests of the flight recorder: it keeps the last seconds within its limit of disk space."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NO_PROCESS = 2**31 - 2
 
 
 def fill(ring: FlightRecorder, first: int, last: int, every: int = 10) -> None:
-    """A chunk for each few messages, 10 ms apart."""
+    """Post messages 10 ms apart, with a new chunk after each multiple of `every`."""
     for seq in range(first, last):
         ring.post([json_message(seq)])
         if seq % every == 0:

@@ -1,4 +1,4 @@
-"""A recording in several files: each is complete, none is much too large, and nothing is lost."""
+"""Tests of recordings in several files: each is complete and bounded in size, and no message is lost."""
 
 from __future__ import annotations
 

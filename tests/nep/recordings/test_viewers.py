@@ -1,7 +1,7 @@
-"""What Lichtblick's and Foxglove's reader demands of a recording holds for ours, whatever became of it.
+"""Tests that recordings meet the requirements of Lichtblick's and Foxglove's readers, even after faults.
 
-They make their fields of the schema of a topic's first channel in the summary, and give a topic up whose
-schema has something else than what is allowed here.
+These viewers derive fields from the schema of a topic's first channel in the summary, and do not show a
+topic whose schema contains anything else than what is allowed here.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Made = Callable[[Path], Path]
 
 
 class UnreadableError(Exception):
-    """A viewer would give the topic up."""
+    """Raised for a topic that a viewer would not show."""
 
 
 def demand(is_met: object, what: str) -> None:
@@ -43,7 +43,7 @@ def demand(is_met: object, what: str) -> None:
 
 
 def look_at_schema(schema: Any, name: str = "") -> None:
-    """The fields of a JSON Schema, as far as viewers read it."""
+    """Check the fields of a JSON Schema as viewers read them."""
     demand(isinstance(schema, dict) and schema.get("type") == "object", f"{name}: no object")
     for key, field in schema.get("properties", {}).items():
         at = f"{name}.{key}"
@@ -64,7 +64,7 @@ def look_at_schema(schema: Any, name: str = "") -> None:
 
 
 def decode(schema: Mapping[str, Any], value: Any) -> Any:
-    """A message with its texts in base64 as bytes, which is what viewers make of it."""
+    """Decode base64 texts of a message to bytes, as viewers do."""
     if not isinstance(value, dict):
         return value
     made = dict(value)
@@ -77,7 +77,7 @@ def decode(schema: Mapping[str, Any], value: Any) -> Any:
 
 
 def declared(described: bytes) -> dict[str, dict[int, tuple[str, int]]]:
-    """Messages of a FileDescriptorSet by their full names: fields by number, with name and type."""
+    """Return the messages of a FileDescriptorSet by full name: the name and type of each field, by number."""
     found: dict[str, dict[int, tuple[str, int]]] = {}
     for _set, file in fields(memoryview(described)):
         parts: list[tuple[int, Any]] = list(fields(file))
@@ -111,7 +111,7 @@ def look_at_protobuf(name: str, described: bytes, data: bytes) -> None:
 
 
 def look(path: Path) -> Iterator[tuple[str, object]]:
-    """(topic, what is shown) of each message. Raises `UnreadableError`."""
+    """Yield the topic and the displayed value of each message; raise `UnreadableError` as a viewer would."""
     with path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         summary = reader.get_summary()
@@ -203,7 +203,7 @@ class Row(TypedDict):
 
 @dataclass
 class Odd:
-    """Whatever a program may declare."""
+    """Class with fields of every kind that a program may declare."""
 
     number: complex
     data: bytes

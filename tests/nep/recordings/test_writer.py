@@ -1,4 +1,4 @@
-"""The writer loses nothing without saying so, whatever the disk does."""
+"""Tests of the writer with slow, full and failing disks: every message that is not written is counted."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from tests.small_disk import SmallDisk
 
 
 class HeldDestination:
-    """A disk that takes nothing until it is let go."""
+    """Destination whose flush blocks until `go_on` is set."""
 
     is_full = False
 
@@ -53,7 +53,7 @@ class HeldDestination:
 
 
 class FullDisk:
-    """A file that takes so many bytes, the last ones of a write by half, and then raises."""
+    """File that accepts `budget` bytes, the last write possibly in part, and then raises "no space left"."""
 
     def __init__(self, file, budget: int) -> None:
         self._file, self._budget = file, budget
@@ -282,7 +282,7 @@ def test_no_file_is_left_if_the_disk_is_full_from_the_start(tmp_path, monkeypatc
 
 
 class FailingBytes:
-    """What cannot be written."""
+    """Data that cannot be written: its use raises "no space left on device"."""
 
     def __add__(self, _other: bytes) -> bytes:
         raise OSError(errno.ENOSPC, "No space left on device")

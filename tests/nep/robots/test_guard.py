@@ -1,4 +1,4 @@
-"""Programs without a window move no robot that nobody has allowed them to move."""
+"""Tests of the motion guard of programs without a window: they move only robots that a person allowed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which topics move a robot, decided from descriptions, types and subscribers."""
+"""Tests of the detection of topics that move a robot, from descriptions, types and subscribers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A program that forks while its client calls its server, where servers have threads of their own."""
+"""Program that forks during a call, for back ends whose servers have their own threads."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ node.close()
 
 
 def check_fork(node: str, at: str = "None") -> None:
-    """The child is told that what it has is its parent's, and ends; in the parent the call is answered.
+    """Check that the child's inherited client raises an error and that the parent's call gets its reply.
 
-    `node` and `at` are Python for the node, and for where its server and client meet.
+    `node` and `at` are Python expressions: the node, and the address where its server and client meet.
     """
     with running(CODE.format(node=node, at=at)) as program:
         assert "client of '/x' belongs to the parent process" in program.line()

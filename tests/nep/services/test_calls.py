@@ -1,4 +1,4 @@
-"""Calls and answers: the same tests over every back end that has services."""
+"""Tests of calls and replies over every back end with services."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ Make = Callable[[str], nep.Node]
     params=["zeromq", "memory", "zenoh", "direct", "tcp", pytest.param("sp", marks=pytest.mark.long)]
 )
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that can meet; closes them. With "direct", "tcp" and "sp" their servers bind and no master
-    is asked."""
+    """Function that creates nodes in the same network; the nodes are closed after the test.
+
+    With "direct", "tcp" and "sp" their servers bind a fixed port, without a master.
+    """
     made: list[nep.Node] = []
     backend = {"direct": "zeromq", "tcp": "zeromq", "sp": "nanomsg"}.get(request.param, request.param)
     where = place_for(backend, master.address)
@@ -44,14 +46,14 @@ def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
 
 @pytest.fixture
 def registered(make: Make, request: pytest.FixtureRequest) -> Make:
-    """As `make`, for what needs a master, or a hub: names, graphs, several servers."""
+    """The fixture `make` for tests that need a master or a hub: names, graphs, several servers."""
     if request.node.callspec.params["make"] not in BACKENDS:
         pytest.skip("nobody knows who is there without a master")
     return make
 
 
 def connect_directly(node: nep.Node, wire: str, ports: dict[str, int]) -> None:
-    """Let the node's servers and clients of one service meet at one port."""
+    """Let the node's servers and clients of a service use the same fixed port."""
 
     def at(service: str) -> nep.Direct:
         with socket.socket() as probe:
@@ -72,7 +74,7 @@ def connect_directly(node: nep.Node, wire: str, ports: dict[str, int]) -> None:
 
 @pytest.fixture
 def spin() -> Iterator[Callable[[nep.Node], None]]:
-    """Spins a node in a thread."""
+    """Function that spins a node in a thread until the end of the test."""
     threads: list[tuple[nep.Node, threading.Thread]] = []
 
     def start(node: nep.Node) -> None:
@@ -140,7 +142,7 @@ def test_concurrent_calls_of_several_clients(make: Make) -> None:
 
 
 class UntellableError(Exception):
-    """One that cannot even be told."""
+    """Exception whose text cannot be formatted."""
 
     def __str__(self) -> str:
         raise ZeroDivisionError
@@ -326,7 +328,7 @@ def test_closing_server_rejects_queued_calls_and_fails_the_running_call(make: Ma
 
 
 def test_closing_server_rejects_every_queued_call(make: Make) -> None:
-    """None of them was carried out, and their clients are told so: not that nobody knows."""
+    """Clients must learn that none of these calls was executed, not that their result is unknown."""
     node = make("server")
     server = node.new_server("/closes", doubled)  # nobody spins
     clients = [make(f"client {n}").new_client("/closes", timeout_s=LONG_S) for n in range(4)]
@@ -438,7 +440,7 @@ def test_callback_can_close_its_server_and_call_other_services(make: Make) -> No
 
 
 def test_callback_that_calls_its_own_single_threaded_server_times_out(make: Make) -> None:
-    """A service that calls itself has one thread too few: a time-out, and everything goes on."""
+    """A service that calls itself needs a second thread; with one, the call times out and calls continue."""
     node = make("server")
     inner = make("inner").new_client("/self", timeout_s=0.3)
     server = node.new_server("/self", lambda deep: inner.call(deep - 1) if deep else "done", threads=1)

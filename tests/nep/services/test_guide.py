@@ -1,4 +1,4 @@
-"""docs/services.md: its example runs and prints what it says."""
+"""Tests of docs/services.md: its examples run and print the documented output."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Services without a master over nanomsg: SP's REQ and REP, as pynng, nanocat and the original have them."""
+"""Tests of services over nanomsg without a master: REQ and REP as in pynng, nanocat and the original nep."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def test_original_wire_errors_are_sent_as_replies(node: nep.Node, port: int) -> 
 def test_client_that_does_not_read_does_not_block_other_clients(
     node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It asks for large answers and reads none: the others have theirs."""
+    """The client requests large replies and reads none."""
     monkeypatch.setattr("nep.backends.nanomsg.direct_services._REPLY_TIMEOUT_MS", 200)
     at = node.direct("127.0.0.1", port)
     node.new_server("/big", lambda n: "x" * n, at, threads=2)

@@ -1,4 +1,4 @@
-"""Surveys without a master: nanomsg's SURVEYOR and RESPONDENT, as other programs have them."""
+"""Tests of surveys without a master: nanomsg's SURVEYOR and RESPONDENT as in other programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Services on bad days: servers that die or hang, masters that come back, strangers, forks."""
+"""Tests of services under faults: dead or hung servers, restarted masters, malformed messages, forks."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def test_calls_continue_while_the_master_is_unreachable() -> None:
 
 
 def test_call_reaches_a_server_despite_an_unreachable_server_of_the_same_name(master: Master, client) -> None:
-    """Something is listed first whose port is closed."""
+    """The server that is listed first has a closed port."""
     key = "k" * 20
     node = NodeRecord(derive_node_id(key), "ghost", "", None, key=key)
     with zmq.Context() as context, context.socket(zmq.ROUTER) as hole:
@@ -231,7 +231,7 @@ def test_duplicate_reply_is_counted_as_late(master: Master, client) -> None:
 
 
 class _fake_server:  # noqa: N801 - it reads as a function
-    """A server of "/x" that answers each call with what `answers` makes of its parts."""
+    """Server of "/x" that replies to each call with the result of `answers` for its parts."""
 
     def __init__(self, master: Master, answers) -> None:
         self._answers = answers
@@ -332,7 +332,7 @@ def test_timers_and_messages_are_handled_between_calls(master: Master) -> None:
 def test_spin_wakes_for_a_new_server_and_for_each_call(
     master: Master, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A wait without a wake takes an hour: one that is lost would be a call without an answer."""
+    """Waits take an hour here, so a lost wake-up would leave a call without a reply."""
     monkeypatch.setattr("nep.nodes.work.WAIT_SLICE_S", 3600.0)
     with nep.node("server") as a, nep.node("client") as b:
         spinner = threading.Thread(target=a.spin, name="spin")

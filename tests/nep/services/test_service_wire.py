@@ -1,4 +1,4 @@
-"""The vectors of the wire of services: what is sent and read is what they say, byte by byte."""
+"""Tests of the wire vectors of services: the bytes sent and received equal those of the vectors."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def parts_of(vector: dict[str, Any]) -> list[bytes]:
 
 @pytest.fixture
 def stream() -> Iterator[tuple[TcpStream, socket.socket]]:
-    """Ours, and the other end of it."""
+    """`TcpStream` and the socket at its other end."""
     ours, theirs = socket.socketpair()
     ours.setblocking(False)
     theirs.settimeout(30.0)

@@ -1,4 +1,4 @@
-"""Servers among other nodes in one spin, and in a loop of asyncio: they answer without being looked at."""
+"""Tests of servers of several nodes in one spin and in an asyncio event loop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surveys: one question to all respondents, over every back end that has them."""
+"""Tests of surveys, requests to all respondents, over every back end that supports them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Make = Callable[[str], nep.Node]
 
 @pytest.fixture(params=["zeromq", "memory", pytest.param("zenoh", marks=pytest.mark.long)])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that can meet; closes them."""
+    """Function that creates nodes in the same network; the nodes are closed after the test."""
     made: list[nep.Node] = []
     where = place_for(request.param, master.address)
 
@@ -35,7 +35,7 @@ def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
 
 
 def respond(make: Make, *answers: object) -> list[nep.Respondent]:
-    """A node with a respondent for each of these answers; one that is an error is raised."""
+    """Create a node with a respondent for each of these replies; an exception is raised instead."""
 
     def callback(answer):
         def answered(question):

@@ -1,4 +1,4 @@
-"""Services over plain TCP: programs that have sockets alone, strangers, and those who die."""
+"""Tests of services over plain TCP: clients with only a socket, malformed frames, killed servers."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def node() -> Iterator[nep.Node]:
 
 
 class Program:
-    """Another language's program: it has a socket, and docs/services.md."""
+    """Client as another language implements it from docs/services.md, with only a socket."""
 
     def __init__(self, port: int) -> None:
         self.socket = socket.create_connection(("127.0.0.1", port), LONG_S)
@@ -239,7 +239,7 @@ def test_connections_beyond_the_limit_are_closed(
 
 
 def _is_answered(port: int) -> bool:
-    """Whether there is room again for one more."""
+    """Return True if the server accepts another connection and replies."""
     with Program(port) as program:
         try:
             program.send(1, {})
@@ -270,7 +270,7 @@ def test_unread_replies_are_bounded(
 def test_client_without_a_server_does_not_connect_to_itself(
     node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The system may give a socket the very port that it asks for, if nobody listens there."""
+    """The system may assign a socket the very port that it connects to, if no process listens there."""
 
     class OwnPort(socket.socket):
         def connect_ex(self, address):

@@ -1,4 +1,4 @@
-"""Calls whose requests and answers have types: both ends check them, and others see plain maps."""
+"""Tests of calls with typed requests and replies: both ends validate them; untyped programs use maps."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def length_of(way: object) -> Length:
 
 @pytest.fixture(params=["memory", "zeromq"])
 def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
-    """Makes nodes that meet; closes them."""
+    """Function that creates nodes in the same network; the nodes are closed after the test."""
     made: list[nep.Node] = []
     where = f"typed-{next(_names)}" if request.param == "memory" else master.address
 

@@ -1,4 +1,4 @@
-"""Services over zenoh on bad days, through a router, and with programs that have zenoh alone."""
+"""Tests of services over zenoh: faults, a router, and programs that use zenoh without nep."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ with zenoh.open(zenoh.Config.from_json5(sys.argv[1])):
     sys.stdin.read()
 """
 HEADER = struct.Struct("<BBHIQ")
-"""Of calls and answers, as docs/services.md has it: version, kind, codec, milliseconds, number."""
+"""Header of calls and replies as in docs/services.md: version, kind, codec, milliseconds, number."""
 
 Make = Callable[..., nep.Node]
 
@@ -66,7 +66,7 @@ def make(place: str) -> Iterator[Make]:
 
 @pytest.fixture(scope="module")
 def routed() -> Iterator[str]:
-    """Where a router of zenoh's own is reached."""
+    """Address of a zenoh router."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
@@ -82,7 +82,7 @@ def routed() -> Iterator[str]:
 
 @pytest.fixture
 def stranger(routed: str) -> Iterator[Any]:
-    """A session of a program that has zenoh alone."""
+    """Session of a program that uses zenoh without nep."""
     told = {
         "mode": "client",
         "connect": {"endpoints": [routed]},
@@ -145,7 +145,7 @@ def test_suspended_server_answers_pending_calls_after_resuming(make: Make, place
 
 
 def asked(session: Any, key: str, header: bytes | None, data: bytes | None) -> list[tuple[bytes, bytes]]:
-    """What a server answers: header and payload."""
+    """Call a server; return header and payload of each reply."""
     replies = session.get(key, payload=data, attachment=header, timeout=LONG_S)
     return [(reply.ok.attachment.to_bytes(), reply.ok.payload.to_bytes()) for reply in replies]
 

@@ -1,4 +1,4 @@
-"""The share of a core that a program uses."""
+"""Tests of the measured share of a CPU core that a program uses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from nep.system.cpu import CpuLoad
 
 
 class Hand:
-    """A clock and a counter of work, moved by hand."""
+    """Fake clock and counter of CPU time that the test moves."""
 
     def __init__(self) -> None:
         self.now = 100.0

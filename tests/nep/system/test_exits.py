@@ -1,4 +1,4 @@
-"""What ends after all nodes, in a process of its own."""
+"""Test of the handlers that run after all nodes are closed, in a separate process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A frozen program whose file is replaced or removed while it runs: its modules are still its own."""
+"""Tests of a frozen program whose file is replaced or removed while it runs: its own modules are imported."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ reader = pytest.importorskip("PyInstaller.loader.pyimod01_archive")
 
 
 def frozen(path: Path, *names: str) -> Path:
-    """A file with modules in it, as PyInstaller makes it; each says its name and the file's first name."""
+    """Write an archive of modules as PyInstaller does; `made` in each holds the first name and its own."""
     code = {name: compile(f"made = '{names[0]} {name}'", name, "exec") for name in names}
     entries = [(name, str(path), "PYMODULE") for name in names]
     writers.ZlibArchiveWriter(str(path), entries, code_dict=code)
@@ -25,7 +25,7 @@ def frozen(path: Path, *names: str) -> Path:
 
 @pytest.fixture
 def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
-    """A program that runs, and the reader of its modules."""
+    """Fake running program: its file and the reader of its modules."""
     file = frozen(tmp_path / "program", "old", "late")
     importers = SimpleNamespace(pyz_archive=reader.ZlibArchiveReader(str(file)))
     monkeypatch.setitem(sys.modules, LOADER_MODULE, importers)
@@ -40,7 +40,7 @@ def made_by(archive, name: str) -> str:
 
 @pytest.fixture
 def held(program: SimpleNamespace):
-    """The program, holding its code."""
+    """The program after `keep_archive_open`."""
     assert keep_archive_open()
     yield program
     os.close(int(program.archive._filename.rpartition("/")[2]))

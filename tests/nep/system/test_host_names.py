@@ -1,4 +1,4 @@
-"""Names of computers are asked for once, in a thread of their own, never where sockets are served."""
+"""Tests of host name resolution: infrequent lookups, in a separate thread, never in the I/O thread."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.nep.programs import eventually
 
 
 class Book:
-    """Names as a system knows them: it answers when it is let, and counts who asks."""
+    """Fake resolver that replies once `may_answer` is set and records hosts and threads."""
 
     def __init__(self, *answers: str) -> None:
         self.answers = list(answers)

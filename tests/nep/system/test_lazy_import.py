@@ -1,4 +1,4 @@
-"""Modules that are imported when they are first used."""
+"""Tests of modules that are imported on first use."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from nep.system.lazy_import import lazy_module
 
 
 def in_a_new_process(program: str) -> str:
-    """What a program prints: what was imported here before must not count."""
+    """Run a program and return its output; modules that this process has imported must not count."""
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=50, check=True
     )

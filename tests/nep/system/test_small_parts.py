@@ -1,4 +1,4 @@
-"""The small parts: inbox, sources, plug-ins, wakers, the I/O thread, addresses, errors."""
+"""Tests of small parts: inbox, sources, plug-ins, wakers, the I/O thread, addresses and errors."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def test_waker_makes_its_descriptor_readable_until_cleared() -> None:
 
 
 class Bell:
-    """Something served that counts its servings."""
+    """I/O handler that counts its calls and returns the given poll states."""
 
     def __init__(self, rests: list[PollState]) -> None:
         self.waker = Waker()
@@ -203,7 +203,7 @@ def test_io_thread_serves_a_sender_as_soon_as_its_socket_is_writable() -> None:
     ours, theirs = socket.socketpair()
 
     class Sender:
-        """Sends until the other side takes no more."""
+        """I/O handler that sends until the socket's buffer is full."""
 
         fd = ours.fileno()
         left = 4_000_000
@@ -329,7 +329,7 @@ def test_largest_possible_gap_is_counted() -> None:
 
 
 class Trap(selectors.DefaultSelector):
-    """Polls, until somebody breaks it: then it says what a system says of a descriptor that was closed."""
+    """Selector that, once broken, fails as for a closed file descriptor."""
 
     def __init__(self) -> None:
         super().__init__()

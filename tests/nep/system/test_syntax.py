@@ -1,4 +1,4 @@
-"""Python source is parsed in several threads."""
+"""Test of parsing Python source in several threads at once."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SOURCE = "\n".join(
 
 
 class Yielding:
-    """An object of a reference cycle whose collection lets other threads run."""
+    """Object in a reference cycle whose finalizer lets other threads run."""
 
     def __init__(self) -> None:
         self.itself = self

@@ -1,4 +1,4 @@
-"""Letters that control: refused in names, readable where they are shown."""
+"""Tests of control characters: rejected in names, escaped in displayed text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Web server, and clients that send raw operations."""
+"""Fixtures with a web server and clients that send raw operations."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ class Peer:
                 return got
 
     def refusal(self, op: str, /, **fields: object) -> str:
-        """Return the message of the status that answers an operation."""
+        """Send an operation that is rejected; return the message of the status."""
         self.send(op, **fields)
         return str(self.receive("status")["msg"])
 
     def call(self, service: str, /, **args: object) -> dict[str, object]:
-        """Return the answer of a service."""
+        """Call a service and return its response."""
         self.send("call_service", id=f"call {service}", service=service, args=args)
         answer = self.receive("service_response")
         assert answer["id"] == f"call {service}"
@@ -59,7 +59,7 @@ class Peer:
 
 @pytest.fixture
 def open_page(server: WebServer) -> Iterator[Callable[..., Peer]]:
-    """Connects to the server; options are those of `websockets`."""
+    """Function that connects to the server; its options are those of `websockets`."""
     with ExitStack() as opened:
         yield lambda **options: Peer(opened.enter_context(connect(server.url, **options)))
 

@@ -1,4 +1,4 @@
-"""Access to the web server: origins of pages, and tokens."""
+"""Tests of access to the web server: origins of pages, and tokens."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command `nep web`: its URL, tokens, and error messages."""
+"""Tests of the command `nep web`: its URL, tokens and error messages."""
 
 from __future__ import annotations
 

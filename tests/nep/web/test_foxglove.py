@@ -1,4 +1,4 @@
-"""Foxglove's WebSocket protocol: topics as channels, messages of those that are subscribed to."""
+"""Tests of Foxglove's WebSocket protocol: topics as channels, and messages of subscribed channels."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def received(connection: ClientConnection, op: str) -> dict[str, object]:
 
 
 def channels_of(connection: ClientConnection, topics: set[str]) -> dict[str, dict[str, object]]:
-    """Wait until all of these topics are advertised."""
+    """Wait until all of these topics are advertised; return the channels by topic."""
     channels: dict[str, dict[str, object]] = {}
     while not topics <= channels.keys():
         channels |= {each["topic"]: each for each in received(connection, "advertise")["channels"]}

@@ -1,4 +1,4 @@
-"""Changes of a running server (origins, token, robots, Foxglove's protocol), and what it shows of pages."""
+"""Tests of changes of a running server (origins, token, robots, Foxglove) and of its list of pages."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_foxglove_is_enabled_and_disabled_without_a_restart(server: WebServer, p
 
 @pytest.fixture
 def connected(server: WebServer) -> Iterator[Callable[..., ConnectedPage]]:
-    """Connect with these options and return what the server shows of it."""
+    """Function that connects with the given options and returns the server's entry for the page."""
 
     def shown(path: str = "", **options: object) -> ConnectedPage:
         with connect(server.url + path, **options):

@@ -1,4 +1,4 @@
-"""Conversion between NEP and ROS messages, in each compression."""
+"""Tests of the conversion between NEP and ROS messages, in each compression."""
 
 from __future__ import annotations
 

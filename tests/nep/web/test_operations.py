@@ -1,4 +1,4 @@
-"""Operations of pages: parsed within limits, or refused with a message."""
+"""Tests of parsing operations of pages: within limits, or rejected with a message."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def parsed(**fields: object) -> op.Operation:
 
 
 def refusal(data: bytes) -> str | None:
-    """Return the error message of a refused operation."""
+    """Return the error message of a rejected operation, or None if it is accepted."""
     try:
         op.parse(data)
     except op.OperationError as error:

@@ -1,4 +1,4 @@
-"""Rates of a page's topics, and names of its client."""
+"""Tests of the message rates of a page's topics, and of the names of its client."""
 
 from __future__ import annotations
 

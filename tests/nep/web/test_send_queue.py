@@ -1,4 +1,4 @@
-"""Send queue of a page: bounded, oldest messages dropped first, round-robin over topics, throttled."""
+"""Tests of a page's send queue: bounded, oldest messages dropped first, round-robin topics, throttled."""
 
 from __future__ import annotations
 

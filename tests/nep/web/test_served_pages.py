@@ -1,4 +1,4 @@
-"""Test page and starter page, by plain HTTP at the port of the server."""
+"""Tests of the test page and the starter page, served by plain HTTP at the port of the server."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Web server: nodes, topics and services of pages, and refused operations."""
+"""Tests of the web server: nodes, topics and services of pages, and rejected operations."""
 
 from __future__ import annotations
 

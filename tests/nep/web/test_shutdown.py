@@ -1,4 +1,4 @@
-"""End of the server and of `nep web` while clients are connected."""
+"""Tests of the end of the server and of `nep web` while clients are connected."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _BIG = "x" * 500_000
 
 @contextmanager
 def page_that_never_reads(url: str, node: nep.Node) -> Iterator[ClientConnection]:
-    """A page whose connection is full: the server can't even send it a close frame."""
+    """Connect a page whose connection is full: the server can't even send it a close frame."""
     publisher = node.new_pub("/big", "string")
     with connect(url, max_queue=1) as stuck, connect(url) as quick:
         for each in (stuck, quick):
@@ -68,7 +68,7 @@ def test_page_that_never_reads_is_disconnected(server: WebServer, node: nep.Node
 
 @contextmanager
 def connected(count: int) -> Iterator[tuple[str, list[ClientConnection], object]]:
-    """`nep web` with so many clients, half of them Foxglove's."""
+    """Start `nep web` with `count` clients, half of them with Foxglove's protocol."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = str(probe.getsockname()[1])
     with running(COMMAND, "web", "--port", port, "--foxglove") as program, ExitStack() as opened:

@@ -1,8 +1,8 @@
 """Driver program in any language, for the contract test over the wire.
 
-The program takes ``--name``, ``--master`` and ``--test-clock``. With the latter its time stands still; each
-line on its stdin is a number of seconds to advance it, and is answered by a line of JSON with the member
-``clock``.
+The program takes ``--name``, ``--master`` and ``--test-clock``. With the latter its clock does not
+advance by itself; each line on its stdin is a number of seconds to advance it, and the program replies
+with a line of JSON that has the member ``clock``.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class ProgramKind:
 
     @property
     def model(self) -> str:
-        """Name of the tests, from the command."""
+        """Model name in the test ids, from the command."""
         return "".join(sign if sign.isalnum() else "_" for sign in self.command[-1].rpartition("/")[2])
 
 
@@ -45,7 +45,7 @@ class ProgramClock:
         self._process = process
 
     def advance(self, seconds: float) -> None:
-        """Advance the clock; returns when the program has confirmed."""
+        """Advance the clock and wait for the program's confirmation."""
         stdin, stdout = self._process.stdin, self._process.stdout
         assert stdin is not None
         assert stdout is not None
@@ -77,7 +77,7 @@ class ProgramDriver:
 def running_driver(
     kind: ProgramKind, name: str, master: str, ears: Ears, *, real_clock: bool = False
 ) -> Iterator[tuple[ProgramDriver, ProgramClock]]:
-    """Start the program, and wait for the announcement of its robot."""
+    """Start the program and wait until its robot is announced."""
     announced = ears.listen("description", "robot/description")
     command = [*kind.command, "--name", name, "--master", master]
     if not real_clock:

@@ -1,4 +1,4 @@
-"""Actions, a stop and a close that are ``async def``: they run, and end when they are told to."""
+"""Tests of drivers whose actions, stop function and close function are coroutines."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from tests.robots.conftest import Ears, FakeClock, eventually
 
 
 async def pause(seconds: float) -> None:
-    """Let others have their turn for so long, as a robot's library does that waits for its radio."""
+    """Suspend the coroutine for `seconds` with `asyncio.wait_for`, as libraries of robots do."""
     with contextlib.suppress(asyncio.TimeoutError):
         await asyncio.wait_for(asyncio.Event().wait(), seconds)
 
 
 class Drone:
-    """Flies with asyncio."""
+    """Fake drone whose actions are coroutines."""
 
     def __init__(self, link: Link) -> None:
         self.link = link
@@ -38,7 +38,7 @@ class Drone:
 
     @action("fly", "Movement", "move", uses=("wings",), timeout_s=5)
     async def fly(self, call: Call, times: int = 1000) -> int:
-        """Fly until it has flapped so often, or is told to end."""
+        """Flap `times` times; clean up with an await also after a cancellation."""
         self.loops.add(asyncio.get_running_loop())
         self.events.append("flies")
         call.feedback(flapped=0)
@@ -52,19 +52,19 @@ class Drone:
 
     @action("break", "Movement", "move")
     async def crash(self, call: Call) -> None:
-        """Ends as the test says."""
+        """Raise the exception in `raises`, if there is one."""
         await pause(0.0)
         if self.raises is not None:
             raise self.raises
 
     @action("wait wrongly", "Movement", "move")
     async def wait_wrongly(self, call: Call) -> None:
-        """Holds the loop up."""
+        """Call the blocking `Call.wait` inside the event loop."""
         call.wait(0.01)
 
     @action("stubborn", "Movement", "move")
     async def stubborn(self, call: Call) -> None:
-        """Does not listen."""
+        """Ignore cancellation until the test sets `let_go`."""
         self.events.append("begun")
         while not self.let_go.is_set():
             try:
@@ -74,17 +74,15 @@ class Drone:
 
     @action("plain", "Movement", "move")
     def plain(self, call: Call) -> str:
-        """No coroutine."""
+        """Return from an action that is an ordinary function."""
         return "as ever"
 
     @safe_stop()
     async def stop(self) -> None:
-        """Stand still."""
         await pause(0.0)
         self.events.append("stopped")
 
     async def close(self) -> None:
-        """Say good bye."""
         self.events.append("closed")
 
 
@@ -205,7 +203,7 @@ def test_function_that_returns_an_awaitable_is_awaited(node):
 
         @safe_stop()
         def stop(self) -> None:
-            """Still."""
+            """Do nothing; the description requires a stop function."""
 
     with nep.node("listener", "memory") as other:
         ears = Ears(other, "Wrapped")

@@ -1,4 +1,4 @@
-"""Busy: queue, replace, reject; what is told about them; cancel and stop of what waits."""
+"""Tests of busy robots: the policies queue, replace and reject, and cancel and stop of queued actions."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What every driver owes to the people who rely on it: one contract, over each robot and each example.
+"""Contract tests that every driver must pass; they run for each robot of Studio and each example.
 
-With ``--driver FILE`` it is held against the robots of that file instead, wherever it lies; with
-``--driver-command COMMAND`` against the robot of a program in any language (`driver_program`).
+With ``--driver FILE`` they run for the robots declared in that file instead; with
+``--driver-command COMMAND`` for the robot of a program in any language (`driver_program`).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ PATIENCE_S = 3.0  # a loaded machine; what stops on its own within its `within` 
 
 
 def kinds_in(path: Path) -> list[Kind]:
-    """The robots that a file declares; what lies beside it can be imported, as when it is run."""
+    """Return the robots that a file declares; its directory is on `sys.path` while it is imported."""
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None, f"{path} is no file of Python"
     assert spec.loader is not None
@@ -54,7 +54,7 @@ def kinds_in(path: Path) -> list[Kind]:
 
 
 def kinds(drivers: Sequence[str], commands: Sequence[str]) -> Iterator[Kind | ProgramKind]:
-    """Return the robots of these files and commands; by default those of Studio and of examples/."""
+    """Yield the robots of these files and commands; by default those of Studio and of examples/."""
     if drivers or commands:
         for driver in drivers:
             yield from kinds_in(Path(driver).resolve())
@@ -68,7 +68,7 @@ def kinds(drivers: Sequence[str], commands: Sequence[str]) -> Iterator[Kind | Pr
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Each robot is a parameter of its own."""
+    """Parametrize the tests with one robot each."""
     if "kind" in metafunc.fixturenames:
         option = metafunc.config.getoption
         found = list(kinds(option("--driver"), option("--driver-command")))
@@ -76,14 +76,14 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 class ControlledClock(Protocol):
-    """A clock that a test advances."""
+    """Clock that a test advances."""
 
     def advance(self, seconds: float) -> None: ...
 
 
 @dataclass
 class Bench:
-    """A driver whose time a test holds in its hand, and ears on its topics."""
+    """Driver with a controlled clock, and a listener on its topics."""
 
     kind: Kind | ProgramKind
     driver: Driver | ProgramDriver
@@ -105,7 +105,7 @@ class Bench:
         return [action for action in self.robot.actions if action.name != stop]
 
     def long(self) -> list[Action]:
-        """The actions that can be ended: with a clock that stands, those that take time run until then."""
+        """Return the cancellable actions; while the clock stands still, those that take time don't end."""
         return [action for action in self.actions() if action.cancellable]
 
     def invoke(self, action: Action, program: str | None = None) -> str:
@@ -114,14 +114,14 @@ class Bench:
         return wanted
 
     def any_action(self, *, long: bool = False) -> Action:
-        """One of its actions; with `long` one that runs until it is ended. A robot without is skipped."""
+        """Return an action; with `long` one that runs until it is ended. Skip the test if there is none."""
         found = [action for action in self.long() if takes_time(self, action)] if long else self.actions()
         if not found:
             pytest.skip("this robot has no such action")
         return found[0]
 
     def begun(self, program: str | None = None) -> str:
-        """The id of an action that runs until it is ended."""
+        """Start an action that runs until it is ended, wait until it runs and return its id."""
         wanted = self.invoke(self.any_action(long=True), program)
         self.running(wanted)
         return wanted
@@ -140,12 +140,12 @@ class Bench:
 
 
 def required(action: Action) -> dict[str, object]:
-    """An input with what must be given."""
+    """Return an input with the required parameters only."""
     return {p.name: good_for(p) for p in action.parameters if p.required}
 
 
 def good_for(parameter: Parameter) -> object:
-    """A value that the parameter takes."""
+    """Return a valid value for a parameter."""
     if parameter.default is not None:
         return parameter.default
     if parameter.choices:
@@ -162,9 +162,9 @@ def good_for(parameter: Parameter) -> object:
 
 
 def takes_time(bench: Bench, action: Action) -> bool:
-    """Whether an action, begun in the world as it is now, goes on until it is ended.
+    """Return whether an action, started in the current state of the room, runs until it is ended.
 
-    Three times, as on a busy computer a cancel may overtake an action that ends at once.
+    The check is repeated three times: a busy computer may cancel a short action before it ends.
     """
     if action.name not in bench.times:
         bench.times[action.name] = all(_goes_on(bench, action) for _ in range(3))
@@ -181,13 +181,13 @@ def _goes_on(bench: Bench, action: Action) -> bool:
 
 
 def wrong_for(kind: str) -> object:
-    """A value that no parameter of this kind takes."""
+    """Return a value that is invalid for every parameter of a kind."""
     return "many" if kind in {"number", "integer", "angle", "object"} else {"x": 1}
 
 
 @contextmanager
 def at_its_start(kind: Kind | ProgramKind, name: str, *, real_clock: bool = False) -> Iterator[Bench]:
-    """A driver of its own, in a room of its own, as that is when the robot starts."""
+    """Yield a bench with a new driver and a new room, in the state in which the robot starts."""
     with ExitStack() as opened:
         if isinstance(kind, ProgramKind):
             master = opened.enter_context(Master("127.0.0.1:0", learn_s=0.0)).address
@@ -291,7 +291,7 @@ def test_stop_that_ends_a_program_rejects_its_later_commands(bench) -> None:
 
 
 def test_stop_with_only_the_name_of_a_program_does_not_block_its_later_commands(bench) -> None:
-    """Its name can be read by everybody: a stop that only names it stops the robot, and no more."""
+    """The name of a program is public: a stop that only contains the name must not block the program."""
     assert bench.stop(ends="studio")["state"] == "succeeded"
     asked = bench.invoke(bench.any_action(), "studio")
     bench.running(asked)
@@ -471,7 +471,7 @@ def test_close_answers_open_actions_and_leaves_no_thread(kind) -> None:
 
 
 def test_all_described_actions_succeed_with_the_real_clock(kind) -> None:
-    """With the computer's own clock, all at once where they use different things."""
+    """Actions that use different parts of the robot run at the same time."""
     with at_its_start(kind, f"Real_{kind.model}", real_clock=True) as bench:
         robot, ears = bench.robot, bench.ears
         taken: set[str] = set()

@@ -1,4 +1,4 @@
-"""The contract is held against a driver's file wherever it lies: it accepts what is right."""
+"""Tests that the contract can check a driver's file in any directory, and that it accepts correct drivers."""
 
 from __future__ import annotations
 

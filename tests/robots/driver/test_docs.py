@@ -1,4 +1,4 @@
-"""The drivers in docs/robots.md and docs/write-a-driver.md are drivers, and the example runs by itself."""
+"""Tests of the drivers listed in docs/robots.md and docs/write-a-driver.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The kit's promises, with a robot whose functions end when the test lets them."""
+"""Tests of the driver kit with a robot whose functions return when the test allows it."""
 
 from __future__ import annotations
 
@@ -224,7 +224,7 @@ def test_failing_stop_function_reports_its_reason(turtle, caplog):
 
 
 class SpeechlessError(Exception):
-    """Not even its words can be had."""
+    """Exception whose `__str__` raises."""
 
     def __str__(self) -> str:
         raise RuntimeError("no words")
@@ -272,7 +272,7 @@ def test_stop_answer_timeout_is_at_most_half_of_the_studio_timeout():
 
 
 def test_late_command_of_a_stopped_program_is_canceled(turtle):
-    """A command that was on its way when its program was ended comes after the stop."""
+    """A command that was in flight when its program was ended arrives after the stop."""
     body, ears, _ = turtle
     ears.command(id="s", op="stop", ends="key")
     assert ears.final("s", "stop")["state"] == "succeeded"
@@ -285,7 +285,7 @@ def test_late_command_of_a_stopped_program_is_canceled(turtle):
 
 
 def test_stop_with_a_forged_program_name_blocks_no_program(turtle):
-    """Everybody reads who a command is from: that name alone, or anything like it, ends no program."""
+    """Program names are public: a name alone, or text similar to it, must not end a program."""
     body, ears, _ = turtle
     name = program_of("key")
     for number, ends in enumerate((name, "studio", "", name[8:], "x" * 100_000)):
@@ -321,13 +321,13 @@ def test_missing_heartbeat_stops_the_robot(turtle):
 
 
 def told_of_itself(ears):
-    """What the newest sign of life says: what has not ended, and why it may still move."""
+    """Return `not_ended` and `error` of the newest heartbeat, or None before the first."""
     signs = [a for a in list(ears.heard["answer"]) if a["op"] == "alive"]
     return (signs[-1]["not_ended"], signs[-1]["error"]) if signs else None
 
 
 def test_failed_watchdog_stop_is_reported_until_a_stop_succeeds(turtle, caplog):
-    """Nobody asked for it, so there is nobody to answer to: whoever listens is told."""
+    """A watchdog stop has no caller to reply to, so its failure is reported in the heartbeats."""
     body, ears, clock = turtle
     body.stop_fails = Failed("the brake does not answer")
     ears.invoke("1", "move", program="p")
@@ -394,7 +394,7 @@ def test_forged_heartbeat_does_not_keep_the_robot_moving(turtle, node):
 
 
 def test_forged_heartbeat_does_not_prevent_the_watchdog_stop_after_an_action():
-    """Also after the action: what it left in motion is its own program's, whoever writes its name."""
+    """A motion that continues after its action belongs to the program that started it, not to its name."""
     dog = Watchdog(1.0)
     program, forger = ProgramId("p", 1), ProgramId("p", 2)
     drive = Task(

@@ -1,4 +1,4 @@
-"""The clock of the tests: no span that a test lets pass is missed, whatever thread is late."""
+"""Tests of the fake clock: a wait ends even if its thread starts it after the clock was advanced."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever a stranger sends, a robot still stops, and answers the next command."""
+"""Tests that a robot stops and replies to the next command after any hostile message."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def stops(ears: Ears, wanted: str) -> bool:
 
 
 def test_robot_stops_after_every_hostile_message(turtle, node):
-    """Issue 26: one message of 2 kB with 1000 levels ended the thread that carries out stops."""
+    """Issue 26: one message of 2 kB with 1000 levels ended the thread that executes stops."""
     body, ears, _clock = turtle
     threads = set(threading.enumerate())
     senders = {
@@ -90,7 +90,7 @@ def test_command_of_more_than_64_kb_is_rejected_with_a_message(turtle, caplog):
 
 
 def test_unknown_input_names_are_checked_in_bounded_time():
-    """Issue 26: looking for a similar name for each of 200 000 names took 3.5 s."""
+    """Issue 26: the search for a similar name for each of 200 000 names took 3.5 s."""
     parameters = (Parameter("text", "text", "text"),)
     given = {"text": "hi"} | {f"text{number}": 1 for number in range(20_000)}
     problems = input_problems(parameters, given)
@@ -101,7 +101,7 @@ def test_unknown_input_names_are_checked_in_bounded_time():
 
 @pytest.fixture
 def busy(node, clock):
-    """A turtle that moves while its deciding thread is blocked, its ears, and the event that unblocks it."""
+    """Moving turtle whose command thread is blocked, its listener, and the event that unblocks the thread."""
     go_on = threading.Event()
     with nep.node("listener", "memory") as other, Driver(TURTLE, "Turtle", node, clock=clock) as driver:
         ears = Ears(other, "Turtle")
@@ -183,7 +183,7 @@ def test_stop_is_confirmed_only_by_a_stop_call_that_ended_after_the_last_action(
 
 
 def kill(name: str) -> threading.Thread:
-    """Raise SystemExit in a thread; return the thread."""
+    """Raise SystemExit in the thread with this name and return the thread."""
     thread = next(each for each in threading.enumerate() if each.name == name)
     assert ctypes.pythonapi.PyThreadState_SetAsyncExc(
         ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit)

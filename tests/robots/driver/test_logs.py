@@ -1,4 +1,4 @@
-"""What a driver logs is published: people see in Studio why a robot did not do what it was told."""
+"""Tests that the log records of a driver are published, so that Studio can show why an action failed."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from tests.robots.conftest import eventually
 
 
 class Clumsy:
-    """A robot whose only action fails."""
+    """Fake robot whose only action fails."""
 
     def __init__(self, link: Link) -> None:
         logging.getLogger("clumsy.arm").warning("the arm is cold")
 
     @action("fall", category="Movement", icon="move")
     def fall(self, call: Call) -> None:
-        """Falls."""
+        """Fall over."""
         raise ValueError("no legs")
 
     @safe_stop(watchdog_s=0.5)
     def stop(self) -> None:
-        """Stands still at once."""
+        """Stand still immediately."""
 
 
 def test_driver_log_records_and_exceptions_are_published(master):

@@ -1,4 +1,4 @@
-"""Drivers as processes: they end with their owner, and a driver of RIZE is driven over the network."""
+"""Tests of drivers as processes: their life cycle, output and options, and a RIZE driver over the network."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def start(*arguments: str, network: str) -> subprocess.Popen[str]:
 
 
 def ended(process: subprocess.Popen[str], timeout_s: float = 5.0) -> tuple[int, str]:
-    """Its exit code and what it complained about; it is killed when it did not end."""
+    """Return the exit code and the error output of a process; kill it if it has not exited by the timeout."""
     try:
         _, errors = process.communicate(timeout=timeout_s)
     finally:
@@ -171,7 +171,7 @@ if __name__ == "__main__":
 
 
 def test_driver_with_a_full_output_pipe_answers_and_exits(network, tmp_path):
-    """Nobody reads its pipe, which has room for 64 kB; a terminal with Ctrl+S has less."""
+    """The pipe holds 64 kB and is not read; a terminal paused with Ctrl+S holds less."""
     (tmp_path / "box.py").write_text(CHATTERBOX, encoding="utf-8")
     process = start(str(tmp_path / "box.py"), network=network)
     try:
@@ -252,7 +252,7 @@ TYPES = {
     ids=["works", "types"],
 )
 def test_declared_actions_return_the_declared_results(network, tmp_path, functions, given, answers):
-    """Over the network, as another program sees it; a Stop behind it is answered in any case."""
+    """The actions are called over the network; a Stop afterwards must be answered in any case."""
     actions = "".join(
         f'{DO}    {head}:\n        """What the test says."""\n        {body}\n'
         for head, body in functions.values()

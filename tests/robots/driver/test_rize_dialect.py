@@ -1,4 +1,4 @@
-"""RIZE's dialect: its messages both ways, and what every driver that speaks it says and hears."""
+"""Tests of the RIZE dialect: messages in both directions, and the cases that every RIZE driver must pass."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def primitive(name: str, given: str, options: object = "none") -> dict[str, obje
 
 @dataclass
 class Speaker:
-    """A running driver: ears on it, and what is its own of the contract's cases."""
+    """Running driver, its listener, and the values that differ between drivers in the shared cases."""
 
     ears: Ears
     several: list[dict[str, object]]  # primitives that it does ...
@@ -111,14 +111,14 @@ class Speaker:
     long: dict[str, object]  # a primitive that goes on until it is stopped
     beyond: dict[str, object]  # one that it has, with what that can't have
     let: Callable[[], None] = field(default=lambda: None)
-    """Let it end what ends by itself."""
+    """Function that allows actions of limited duration to end."""
 
     @property
     def answers(self) -> list[object]:
         return self.ears.heard["action_state"]
 
     def command(self, primitives: object, **other: object) -> dict[str, object]:
-        """Send it this; the message."""
+        """Send a command with these primitives to the driver and return the message."""
         message = {
             "node": "action", "primitives": primitives, "robots": self.ears.name, "state": "idle", "times": 0,
             "id": "acti20261120075304-0", **other,
@@ -127,7 +127,7 @@ class Speaker:
         return message
 
     def answered(self, count: int = 1) -> list[object]:
-        """Its answers, when there are so many."""
+        """Wait for at least `count` replies and return all of them."""
         eventually(lambda: len(self.answers) >= count)
         return list(self.answers)
 
@@ -211,7 +211,7 @@ def test_stop_is_reported_to_rize_and_rize_can_cancel(speaker):
 
 
 def test_program_and_rize_driver_exchange_commands_and_results(speaker):
-    """The program takes it for a robot of RIZE, which tells nothing of itself."""
+    """The program treats the driver as a RIZE robot, which does not publish a description."""
     speaker.let()
     robot = rize.robot(speaker.ears.name)
     with nep.node("program", "memory") as node:
@@ -266,7 +266,7 @@ def test_virtual_robot_walks_backwards(pepper):
 
 
 def test_example_rize_driver_executes_commands(network):
-    """The same 30 lines run on the original nep; here on ours, which has the paper's spelling."""
+    """The same 30 lines run on the original NEP; this nep supports the method names of the NEP paper."""
     process = start("examples/rize_driver.py", "Turtle", network=network)
     robot = rize.robot("Turtle")
     try:

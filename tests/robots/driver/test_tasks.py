@@ -1,4 +1,4 @@
-"""Who goes first, who waits, who is ended: the deciding of one robot's tasks, without a network."""
+"""Tests of the scheduling of a robot's tasks (order, queue, replacement, stop) without a network."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.robots.conftest import eventually
 
 
 class World:
-    """Tasks of a robot that end when they are let go, and what was answered to each."""
+    """Tasks of a robot that run until the test releases them, and the replies to each."""
 
     def __init__(self) -> None:
         self.began: list[str] = []
@@ -25,7 +25,7 @@ class World:
         self.tasks.start()
 
     def ask(self, name: str, uses: tuple[str, ...], *, obeys: bool = True, **more: Any) -> None:
-        """Ask for an action that runs until it is let go or, if it obeys, told to end."""
+        """Submit an action that runs until it is released or, with `obeys`, until it is canceled."""
         gone = self.let_go[name] = threading.Event()
         told = self.answers[name] = []
 

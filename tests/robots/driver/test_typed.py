@@ -267,7 +267,7 @@ def test_recursive_type_is_rejected():
 
 
 class Arm:
-    """Takes and gives each kind of value."""
+    """Fake robot that accepts and returns values of every supported type."""
 
     pose = sensor(Pose, title="pose")
     limits = sensor(tuple[float, float], title="limits")
@@ -290,37 +290,37 @@ class Arm:
         side: Side = Side.FAR_RIGHT,
         must: int | None = 3,
     ) -> None:
-        """Keep what it is given."""
+        """Store the arguments."""
         self.had = [angles, at, pose, speeds, side, must]
 
     @action("need", "Movement", "move")
     def need(self, call: Call, maybe: float | None) -> None:
-        """Has no default, and may be left out all the same."""
+        """Accept None for a parameter that has no default."""
         self.had = [maybe]
 
     @action("measure", "Movement", "move")
     def measure(self, call: Call) -> Annotated[float, Range(unit="cm"), Title("width")]:
-        """A number."""
+        """Return a number with a unit and a title."""
         return self.gives  # type: ignore[return-value]
 
     @action("look", "Movement", "move")
     async def look(self, call: Call) -> Pose:
-        """A pose."""
+        """Return a pose from a coroutine."""
         return self.gives  # type: ignore[return-value]
 
     @action("count", "Movement", "move", output={"count": int})
     def count(self, call: Call) -> int:
-        """One field."""
+        """Return an integer."""
         return self.gives  # type: ignore[return-value]
 
     @action("anything", "Movement", "move")
     def anything(self, call: Call):
-        """Whatever."""
+        """Return a value without a type annotation."""
         return self.gives
 
     @safe_stop()
     def stop(self) -> None:
-        """Still."""
+        """Stand still."""
 
 
 ARM = Kind(model="arm", title="Arm", body=Arm)

@@ -1,4 +1,4 @@
-"""A driver that declares something wrong is told what and where, in one sentence."""
+"""Tests of the error messages for invalid declarations in a driver: one sentence with cause and line."""
 
 from __future__ import annotations
 

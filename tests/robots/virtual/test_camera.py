@@ -1,4 +1,4 @@
-"""The camera sees what is there: checked against the geometry, not against itself."""
+"""Tests of the camera of virtual robots against calculated positions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever strangers do to the world of virtual robots, they go on, see, and stop."""
+"""Tests that virtual robots keep running, see and stop after any hostile message on the world topics."""
 
 from __future__ import annotations
 

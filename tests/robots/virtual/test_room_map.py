@@ -1,4 +1,4 @@
-"""The map of the room: merged in any order it is the same, damaged messages change nothing."""
+"""Tests of the room map: merging is independent of message order; damaged messages change nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several virtual robots in one room: they see, meet and avoid each other; each has a process of its own."""
+"""Tests of several virtual robots in one room, each with its own driver and node."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def test_robot_started_later_gives_way_to_an_overlapping_robot() -> None:
 
 
 class Robots:
-    """Virtual robots on one network, each with a node of its own."""
+    """Virtual robots in one network, each with its own node."""
 
     def __init__(self) -> None:
         self._open: list[Driver | nep.Node] = []
@@ -171,7 +171,7 @@ def robots() -> Iterator[Robots]:
 
 
 def place(ears: Ears, name: str) -> tuple[float, float]:
-    """Where a robot has a thing now."""
+    """Return the position (x, y) of an object in the newest state of a robot; (99.0, 99.0) if it has none."""
     things = ears.heard["state"][-1]["objects"]
     return next(((t["x"], t["y"]) for t in things if t["name"] == name), (99.0, 99.0))
 

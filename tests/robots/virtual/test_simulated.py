@@ -1,4 +1,4 @@
-"""The virtual robot through the kit: every action of its description, and what it tells by itself."""
+"""Tests of the virtual robot through the driver kit: every described action, and its published state."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.robots.conftest import Ears, eventually
 
 
 class Pepper(Ears):
-    """A running virtual robot, heard and spoken to."""
+    """Listener and sender for a running virtual robot."""
 
     def __init__(self, node: nep.Node, driver: Driver) -> None:
         super().__init__(node, "Pepper")

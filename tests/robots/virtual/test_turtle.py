@@ -1,4 +1,4 @@
-"""The robot on two wheels: how it rolls, what it bumps into and sees, how it stops; its description."""
+"""Tests of the two-wheeled robot: motion, collisions, camera, stop and description."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The backpack: blocks kept for other files, by mouse and by keys."""
+"""Tests of the backpack, which stores blocks for other files, with mouse and keyboard."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FREE = QPoint(300, 260), QPoint(520, 420)
 
 
 class Window:
-    """Stands for the window: keeps the backpack in a file and says what was done."""
+    """Fake window that stores the backpack in a file and records toasts."""
 
     def __init__(self, view, folder: Path) -> None:
         self.said: list[str] = []
@@ -65,7 +65,7 @@ def window(view, tmp_path: Path) -> Window:
 
 @pytest.fixture
 def them(view, person, window) -> Person:
-    """Tab "a" is shown, "b" was shown before."""
+    """Simulated user of an editor that shows tab "a" and has shown tab "b" before."""
     view.show_tab("b", workspace(START))
     person_there = person(state=workspace(START))
     view.show_tab("a", workspace(START, WAITS))

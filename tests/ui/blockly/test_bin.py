@@ -1,4 +1,4 @@
-"""Deleting by dragging, and the bin from which everything can be taken back."""
+"""Tests of deleting blocks by dragging, and of the bin from which they can be restored."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The menus of blocks and of the canvas; blocks that are folded up or switched off."""
+"""Tests of the context menus of blocks and canvas, and of collapsed and disabled blocks."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def them(view, person) -> Person:
 
 
 def looked_at(them: Person, name: str) -> None:
-    """A picture for whoever asks for one: NEP_LOOK=FOLDER."""
+    """Save a screenshot to the folder NEP_LOOK, if this environment variable is set."""
     folder = os.environ.get("NEP_LOOK")
     if folder:
         QTest.qWait(150)

@@ -1,4 +1,4 @@
-"""An *if* gets and loses “else if” and “else” by its plus and minus, its menu, and by keys."""
+"""Tests of adding and removing branches of an *if* block with its buttons, its menu and the keyboard."""
 
 from __future__ import annotations
 
@@ -48,9 +48,10 @@ def shape(them: Person) -> object:
 
 
 def press_button(them: Person, number: int) -> None:
-    """Press the button of that place: the plus is the first, then a minus for each branch.
+    """Press a button of the *if* block: 0 is the plus, followed by a minus for each branch.
 
-    The page has a new button before the block is drawn anew: until all stand still none is the first.
+    Buttons are sorted by position: the page adds a new button before it renders the block again, so the
+    order of elements is not the order on the screen.
     """
     buttons = "[...document.querySelectorAll('[data-id=if] > .nepButton')]"
     them.ask(f"{buttons}.forEach((each, at) => each.setAttribute('data-test', at))")

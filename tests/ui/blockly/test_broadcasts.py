@@ -1,4 +1,4 @@
-"""The names of broadcasts in the block editor: those that there are, and a new one."""
+"""Tests of the field for broadcast names: choosing an existing name and adding a new one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def scripts() -> dict:
 
 
 def choose(them: Person, words: str) -> None:
-    """Click a line of the open menu."""
+    """Click the entry of the open menu with this text."""
     number = them.ask(f"{OFFERED}.indexOf({json.dumps(words, ensure_ascii=False)})")
     them.ask(f"document.querySelectorAll('.blocklyMenuItem')[{number}].setAttribute('data-test', 'line')")
     them.click("[data-test=line]", dx=20, dy=10)

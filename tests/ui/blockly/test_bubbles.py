@@ -1,4 +1,4 @@
-"""The sentence beside a block is wholly in sight wherever its block is, at every zoom."""
+"""Tests that the error bubble next to a block is completely visible at every position and zoom level."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def wait_block(id: str, x: int, y: int) -> dict[str, object]:
 def shown_beside(
     qtbot, them: Person, view: BlocklyView, id: str
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Where the bubble and its block are."""
+    """Show an error at a block and return the boxes of its bubble and of the block."""
     view.set_errors({id: SENTENCE})
     them.wait_for("document.querySelectorAll('.nepBubble').length", 1)
     return them.box(".nepBubble > path"), them.box(f"[data-id={id}] > .blocklyPath")

@@ -1,4 +1,4 @@
-"""The committed bundle is what its sources build."""
+"""Tests that the committed bundle of the block editor is reproducible from its sources and complete."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ built = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def tools() -> None:
-    """What the sources are built with, brought once for each checkout."""
+    """Install the build tools of the editor, once per checkout; skip the tests if npm fails."""
     if (EDITOR / "node_modules" / "esbuild").is_dir():
         return
     command = [npm, "ci", "--no-audit", "--no-fund", "--silent"]

@@ -1,4 +1,4 @@
-"""Blocks and notes that are dragged out of the page: what the window hears, and how another tab gets them."""
+"""Tests of dragging blocks and notes out of the page and onto another tab."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def told(view) -> Told:
 
 @pytest.fixture
 def them(view, person) -> Person:
-    """Tab "a" is shown, "b" was shown before."""
+    """Simulated user of an editor that shows tab "a" and has shown tab "b" before."""
     view.show_tab("b", workspace(START))
     person_there = person(state=workspace(START))
     view.show_tab("a", {**workspace(START, WAITS), "workspaceComments": [NOTE]})
@@ -209,7 +209,7 @@ def test_note_is_moved_to_another_tab(qtbot, view, them, told) -> None:
 
 
 def hold_outside(them: Person, told: Told, selector: str, to: QPoint = ABOVE) -> None:
-    """Drag something out of the page, and go on holding it."""
+    """Drag an element out of the page without releasing the mouse button."""
     box = them.box(selector)
     start = QPoint(
         round(box["left"]) + (60 if "Comment" in selector else 12), round(box["top"] + box["bottom"]) // 2
@@ -234,7 +234,7 @@ def open_tab(view, them: Person, key: str, block: str) -> None:
 
 
 def below(them: Person, block: str) -> QPoint:
-    """Where the mouse is with a block held at its left end that joins below this one."""
+    """Return the mouse position at which a block held at its left end connects below this block."""
     box = them.box(f".nepTab:not([hidden]) [data-id={block}] > .blocklyPath")
     return QPoint(round(box["left"]) + 16, round(box["bottom"]) + 16)
 
@@ -332,7 +332,7 @@ def test_toolbox_block_is_dragged_through_an_opened_tab(qtbot, view, them, told)
 
 
 def choose_mixed(them: Person) -> None:
-    """The last block of the script, and the note."""
+    """Select the last block of the script and the note."""
     them.click(".nepTab:not([hidden]) [data-id='3'] > .blocklyPath")
     box = them.box(".nepTab:not([hidden]) .blocklyCommentTopbar")
     at = QPoint(round(box["left"]) + 60, round(box["top"] + box["bottom"]) // 2)

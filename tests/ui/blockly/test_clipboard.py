@@ -1,4 +1,4 @@
-"""Copying and pasting blocks: they lie free, in sight, in any tab, and come from other Studios as text."""
+"""Tests of copying and pasting blocks: position, undo, between tabs, and as text between Studios."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_duplicates_are_placed_unattached_next_to_the_original_in_the_viewport(q
 
 
 def test_rapid_duplicates_leave_the_focus_on_the_newest_duplicate(them):
-    """Faster than the page draws, as when the keys are held."""
+    """Held keys repeat faster than the page renders frames."""
     them.click("[data-id=w] > .blocklyPath")
     them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "w")
     for _ in range(4):

@@ -1,4 +1,4 @@
-"""Scripts far outside the view are not drawn, and nobody who looks or presses keys can tell."""
+"""Tests of culling: scripts far outside the viewport are not rendered, without visible consequences."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def script(name: str, x: int, y: int) -> dict:
 
 
 def drawn(*names: str) -> str:
-    """A script: which of these are drawn."""
+    """Return JavaScript that lists which of these blocks are rendered."""
     return f"{list(names)}.filter(name => {DRAWN}.some(e => e.dataset.id === name))"
 
 

@@ -1,4 +1,4 @@
-"""The edges of blocks: one inside another of its colour is told apart; the selected one is seen on any."""
+"""Tests of the outlines of nested and selected blocks, and of the focus ring."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_outline_has_enough_contrast_on_every_colour(view, person, mode) -> None
 
 
 def mixed(front: str, back: str, share: float) -> str:
-    """A colour laid over another one, as it is seen."""
+    """Return the colour of `front` over `back` with the opacity `share`."""
     pairs = [(int(front[at : at + 2], 16), int(back[at : at + 2], 16)) for at in (1, 3, 5)]
     return "#" + "".join(f"{round(over * share + under * (1 - share)):02X}" for over, under in pairs)
 
@@ -100,7 +100,7 @@ def test_selected_block_has_two_tones_with_enough_contrast(view, person, mode) -
 
 
 def rings(them: Person) -> list[str]:
-    """What of the page has a ring now."""
+    """Return the tags and classes of the elements with a visible outline."""
     return them.ask(
         "[...document.querySelectorAll('body *')].filter(e => { const s = getComputedStyle(e);"
         " return s.outlineStyle !== 'none' && parseFloat(s.outlineWidth) > 0 })"

@@ -1,4 +1,4 @@
-"""Programs in the block editor: what goes in comes out, whatever it is."""
+"""Tests that the block editor saves every loaded program unchanged, also unknown and damaged ones."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ KNOWN = {
 
 
 class Maker:
-    """Random programs: known and unknown blocks, fitting and not, shadows, stacks and nesting."""
+    """Generator of random programs: known and unknown blocks, valid or not, shadows, stacks and nesting."""
 
     def __init__(self, seed: int) -> None:
         self._random = random.Random(seed)

@@ -1,4 +1,4 @@
-"""The blocks of a category: they stay open when that is wanted, are readable, and take what is chosen."""
+"""Tests of the flyout: when it stays open, its layout, and adding its blocks to the canvas."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CANVAS = QPoint(850, 500)
 
 @pytest.fixture
 def opened(qtbot):
-    """A function that shows the start block at a width; a robot whose blocks are wide is connected."""
+    """Function that opens an editor of a given width with a start block; a robot has wide blocks."""
 
     def show(width: int, *blocks: dict, pinned: bool | None = None) -> Person:
         view = editor(qtbot, editor_definitions([robot("Pepper"), nao()]), width, 640)

@@ -1,4 +1,4 @@
-"""The empty canvas says its first step and takes the block anyway; a ring leads to a block."""
+"""Tests of the hint on the empty canvas and of the ring that points to a block."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever the page of the block editor, the clipboard or a dragged field holds is read or refused."""
+"""Tests that invalid values from the editor's page, the clipboard and drags are parsed or rejected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a folded block hides and a person must not forget shows on it: notes, and where the program pauses."""
+"""Tests of the marks on a collapsed block for hidden notes and breakpoints."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def view(qtbot) -> BlocklyView:
 
 @pytest.fixture
 def state() -> dict:
-    """A loop, folded up, with a block that pauses and one with an open note."""
+    """Return a program with a collapsed loop around a block with a breakpoint and one with an open note."""
     made = program()
     loop = made["blocks"]["blocks"][0]["next"]["block"]["next"]["block"]
     loop["collapsed"] = True

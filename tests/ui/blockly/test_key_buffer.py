@@ -1,4 +1,4 @@
-"""Keys that are kept until the page is ready for them."""
+"""Tests of the buffer for key events that arrive before the page is ready."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from app.ui.blockly.key_buffer import KeyBuffer
 
 
 class Watch(QObject):
-    """Gives the keys of a field to whoever keeps them, as the host of the page does."""
+    """Event filter that passes key events to the buffer, as the host of the page does."""
 
     def __init__(self, keys: KeyBuffer) -> None:
         super().__init__()

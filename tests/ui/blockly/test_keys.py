@@ -1,4 +1,4 @@
-"""A whole behaviour built with keys alone; help and search under the keys."""
+"""Tests of the block editor with the keyboard only, including help and search."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def them(qtbot, view, person) -> Person:
 
 
 def goes_to(them: Person, part: str) -> None:
-    """The keys go to what has this in its class, its label or its id."""
+    """Wait until the focus is on an element with this text in its class, label or id."""
     them.wait_for(f"{FOCUSED}.some(each => each.includes({part!r}))")
 
 
@@ -53,7 +53,7 @@ def take_the_keys(them: Person) -> None:
 
 
 def begin_to_search(them: Person) -> None:
-    """The keys are in the field, and what was typed before is marked, so that it goes."""
+    """Open the search and wait until its field is focused and its text is selected."""
     them.view.open_search()
     goes_to(them, "Find a block")
     marked = "(it => it.selectionEnd - it.selectionStart == it.value.length)(document.activeElement)"
@@ -61,20 +61,20 @@ def begin_to_search(them: Person) -> None:
 
 
 def press(them: Person, *keys: Qt.Key) -> None:
-    """At the pace of a quick person: the page moves its focus with the next picture, not with the key."""
+    """Press keys with pauses, because the page moves the focus with the next frame."""
     for key in keys:
         them.press(key)
         QTest.qWait(PACE_MS)
 
 
 def hold(them: Person, key: Qt.Key, held=Qt.ControlModifier) -> None:
-    """A key with Ctrl."""
+    """Press a key with Ctrl or other modifiers."""
     them.press(key, held)
     QTest.qWait(PACE_MS)
 
 
 def to_the_canvas(them: Person) -> None:
-    """From wherever the keys are."""
+    """Move the focus to the canvas."""
     hold(them, Qt.Key_B, Qt.ControlModifier | Qt.ShiftModifier)
 
 

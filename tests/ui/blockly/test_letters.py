@@ -1,4 +1,4 @@
-"""Typing into nothing changes nothing; the block commands have their keys with Ctrl."""
+"""Tests that letters without a modifier do nothing on the canvas, and of the shortcuts of block commands."""
 
 from __future__ import annotations
 

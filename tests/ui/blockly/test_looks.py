@@ -1,4 +1,4 @@
-"""What the block editor shows: theme, states, toolbox."""
+"""Tests of the appearance of the block editor: theme, running blocks, errors and toolbox."""
 
 from __future__ import annotations
 

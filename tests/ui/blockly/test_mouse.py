@@ -1,4 +1,4 @@
-"""The block editor under a real mouse and real keys."""
+"""Tests of the block editor with real mouse and key events."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_block_dragged_under_the_event_block_snaps_to_the_event_block(qtbot, vie
 
 
 def test_fast_drag_connects_to_the_targeted_connection(qtbot, person):
-    """The preview of a gap on the way pushes the blocks below it apart, and nobody could see that yet."""
+    """A preview on the way moves the blocks below before the user can see the new layout."""
     wait = {"type": "control_wait", "inputs": {"SECONDS": {"shadow": {"type": "math_number"}}}}
     last = {**wait, "id": "last"}
     them = person({**START, "next": {"block": {**wait, "id": "first", "next": {"block": last}}}})

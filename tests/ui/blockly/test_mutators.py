@@ -1,4 +1,4 @@
-"""Lists and functions in the block editor: gaps that people make, uses that follow their function."""
+"""Tests of lists and functions in the block editor: adding slots, and calls that follow their function."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page where there is little room: a toolbox of tiles, which say their names and open the same blocks."""
+"""Tests of the editor on a narrow page, where the toolbox collapses to tiles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A note that is moved, resized, opened or closed is an edit: told by itself, and one step of undo."""
+"""Tests that moving, resizing, opening and closing a note is reported as an edit and is one undo step."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def view(qtbot) -> BlocklyView:
 
 @pytest.fixture
 def told(view) -> list[dict]:
-    """The programs that the page told of itself; the newest is the last."""
+    """Return the list of programs that the page reports; the newest is the last."""
     programs: list[dict] = []
     view.changed.connect(lambda _key, program: programs.append(dict(program.blocks)))
     return programs
@@ -72,7 +72,7 @@ def drag(them: Person, selector: str, inside: QPoint, way: QPoint) -> None:
 
 
 def one_step(qtbot, them: Person, told: list[dict], which: str, before: dict) -> Note:
-    """The note as the page told it by itself; then the one step is taken back and done again."""
+    """Wait for the reported change of a note, undo and redo it; return the changed note."""
     qtbot.waitUntil(lambda: told and WHICH[which](told[-1]) != WHICH[which](before), timeout=WAIT_MS)
     changed = WHICH[which](told[-1])
     them.view.undo()

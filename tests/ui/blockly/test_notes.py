@@ -1,4 +1,4 @@
-"""Notes: they have the keys at once, keep what is typed, stand beside their block and are easy to read."""
+"""Tests of notes: focus, saving of typed text, position next to the block, and readability."""
 
 from __future__ import annotations
 

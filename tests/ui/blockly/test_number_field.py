@@ -1,4 +1,4 @@
-"""Number fields of blocks: a decimal comma or point; anything else is rejected with a sentence."""
+"""Tests of number fields of blocks: comma or point as decimal separator; other text is rejected."""
 
 from __future__ import annotations
 

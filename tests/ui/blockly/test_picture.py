@@ -1,4 +1,4 @@
-"""Pictures of all blocks: also those outside the view, light in the dark theme, complete in themselves."""
+"""Tests of exported images of all blocks, including those outside the viewport."""
 
 from __future__ import annotations
 

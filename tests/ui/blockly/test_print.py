@@ -1,4 +1,4 @@
-"""The blocks on paper: every stack is there, whole where it fits, on white, below title and page."""
+"""Tests of printing blocks: page breaks, scaling, and the text of notes and page headers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def view(qtbot) -> BlocklyView:
 
 
 class Pages:
-    """A PDF as people see it."""
+    """Pages of a PDF as text and images."""
 
     def __init__(self, data: bytes) -> None:
         self._buffer = QBuffer()

@@ -1,4 +1,4 @@
-"""Any item goes out of a list and any input off a function, by the menu, and comes back by undo."""
+"""Tests of removing list items and function inputs with the context menu, and of undo."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def grey(words: str, id: str) -> dict:
 
 
 def words_list() -> dict:
-    """Two grey values that were written over, one block between them."""
+    """Return a list block with two edited shadow blocks and an ordinary block between them."""
     made = list_of(text("a"), text("b"), text("c")) | {"id": "l"}
     made["inputs"] = {
         "ITEM0": grey("a", "a"),
@@ -42,7 +42,7 @@ def words_list() -> dict:
 
 
 def written(saved: dict) -> list[str]:
-    """What is written in each gap."""
+    """Return the text in each slot."""
     inputs = saved["inputs"]
     each = (inputs[f"ITEM{number}"] for number in range(saved["extraState"]["items"]))
     return [(it.get("block") or it["shadow"])["fields"]["TEXT"] for it in each]
@@ -54,7 +54,7 @@ def in_the_gap(them: Person) -> dict:
 
 
 def choose(them: Person, begin: str) -> None:
-    """With the arrow keys."""
+    """Choose the menu entry that starts with this text, using the arrow keys."""
     them.wait_for(f"{MENU}.some(words => words.startsWith({begin!r}))")
     entries = them.ask(MENU)
     for _ in range(len(entries) + 1):

@@ -1,4 +1,4 @@
-"""Finding blocks in the toolbox by the words that people type, in English and Spanish."""
+"""Tests of the toolbox search with English and Spanish words."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ LEADING_SPANISH = {
 
 @pytest.fixture
 def opened(qtbot) -> Iterator[Callable[[str], Person]]:
-    """A function that shows the editor with the blocks of a language, and two robots."""
+    """Function that opens the editor in a language, with two robots."""
     before = language()
 
     def show(wanted: str) -> Person:
@@ -213,11 +213,11 @@ TYPED = f"""(words => {{
     field.dispatchEvent(new Event('input'));
     field.dispatchEvent(new KeyboardEvent('keydown', {{key: 'Tab'}}));
 }})"""
-"""Types words; Tab leaves the field, so that what is found is there at once."""
+"""JavaScript that types words into the search field; Tab shows the results without delay."""
 
 
 def first_two(them: Person, words: str) -> list[str]:
-    """The types of the blocks that come first and second when the field holds these words."""
+    """Return the types of the first two blocks found for these words."""
     of_all = f"[...document.querySelectorAll('{FLYOUT} .blocklyBlockCanvas > .blocklyDraggable')]"
     top = "(e => e.getBoundingClientRect().top)"
     return them.ask(
@@ -228,7 +228,7 @@ def first_two(them: Person, words: str) -> list[str]:
 
 
 def found(them: Person, words: str) -> str:
-    """The type of the block that comes first when the field holds these words."""
+    """Return the type of the first block found for these words, or "" if there is none."""
     return them.ask(
         f"({TYPED}({json.dumps(words)}), "
         f"[...({FIRST})?.classList ?? []].find(name => /^[a-z]+_/.test(name)) ?? '')"
@@ -273,7 +273,7 @@ def test_search_without_results_shows_suggestions(opened):
 
 
 def shown(them: Person) -> int:
-    """How many blocks the toolbox shows."""
+    """Return the number of blocks in the flyout."""
     return them.ask(f"document.querySelectorAll('{FLYOUT} .blocklyBlockCanvas > .blocklyDraggable').length")
 
 
@@ -346,9 +346,9 @@ def test_keys_typed_before_the_page_is_loaded_reach_the_search_field(qtbot):
 
 
 MORE = [robot("Pepper"), nao(), robot("Sonny")]
-"""The robots after another Pepper has arrived."""
+"""Robots after another Pepper has connected."""
 SAYS = f"document.querySelectorAll('{FLYOUT} .blocklyBlockCanvas > .robot_pepper_do_say').length"
-"""How many blocks that let a Pepper speak the toolbox shows."""
+"""JavaScript for the number of Pepper's say blocks in the flyout."""
 
 
 def test_search_text_and_focus_are_kept_when_a_robot_connects(opened):

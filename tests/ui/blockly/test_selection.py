@@ -1,4 +1,4 @@
-"""Several blocks at once: chosen by a frame, by clicks or all; moved, copied and deleted together."""
+"""Tests of selecting several blocks by rubber band, clicks or Select all, and of editing the selection."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def view(qtbot) -> BlocklyView:
 
 @pytest.fixture
 def can_undo(view) -> list[bool]:
-    """What the page told about that; the newest is the last."""
+    """Return the list of reports whether undo is available; the newest is the last."""
     told: list[bool] = []
     view.history_changed.connect(lambda can, _again: told.append(can))
     return told
@@ -39,7 +39,7 @@ def can_undo(view) -> list[bool]:
 
 @pytest.fixture
 def them(view, person) -> Person:
-    """One script of a start and three waits, and two lone waits to its right."""
+    """Simulated user of a script of a start and three waits, and two separate waits to its right."""
     QGuiApplication.clipboard().setText("")
     script = started(wait_block("a", wait_block("b", wait_block("c")))) | {"id": "start", "x": 60, "y": 60}
     state = workspace(script, wait_block("d") | {"x": 420, "y": 60}, wait_block("e") | {"x": 420, "y": 200})
@@ -56,7 +56,7 @@ def click(them: Person, id: str, modifier=Qt.NoModifier) -> None:
 
 
 def frame(them: Person, first: str, last: str, modifier=Qt.ShiftModifier) -> None:
-    """Draw a frame from above the one to below the other."""
+    """Draw a rubber band from above the first block to below the last."""
     one, other = (them.box(f"[data-id={each}] > .blocklyPath") for each in (first, last))
     start = QPoint(round(one["left"] - 12), round(one["top"] - 6))
     end = QPoint(round(other["right"] + 8), round(other["bottom"] - 8))
@@ -66,13 +66,13 @@ def frame(them: Person, first: str, last: str, modifier=Qt.ShiftModifier) -> Non
 
 
 def undo(them: Person, known: list[bool]) -> None:
-    """Take the last step back, once the page has listed it."""
+    """Undo the last step as soon as the page reports it."""
     them.until(lambda: known and known[-1], "there is something to undo")
     them.press(Qt.Key_Z, Qt.ControlModifier)
 
 
 def way(them: Person, id: str, before: dict) -> tuple[float, float]:
-    """How far a script has gone since."""
+    """Return how far a script has moved since `before`, as (x, y)."""
     now = by_id(them)[id]
     return now["x"] - before["x"], now["y"] - before["y"]
 

@@ -1,4 +1,4 @@
-"""Notes of the canvas are chosen with the blocks: by a frame, by clicks, all; and go with them."""
+"""Tests of notes on the canvas that are selected, moved, copied and deleted together with blocks."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def note(id: str, y: int) -> dict:
 
 @pytest.fixture
 def them(view, person) -> Person:
-    """A script, and to its right a lone wait and two notes."""
+    """Simulated user of a script, a separate wait block and two notes."""
     QGuiApplication.clipboard().setText("")
     script = started(wait_block("a")) | {"id": "start", "x": 60, "y": 60}
     state = workspace(script, wait_block("d") | {"x": 420, "y": 60})
@@ -49,7 +49,7 @@ def them(view, person) -> Person:
 
 
 def frame_right(them: Person) -> None:
-    """Draw a frame round the lone block and the first note."""
+    """Draw a rubber band around the separate block and the first note."""
     block, sheet = them.box("[data-id=d] > .blocklyPath"), them.box("[data-id=one] .blocklyCommentHighlight")
     start = QPoint(round(block["left"] - 12), round(block["top"] - 8))
     end = QPoint(round(sheet["right"] + 8), round(sheet["bottom"] - 20))

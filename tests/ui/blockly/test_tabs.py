@@ -1,4 +1,4 @@
-"""Several behaviours in the one page, each with its own undo, zoom and scroll position."""
+"""Tests of several behaviours in one page, each with its own undo stack, zoom and scroll position."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_edits_of_a_closed_or_replaced_program_are_ignored() -> None:
 
 @pytest.fixture
 def two(qtbot, view, person):
-    """Tab "a" is shown, "b" was shown before; the person at the page."""
+    """Simulated user of an editor that shows tab "a" and has shown tab "b" before."""
     view.show_tab("b", B)
     them = person(state=B)
     view.show_tab("a", A)

@@ -1,4 +1,4 @@
-"""Trying blocks: a click in the toolbox, the round button and Ctrl+Enter ask; values are shown beside."""
+"""Tests of trying blocks by a click in the flyout, the try button and Ctrl+Enter, and of shown values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ANSWER = "(e => e && !e.hidden && e.textContent)(document.querySelector('.nepTry
 
 @pytest.fixture
 def asked(view) -> list[dict]:
-    """What was to be tried."""
+    """Return the list of requests to try blocks; it grows with each request."""
     made: list[dict] = []
     view.try_requested.connect(lambda text: made.append(json.loads(text)))
     return made

@@ -1,4 +1,4 @@
-"""Variables in the page: their cards with values, their drop-down, and edits that the window asks for."""
+"""Tests of variables in the page: value cards, the drop-down menu, and edits requested by the window."""
 
 from __future__ import annotations
 

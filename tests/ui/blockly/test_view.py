@@ -1,4 +1,4 @@
-"""The block editor while robots come and go, and when its process dies."""
+"""Tests of the block editor while robots connect and disconnect, and after its web process was killed."""
 
 from __future__ import annotations
 

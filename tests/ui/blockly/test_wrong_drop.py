@@ -1,4 +1,4 @@
-"""A block that is let go where it does not fit says why; one that fits is caught from afar."""
+"""Tests of the message after an invalid drop, and of the snap distance."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def them(person) -> Person:
 
 
 def drop(them: Person, id: str, target: QPoint) -> None:
-    """Let its top left corner go a few pixels from there."""
+    """Drag a block and drop it with its top left corner at `target`."""
     box = them.box(f"[data-id={id}] > .blocklyPath")
     start = them.hold(f"[data-id={id}] > .blocklyPath")
     end = target + start - QPoint(round(box["left"]), round(box["top"]))
@@ -85,7 +85,7 @@ def test_invalid_drop_shows_the_reason_and_moves_the_block_off_the_target(
 
 
 def test_block_moved_off_the_target_of_an_invalid_drop_covers_no_other_script(qtbot, view, them):
-    """The way to the right of the place leads onto the script there."""
+    """The first free direction, to the right of the target, leads to another script."""
     state = workspace(START, TURN, EVER, {**FACE, "y": 476}, {**BATTERY, "x": 300, "y": 196})
     view.load(state)
     them.wait_for("!!document.querySelector('[data-id=battery]') && !document.querySelector('[data-id=if]')")

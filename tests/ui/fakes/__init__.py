@@ -1,6 +1,6 @@
-"""The core for tests of panels, and for looking at panels alone: the real one, and nothing of the computer.
+"""Fake core for tests of panels: the real core without network, processes and files.
 
-What stands for the computer passes the same tests as what it stands for; they are beside it.
+The fakes pass the same tests as the real classes; these tests are in this package.
 """
 
 from tests.ui.fakes.images import Images, ImageStream, on_topic

@@ -1,4 +1,4 @@
-"""Pictures that are decoded in the thread that offers them."""
+"""Image streams that decode in the thread that delivers the messages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nep.messages.message import Message
 
 @dataclass(eq=False)
 class ImageStream(images_module.ImageStream):
-    """The real one; a test asks it for what was painted."""
+    """Real image stream that also records the painted images."""
 
     painted: list[Picture] = field(default_factory=list)
 
@@ -25,7 +25,7 @@ class ImageStream(images_module.ImageStream):
             self.painted.append(self.picture)
 
     def came(self, arriving_hz: float, shown_hz: float) -> None:
-        """As if pictures had come and had been painted for two seconds; the next ones come after these."""
+        """Set the measured rates as if images had arrived and been painted at these rates (Hz) until now."""
         begin = self._images.clock() - images_module.RATE_DELAY_S - images_module.RATE_WINDOW_S
         for rate, hz in ((self.arrival_rate, arriving_hz), (self._display_rate, shown_hz)):
             for number in range(round(hz * images_module.RATE_WINDOW_S)):
@@ -33,7 +33,7 @@ class ImageStream(images_module.ImageStream):
 
 
 class Images(images_module.Images):
-    """The real ones, but decoded in the thread that offers them; ``camera`` tells what a topic sends."""
+    """Real image streams that decode in the calling thread; ``camera`` returns the image for a topic."""
 
     def __init__(
         self,
@@ -54,7 +54,7 @@ class Images(images_module.Images):
         return stream
 
     def look(self, topic: str) -> None:
-        """The camera of a topic sends what it sees, if there is one."""
+        """Deliver the current image of a topic's camera, if there is one."""
         seen = self.camera(topic)
         if seen is not None and seen.message is not None:
             self.offer([on_topic(seen.message, topic)])
@@ -80,7 +80,7 @@ class Images(images_module.Images):
 
 
 def on_topic(message: Message, topic: str) -> Message:
-    """The same message on another topic."""
+    """Return a copy of a message with another topic."""
     return Message(
         topic, message.data, message.codec, message.msg_type,
         stamp_ns=message.stamp_ns, seq=message.seq, extension=message.extension,

@@ -1,4 +1,4 @@
-"""A network that a test makes up."""
+"""Fake network whose nodes and messages are defined by a test."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from nep.protocol.graph_view import GraphView
 
 
 class Network:
-    """A source of messages: a test tells who is there and what they send.
+    """Message source whose graph and messages are defined by a test.
 
-    What robots are told goes over nodes in memory; `listen` hears it.
+    Commands to robots are published by a node in memory; subscribe to them with `listen`.
     """
 
     _names = itertools.count()
@@ -35,31 +35,31 @@ class Network:
 
     @property
     def node(self) -> Node:
-        """Studio's node."""
+        """Studio's node, created on first use."""
         if self._node is None:
             self._node = nep.node("studio", "memory", master=self._master)
         return self._node
 
     def listen(self, topic: str, msg_type: str) -> Subscriber:
-        """Hear what is published there."""
+        """Return a subscriber to a topic in memory."""
         return self.node.new_sub(topic, msg_type)
 
     def tell(self, view: GraphView) -> None:
-        """The master tells who is there."""
+        """Deliver a graph as if the master had sent it."""
         self._post_event(GraphReceived(view, 0.0))
 
     def find_master(self) -> None:
-        """A master answers."""
+        """Report that a master was found."""
         self._post_event(MasterFound(self.address))
 
     def send(self, message: Message) -> None:
-        """A program sends a message: it comes to who watches its topic."""
+        """Deliver a message to all sinks if its topic is watched."""
         if message.topic in self.wanted:
             for sink in self._sinks:
                 sink(message.topic, [message])
 
     def start(self) -> None:
-        """A test tells everything."""
+        """Do nothing; the test delivers all events."""
 
     def watch(self, topic: str) -> None:
         self.wanted.add(topic)

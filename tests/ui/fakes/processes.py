@@ -1,4 +1,4 @@
-"""Processes without the computer: of virtual robots, and of the program that runs."""
+"""Fake processes of virtual robots and programs."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from app.errors import RunnerError
 
 
 class Process:
-    """Lives until it is told to end, or until a test says that it has ended by itself."""
+    """Fake process that runs until it is terminated or until a test calls `die`."""
 
     _ids = itertools.count(1_000_000_000)
-    """No process of any computer has such a number."""
+    """Process ids higher than those of any operating system."""
 
     def __init__(self, log: IO[bytes]) -> None:
         self.pid = next(self._ids)
@@ -25,7 +25,7 @@ class Process:
         self._code: int | None = None
 
     def die(self, said: bytes, code: int) -> None:
-        """It says something and ends by itself."""
+        """Write output to the log and exit with this code."""
         self._log.write(said)
         self._log.flush()
         self._code = code
@@ -46,7 +46,7 @@ class Process:
 
 
 class Runner:
-    """Runs nothing: a test says what the program does. The program itself does what it is told, at once."""
+    """Fake runner of a program whose steps a test reports; it executes commands immediately."""
 
     _runs = itertools.count(1_000_000)
     pid = None
@@ -82,21 +82,21 @@ class Runner:
             self.pause()
 
     def does(self, *blocks: str, says: str = "") -> None:
-        """The program is at these blocks now."""
+        """Report that the program executes these blocks."""
         self._blocks, self._says = blocks, says
         self._tell("running", blocks=blocks, description=says)
 
     def warns(self, block: str, sentence: str, count: int = 1) -> None:
-        """A block lost its robot to another script, so often."""
+        """Report that a block lost its robot to another script `count` times."""
         self._tell("warning", blocks=(block,), text=sentence, count=count)
 
     def fails(self, block: str, sentence: str) -> None:
-        """A block fails, and with it the program."""
+        """Report that a block failed, and end the program."""
         self._tell("error", blocks=(block,), text=sentence, is_ok=False)
         self.ends(ok=False)
 
     def ends(self, *, ok: bool = True, why: str = "") -> None:
-        """The program comes to its end; ``why`` it did not end well."""
+        """Report the end of the program; ``why`` is the reason if it failed."""
         if self.state != "ended":
             self.state = "ended"
             self._tell("ended", is_ok=ok, text=why)
@@ -108,7 +108,7 @@ class Runner:
         self.breakpoints = tuple(blocks)
 
     def set_robots(self, owners: Mapping[str, str], guarded: Mapping[str, Sequence[str]]) -> None:
-        """The program asks nobody."""
+        """Do nothing; the fake program uses no robots."""
 
     def pause(self) -> None:
         self.state = "paused"
@@ -129,7 +129,7 @@ class Runner:
 
 
 class Launcher(processes_module.Launcher):
-    """The real ones, with processes of a test, and no master of the computer."""
+    """Real launcher with fake processes that starts no master."""
 
     def __init__(
         self,

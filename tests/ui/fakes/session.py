@@ -1,7 +1,7 @@
-"""The real session over a network that a test makes up.
+"""Real session over a fake network.
 
 `Session.full()` has a master, thirteen topics, the virtual Pepper and a behaviour;
-`Session()` has nothing. `tick()` makes the figures move.
+`Session()` is empty. `tick()` updates the values.
 """
 
 from __future__ import annotations
@@ -41,27 +41,27 @@ TICK_S = 1 / 30
 
 
 class Clock:
-    """Goes on only when a test says so; it begins at the computer's time, which some panels look at."""
+    """Fake clock that a test advances; it starts at the current time, which some panels compare with."""
 
     def __init__(self, behind_s: float = 0.0) -> None:
         self.now = time.monotonic() - behind_s
         self._epoch_ns = time.time_ns() - round(time.monotonic() * 1e9)
 
     def __call__(self) -> float:
-        """Monotonic seconds."""
+        """Return the monotonic time in seconds."""
         return self.now
 
     def ns(self) -> int:
-        """Nanoseconds since 1970."""
+        """Return the time in nanoseconds since 1970."""
         return self._epoch_ns + round(self.now * 1e9)
 
     def epoch_s(self) -> float:
-        """Seconds since 1970."""
+        """Return the time in seconds since 1970."""
         return self.ns() / 1e9
 
 
 class Doctor(doctor_module.Doctor):
-    """The real one; finds what the test says, at once and in the thread that asks."""
+    """Real doctor that finds what a test defines, immediately and in the calling thread."""
 
     is_running = False  # type: ignore[assignment]  # what a test says instead of a thread
 
@@ -84,7 +84,7 @@ _open: list[Session] = []
 
 
 class Session(session_module.Session):
-    """Has nothing: no master, no topic, no robot, an empty behaviour. `close_sessions` ends it."""
+    """Session without master, topics and robots, with an empty behaviour. `close_sessions` closes it."""
 
     source: Network
     documents: Documents
@@ -128,21 +128,21 @@ class Session(session_module.Session):
 
     @property
     def document(self) -> Document:
-        """The behaviour whose tab shows."""
+        """Behaviour of the current tab."""
         current = self.documents.current
         assert isinstance(current, Document)
         return current
 
     @property
     def watched(self) -> list[str]:
-        """The topics that panels look at, in the order in which they began."""
+        """Topics watched by panels, in the order of their first watch."""
         answers = {link.robot.topics.reply for link in self.fleet.links}
         watched = self.source.wanted - answers
         return [topic for topic in dict.fromkeys(self.source.asked) if topic in watched]
 
     @property
     def looked_at(self) -> list[str]:
-        """The robots whose sensors somebody sees."""
+        """Names of the robots whose sensors are watched."""
         return [link.name for link in self.fleet.links if set(topics_of(link.robot)) <= self.source.wanted]
 
     def _make_runner(self, on_event: Callable[[RunnerEvent], object]) -> Runner:
@@ -152,11 +152,11 @@ class Session(session_module.Session):
     # -- what a test lets happen
 
     def take_over(self) -> None:
-        """What was posted is taken over; no time goes by."""
+        """Process the posted events without advancing the clock."""
         super().tick()
 
     def tick(self) -> None:
-        """A thirtieth of a second goes by."""
+        """Advance the clock by a thirtieth of a second and update values, images and events."""
         self.ticks += 1
         self.clock.now += TICK_S
         now_ns = self.clock.ns()
@@ -172,7 +172,7 @@ class Session(session_module.Session):
         super().tick()
 
     def put(self, topic: Topic) -> Topic:
-        """A topic is there, with everything that is known of it."""
+        """Add or replace a topic with all its properties."""
         if topic.age_s is not None:
             topic.last_stamp_ns = self.clock.ns() - round(topic.age_s * 1e9)
         if topic.gone_s is not None:
@@ -183,12 +183,12 @@ class Session(session_module.Session):
         return topic
 
     def remove(self, name: str) -> None:
-        """A topic is not known any more."""
+        """Remove a topic."""
         del self.topics._topics[name]
         self.topics.revision += 1
 
     def send(self, topic: str, payload: object) -> Message:
-        """A message arrives on a topic that is watched."""
+        """Deliver a message on a topic, if it is watched, and return the message."""
         message = self._message(topic, payload)
         self.source.send(message)
         self.take_over()
@@ -203,7 +203,7 @@ class Session(session_module.Session):
         )
 
     def join(self, robot: Robot, *, virtual: bool = True) -> RobotLink:
-        """A robot comes. It hears what it is told (`asked`, `changes`), and has answered a stop."""
+        """Connect a robot whose last stop was confirmed; `asked` and `changes` return its commands."""
         topics = robot.topics
         self._ears[robot.name] = [
             self.source.listen(topics.command, COMMAND_TYPE),
@@ -217,17 +217,17 @@ class Session(session_module.Session):
         return link
 
     def asked(self, name: str) -> list[tuple[object, object, object]]:
-        """What a robot was told since the last time: (op, action, input); no signs of life."""
+        """Return the commands to a robot since the last call as (op, action, input), without heartbeats."""
         told = _heard(self._ears[name][0])
         return [(one["op"], one["action"], one.get("input")) for one in told if one["op"] != "alive"]
 
     def changes(self, name: str) -> list[Mapping[str, object]]:
-        """What was changed in a robot's world since the last time."""
+        """Return the changes to a robot's world since the last call."""
         return _heard(self._ears[name][1])
 
     @classmethod
     def full(cls) -> Session:
-        """A session as in the design's pictures."""
+        """Return a session with the content of the design drawings."""
         session = cls(Clock(behind_s=sample_data.LOG[0][0]))
         clock, end = session.clock, session.clock.now + sample_data.LOG[0][0]
         at_ns = clock.ns() + sample_data.LOG[0][0] * 1_000_000_000
@@ -271,6 +271,6 @@ def _heard(ear: Subscriber) -> list[Mapping[str, object]]:
 
 
 def close_sessions() -> None:
-    """End all sessions that a test has made, with their threads."""
+    """Close all sessions that a test created, with their threads."""
     while _open:
         _open.pop().close()

@@ -1,4 +1,4 @@
-"""What is kept in memory alone: settings, and the journal of a behaviour whose compiler a test may lead."""
+"""Storage in memory: settings, and the journal of a behaviour whose compiler results a test can define."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from app.core.storage import settings as settings_module
 
 
 class Settings(settings_module.Settings):
-    """Settings that are kept in memory alone."""
+    """Settings in memory."""
 
     def __init__(self) -> None:
         super().__init__(Path("no such folder"))
@@ -25,7 +25,7 @@ class Settings(settings_module.Settings):
 
 
 class Journal(journal_module.Journal):
-    """Keeps the work in memory alone."""
+    """Journal in memory."""
 
     def __init__(self) -> None:
         super().__init__(Path("no such folder"))
@@ -46,7 +46,7 @@ class Journal(journal_module.Journal):
 
 
 class Document(document_module.Document):
-    """The real one; a test may tell what its compiler says."""
+    """Real document whose compiler results a test can define."""
 
     def __init__(self) -> None:
         super().__init__(Journal)

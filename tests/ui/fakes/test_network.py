@@ -1,4 +1,4 @@
-"""The network for tests of panels brings what the live one brings."""
+"""Tests that the fake network and the real network deliver the same events and messages."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from tests.ui.fakes.network import Network
 
 
 class World(Protocol):
-    """A network with one program that sends, and what Studio hears of it."""
+    """Network with a program that publishes, and what Studio receives from it."""
 
     source: Source
     events: list[object]
     heard: list[tuple[str, object]]
 
     def begin(self) -> None:
-        """The master answers, and tells that the program publishes /a."""
+        """Start Studio's connection; the master reports that the program publishes /a."""
 
     def send(self, payload: object) -> None:
-        """The program publishes on /a; it has come to all who listen when this returns."""
+        """Publish on /a; return when all subscribers have received the message."""
 
     def listens(self, listens: bool) -> bool:
-        """Wait until the program is heard, or is not; whether that is so."""
+        """Wait until Studio is, or is not, subscribed to /a; return True on success."""
 
 
 class RealWorld:
-    """On sockets, with a master."""
+    """Real network with sockets and a master."""
 
     def __init__(self, master: Master) -> None:
         self.events: list[object] = []
@@ -71,7 +71,7 @@ class RealWorld:
 
 
 class MadeUpWorld:
-    """As tests of panels make it up."""
+    """Fake network."""
 
     def __init__(self) -> None:
         self.events: list[object] = []

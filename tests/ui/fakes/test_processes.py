@@ -1,4 +1,4 @@
-"""Virtual robots of processes that a test makes up come and go as those of the computer."""
+"""Tests that the launcher of virtual robots handles fake processes like real ones."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ while not os.path.exists(sys.argv[1]):
 print("no room left")
 sys.exit(3)
 """
-"""Lives until its file is there; then it says why, and ends."""
+"""Program that waits for a file, prints the reason and exits with code 3."""
 
 
 class RealProcesses:
-    """Processes of the operating system that end by themselves when a test says so."""
+    """Processes of the operating system that exit when a test creates a file."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -42,7 +42,7 @@ class RealProcesses:
 
 
 class MadeUpProcesses:
-    """Those for tests of panels."""
+    """Fake processes."""
 
     def __init__(self) -> None:
         self.made: list[MadeUpProcess] = []

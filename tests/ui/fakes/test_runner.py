@@ -1,4 +1,4 @@
-"""The real control of runs says the same of a program that a test makes up as of one in a process."""
+"""Tests that runs of fake programs behave like runs of programs in processes."""
 
 from __future__ import annotations
 
@@ -26,31 +26,31 @@ from tests.ui import fakes
 
 
 class Run(Protocol):
-    """A session with its programs. Each method returns when the window has taken it over."""
+    """Session with a program. Each method returns after the window has processed the event."""
 
     session: Session
 
     def make_runner(self, on_event: Callable[[RunnerEvent], object]) -> Runner:
-        """What runs one program."""
+        """Return a runner for one program."""
 
     def works(self, block: str) -> None:
-        """The program that runs comes to this block by itself."""
+        """Let the running program reach this block."""
 
     def fails(self, block: str) -> None:
-        """It comes to this block, which fails."""
+        """Let the program fail at this block."""
 
     def ends(self) -> None:
-        """It comes to its end by itself."""
+        """Let the program reach its end."""
 
     def pauses_at(self, block: str) -> None:
-        """It comes to this block, and pauses as it was told."""
+        """Let the program reach the breakpoint of this block and pause."""
 
     def is_killed(self) -> None:
-        """Its process is killed."""
+        """Kill the process of the program."""
 
 
 class RealRun:
-    """Programs in processes of their own."""
+    """Programs in processes."""
 
     def __init__(self, master: Master, folder: Path) -> None:
         self.session = Session(
@@ -85,7 +85,7 @@ class RealRun:
 
 
 class MadeUpRun:
-    """Programs of which a test says what they do."""
+    """Programs whose events a test defines."""
 
     def __init__(self) -> None:
         self.session = fakes.Session()
@@ -136,13 +136,13 @@ def run(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Run]:
 
 
 def endless() -> Mapping[str, object]:
-    """Counts for ever."""
+    """Return a behaviour that increments a variable in an infinite loop."""
     change = block("variables_change", "c", VAR={"id": "n"}, BY=number(1))
     return workspace(started(block("control_forever", "loop", BODY=[change])), variables=("n",))
 
 
 def shown(run: Run) -> tuple[object, ...]:
-    """What can be pressed, and what stands there."""
+    """Return the state of the run, its enabled buttons and their labels."""
     view = run.session.runs.view()
     return view.state, view.can_run, view.can_pause, view.can_step, view.run_label, view.stop_label
 
@@ -202,7 +202,7 @@ def test_breakpoint_applies_immediately_and_is_not_a_pending_edit(run: Run) -> N
 
 
 def pressed_long_ago(run: Run) -> None:
-    """Run was not pressed just now: another press is no double click."""
+    """Set the start of the run 10 s back, so that another press of Run is no double click."""
     runs = run.session.runs
     runs._run = replace(runs._run, started_s=runs._run.started_s - 10)
 
@@ -261,7 +261,7 @@ def test_edits_during_a_run_are_reported_as_pending_until_undone(run: Run) -> No
     runs, document = run.session.runs, run.session.document
 
     def says() -> bool:
-        """Whether the bar says so, once the newest edit is compiled."""
+        """Return whether the run bar reports pending edits, after the newest edit was compiled."""
         tick_until(run.session, lambda: document.newest_program() is document.program())
         runs.tick()
         view = runs.view()
@@ -358,7 +358,7 @@ def test_runner_reports_program_events_and_state(run: Run) -> None:
     runner = run.make_runner(told.append)
 
     def come(kind: str) -> None:
-        """Wait until this is the newest kind of what was told, and forget what was before."""
+        """Wait until the newest event is of this kind, check all events and clear them."""
         until(lambda: bool(told) and told[-1].kind == kind)
         assert {event.run for event in told} == {runner.run}
         assert all(event.is_ok for event in told)

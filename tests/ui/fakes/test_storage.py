@@ -1,4 +1,4 @@
-"""What tests of panels keep in memory is kept as on a disk; their doctor finds what the real one finds."""
+"""Tests that the storage in memory behaves like files, and the fake doctor like the real one."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_recent_files_are_newest_first(settings: Settings, tmp_path: Path) -> No
 
 
 class Kept:
-    """A document, and what its journal keeps."""
+    """Document and the content of its journal."""
 
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder
@@ -75,7 +75,7 @@ class Kept:
 
     @property
     def blocks(self) -> object:
-        """The blocks in the journal, None when it keeps none."""
+        """Blocks in the journal, or None if it is empty."""
         if self._folder is not None:
             file = self._folder / self.document.journal_name
             return json.loads(file.read_text("utf-8"))["workspace"] if file.exists() else None
@@ -154,7 +154,7 @@ def test_fake_document_returns_the_given_compiler_results() -> None:
 
 @pytest.fixture
 def look(is_real: bool) -> Callable[[list[Finding]], Doctor]:
-    """A doctor who has looked and found these; who finds None breaks off."""
+    """Return a function that runs a doctor with these findings; None makes its checks fail."""
 
     def found(findings: list[Finding] | None) -> Doctor:
         if is_real:

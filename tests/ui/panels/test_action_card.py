@@ -1,4 +1,4 @@
-"""A card of an action: what it waits for or replaces, its time, its answer, its last tries."""
+"""Tests of action cards: state, replacement, remaining time, reply and last tries."""
 
 from __future__ import annotations
 

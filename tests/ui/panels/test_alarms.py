@@ -1,4 +1,4 @@
-"""The panel of alarms: sentences whose words are chosen, states, snooze, and what happened."""
+"""Tests of the Alarms panel: editing conditions, states, snooze and history."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def said(panel: AlarmsPanel, row: int = 0) -> str:
 
 
 def choose(words: str) -> None:
-    """Choose from the menu that is open."""
+    """Trigger an item of the open menu by its text."""
     menu = QApplication.activePopupWidget()
     assert isinstance(menu, QMenu)
     action = next(each for each in menu.actions() if each.text() == words)

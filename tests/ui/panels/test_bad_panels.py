@@ -1,4 +1,4 @@
-"""Panels that raise: the window lives on, the others show what is new, and the panel comes back."""
+"""Tests of panels that raise exceptions: the window and other panels keep working, and the panel recovers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def explode() -> dict[str, object]:
 
 @pytest.fixture
 def topics(qtbot, window: MainWindow, commands: object) -> Dock:
-    """The Topics panel of an open window."""
+    """Dock of the Topics panel in an open window."""
     window.show()
     dock = window.show_layout("developer").docks["topics"]
     qtbot.waitUntil(dock.is_displayed)
@@ -92,7 +92,7 @@ def test_panel_that_fails_to_close_or_save_state_does_not_block_closing_the_wind
 
 
 class Bad(PlainPanel):
-    """Does what the window asks of it until ``raises`` names it; then it raises that."""
+    """Panel that raises the exceptions set in `raises`, by method name."""
 
     raises: ClassVar[dict[str, BaseException]] = {}
 
@@ -131,14 +131,14 @@ class Bad(PlainPanel):
 
 @pytest.fixture
 def bad(monkeypatch: pytest.MonkeyPatch) -> dict[str, BaseException]:
-    """What the panel "bad" raises, by where; nothing at first."""
+    """Exceptions that the panel "bad" raises, by method name; empty at first."""
     raises: dict[str, BaseException] = {}
     monkeypatch.setattr(Bad, "raises", raises)
     return raises
 
 
 def with_bad(qtbot, theme: Theme, home: Path) -> MainWindow:
-    """A window with the panel "bad" beside the plain ones, as Studio starts it."""
+    """Main window with the shipped panels and the panel "bad"."""
     session = Session(
         Settings(home), address=free_address(), journal_folder=home / "journal", start_processes=False
     )
@@ -151,7 +151,7 @@ def with_bad(qtbot, theme: Theme, home: Path) -> MainWindow:
 
 
 def seen(qtbot, window: MainWindow, name: str = "bad") -> Dock:
-    """The dock of a panel, opened, seen and refreshed."""
+    """Open a panel, wait until it is displayed, refresh it and return its dock."""
     bench = window.show_layout("developer")
     dock = bench.open(name)
     assert dock is not None

@@ -1,4 +1,4 @@
-"""A program that sends nonsense a thousand times a second, seen by a person at the window."""
+"""Test of the alert about a publisher that sends undecodable messages at 1 kHz."""
 
 from __future__ import annotations
 

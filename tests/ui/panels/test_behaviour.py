@@ -21,7 +21,7 @@ from tests.ui.sample_data import PROGRAM, Invocation, pepper
 
 
 class Editor(QWidget):
-    """Stands for the block editor: writes down what it is told."""
+    """Fake block editor that records its calls."""
 
     changed = Signal(str, dict)
     history_changed = Signal(bool, bool)

@@ -1,4 +1,4 @@
-"""The tabs of the open behaviours: what they show, and a person's mouse and keys on them."""
+"""Tests of the tab bar of open behaviours: contents, mouse and keyboard."""
 
 from __future__ import annotations
 

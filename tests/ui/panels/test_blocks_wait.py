@@ -1,4 +1,4 @@
-"""While the page of the blocks is not there, words say so; a quick page is not announced."""
+"""Test of the loading message of the block editor, which appears only after a delay."""
 
 from __future__ import annotations
 

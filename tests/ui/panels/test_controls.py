@@ -1,4 +1,4 @@
-"""Controls of typed values: what was typed is kept and judged, keys and wheel, pictures, colours, angles."""
+"""Tests of the input controls of typed values: validation, keyboard and wheel, images, colours, angles."""
 
 from __future__ import annotations
 
@@ -273,7 +273,7 @@ class Cameras:
         self.made = self.images.stream("/Pepper/camera")
 
     def send(self, width: int, height: int) -> None:
-        """The camera sends a picture of this size."""
+        """Offer a camera image of this size in pixels."""
         message = picture(width, height).message
         assert message is not None
         self.images.offer([fakes.on_topic(message, "/Pepper/camera")])

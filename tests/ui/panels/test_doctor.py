@@ -57,7 +57,7 @@ def test_findings_are_shown_incrementally_during_a_check(qtbot, window) -> None:
     told = []
 
     def look() -> None:
-        """As the other thread: two steps, and a refresh of the panel after each."""
+        """Report two steps of a check as the checking thread does, and refresh the panel after each."""
         doctor.looked += 1
         doctor.is_running = True
         for done, found in enumerate(((FINE,), (FULL, FINE))):
@@ -174,7 +174,7 @@ NEAR = Finding(
 
 
 class Asker(PanelWidget):
-    """A panel that sees nothing, and is paused."""
+    """Panel without visible data that is paused and records the topics passed to `show_topic`."""
 
     def __init__(self, context) -> None:
         super().__init__(context, "Depth")

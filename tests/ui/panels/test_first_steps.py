@@ -1,4 +1,4 @@
-"""First steps: which are done is read from the blocks and the run, kept, and a hint comes after a while."""
+"""Tests of the First steps tutorial: completion from blocks and runs, saved progress, delayed hints."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def show(window: Window, view: GraphView) -> None:
 
 
 def settle(qtbot, panel: GraphPanel) -> None:
-    """Until everything that was asked for has its place, and is shown."""
+    """Wait until the requested graph is laid out and shown."""
     panel.refresh()
 
     def is_there() -> bool:
@@ -132,7 +132,7 @@ def names(panel: GraphPanel) -> set[str]:
 
 
 def at(panel: GraphPanel, place: QPointF) -> QPoint:
-    """Where a place of the drawing is on the canvas."""
+    """Convert a scene position to canvas pixels."""
     canvas = panel.canvas
     return ((place - canvas.visible_rect().topLeft()) * canvas.scale).toPoint()
 
@@ -272,7 +272,7 @@ def test_service_card_shows_its_details(panel: GraphPanel) -> None:
 
 
 def menu_at(panel: GraphPanel, place: QPoint, *, by_keys: bool = False) -> QMenu:
-    """The menu that a right click, or the menu key, opens."""
+    """Return the context menu that a right click or the menu key opens at a canvas position."""
     reasons = QContextMenuEvent.Reason
     reason = reasons.Keyboard if by_keys else reasons.Mouse
     event = QContextMenuEvent(reason, place, panel.canvas.mapToGlobal(place))
@@ -284,7 +284,7 @@ def menu_at(panel: GraphPanel, place: QPoint, *, by_keys: bool = False) -> QMenu
 
 
 def run_all(menu: QMenu) -> list[str]:
-    """Do everything that a menu offers; the words."""
+    """Trigger every action of a menu and return their texts."""
     words = [action.text() for action in menu.actions()]
     for action in menu.actions():
         action.trigger()

@@ -1,4 +1,4 @@
-"""Panels with pictures are refreshed twice in a tick, the others once."""
+"""Test of the refresh rate of image panels: twice per tick, other panels once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Health: rows of facts, how many are to be looked at, and the next step."""
+"""Tests of the Health panel: rows, number of problems and suggested next steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Panels that nobody can see cost nothing: no watches, no streams, no 60 Hz; seen again, they get them."""
+"""Tests that hidden panels have no watches, streams or 60 Hz timer and get them back when shown."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def graph() -> GraphView:
 
 
 class Case:
-    """A window with the real panels on a session that talks to nobody, and its clock, or the computer's."""
+    """Window with the real panels on a session without a master, with a fake or the real clock."""
 
     def __init__(self, home: Path, theme: Theme, *, own_clock: bool = True) -> None:
         self.now = 100.0
@@ -67,7 +67,7 @@ class Case:
         self.window.tick()
 
     def hide_for_long(self) -> None:
-        """What is hidden now is hidden for longer than it stays subscribed."""
+        """Advance the clock until the watches of hidden panels have ended."""
         self.tick()
         self.tick(SUSPEND_DELAY_S)
 
@@ -305,7 +305,6 @@ def test_failed_panel_watches_no_topics_until_retried(qtbot, case: Case) -> None
 
 
 def test_hiding_all_panels_ends_every_watch(case: Case) -> None:
-    """Whatever a panel opens is among its `looks`: nothing of it is wanted while no panel can be seen."""
     assert isinstance(case.window, QMainWindow)
     for layout in ("behaviour", "developer"):
         case.window.show_layout(layout)
@@ -318,7 +317,7 @@ def test_hiding_all_panels_ends_every_watch(case: Case) -> None:
 
 
 class Paints(QObject):
-    """Writes down which widgets are painted."""
+    """Event filter that records the class names of painted widgets."""
 
     def __init__(self) -> None:
         super().__init__()

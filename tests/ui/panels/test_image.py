@@ -54,7 +54,7 @@ def made(qtbot, window: Window) -> ImagePanel:
 
 
 def stream_of(shown: Picture, silent_s: float = 0.01) -> ImageStream:
-    """A stream whose last picture came so long ago."""
+    """Return a stream whose last image was received ``silent_s`` seconds ago."""
     clock = Clock(behind_s=silent_s)
     stream = Images(clock=clock).stream("/c")
     assert shown.message is not None

@@ -1,4 +1,4 @@
-"""The image panel's colours, its colour bar, and what messages draw on a picture."""
+"""Tests of the image panel's colour maps, colour bar and annotations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A click in a picture publishes its point: once it is armed, and never by a drag or a double click."""
+"""Tests of publishing image points by click: only while armed, never by a drag or a double click."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ SHIFT = Qt.KeyboardModifier.ShiftModifier
 
 
 def arm(window: Window, panel: ImagePanel) -> Subscriber:
-    """Let its clicks publish points, and listen to them."""
+    """Arm the publishing of points and return a subscriber to them."""
     heard = window.session.source.listen(POINTS, "json")
     panel.actions_of["point"].trigger()
     press(panel.points.strip.switch)
@@ -65,13 +65,13 @@ def arm(window: Window, panel: ImagePanel) -> Subscriber:
 
 
 def at(panel: ImagePanel, x: float, y: float) -> QPoint:
-    """Where a place of the picture is in the view."""
+    """Convert a position in the 320 x 240 image to view pixels."""
     view = panel.view
     return view.place.to_view(view.area()).map(QPointF(x / 320, y / 240)).toPoint()
 
 
 def click(qtbot, window: Window, panel: ImagePanel, x: float, y: float, key=LEFT) -> PicturePoint:
-    """Click there, wait until it is known to be no double click, and let the session take the result."""
+    """Click at an image position, wait out the double-click time and return the point."""
     with qtbot.waitSignal(panel.view.clicked, timeout=20_000) as told:
         QTest.mouseClick(panel.view, key, Qt.KeyboardModifier.NoModifier, at(panel, x, y))
     ticks(window, panel)

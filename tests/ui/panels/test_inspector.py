@@ -132,7 +132,7 @@ def test_latency_of_a_shown_message_does_not_grow(panel, window) -> None:
 
 
 class Layouts(QObject):
-    """Counts how often something inside asked to be laid out again."""
+    """Event filter that counts the layout requests of a widget."""
 
     def __init__(self, watched: QWidget) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""How two messages differ, and how the tree shows it."""
+"""Tests of the difference between two messages and of its display in the tree."""
 
 from __future__ import annotations
 

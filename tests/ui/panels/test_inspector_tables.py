@@ -1,4 +1,4 @@
-"""The inspector's query, its table of objects, and going back through what came."""
+"""Tests of the inspector's queries, tables of objects and message history."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def send(window: Window, panel: InspectorPanel, value: object) -> None:
 
 @pytest.fixture
 def soon(qtbot, window, panel) -> Callable[[Callable[[], object]], None]:
-    """Goes on with the window until something is so; a query is answered in a thread."""
+    """Function that ticks the window until a condition holds; queries run in a thread."""
 
     def wait(true: Callable[[], object]) -> None:
         qtbot.waitUntil(lambda: (ticks(window, panel), bool(true()))[1], timeout=LONG_MS)

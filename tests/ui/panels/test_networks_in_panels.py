@@ -1,4 +1,4 @@
-"""Topics, Nodes and Inspector show what is on other networks, and say in words what can't be known there."""
+"""Tests of Topics, Nodes and Inspector with other networks, where some values are unknown."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def window(qapp) -> Window:
 
 @pytest.fixture
 def look(window: Window) -> Look:
-    """Look at a network of this kind; what a test lets it tell is taken over with the next tick."""
+    """Function that selects a network kind and returns its fake; its reports are applied at the next tick."""
     made: list[Fake] = []
 
     def make(*told: object) -> Fake:

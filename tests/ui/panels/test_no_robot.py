@@ -1,4 +1,4 @@
-"""While a virtual robot is being started, nothing in the window says that there is none."""
+"""Tests that the window does not report a missing robot while a virtual robot is starting."""
 
 from __future__ import annotations
 

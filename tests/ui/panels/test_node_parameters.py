@@ -1,4 +1,4 @@
-"""The parameters of the chosen node in Nodes: seen live, set by keys or a choice, refused in words."""
+"""Tests of the parameters of the selected node in Nodes: live values, setting and rejected input."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.ui.panels.test_words import said_by
 
 
 class World:
-    """A robot with parameters on a network in memory, and the panel over it."""
+    """Robot with parameters on a network in memory, and the Nodes panel."""
 
     def __init__(self, window: Window, robot: nep.Node) -> None:
         self.window, self.robot = window, robot
@@ -32,7 +32,7 @@ class World:
         self.part = self.panel.parameters
 
     def hear(self) -> None:
-        """What the robot tells comes to who watches it."""
+        """Pass the robot's latched parameters to the session and refresh the panel."""
         topic = parameters_topic(self.robot.id)
         with self.window.session.source.node.new_sub(topic, "json") as kept:
             message = kept.receive(5.0)
@@ -46,7 +46,7 @@ class World:
         ticks(self.window, self.panel, 2)
 
     def settle(self, qtbot) -> None:
-        """The robot has answered, and told what it has now."""
+        """Wait until the robot has replied, then update the panel with its parameters."""
         qtbot.waitUntil(lambda: self._refreshed() == "", timeout=20_000)
         self.hear()
 

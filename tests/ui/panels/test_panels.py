@@ -1,4 +1,4 @@
-"""Every panel that there is, with nothing and with everything, in both densities and both themes."""
+"""Tests of every panel, empty and with sample data, in both densities and themes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ NAMES = sorted({module.name for module in pkgutil.iter_modules(app.ui.panels.__p
 
 @pytest.fixture(autouse=True)
 def without_web(monkeypatch) -> None:
-    """The block editor has tests of its own."""
+    """Behaviour panel with a fake block editor, which is tested separately."""
     made = lambda context: behaviour.BehaviourPanel(context, Editor)  # noqa: E731
     monkeypatch.setattr(app.ui.panels.behaviour, "PANEL", Panel("behaviour", "Behaviour", "blocks", (), made))
 
@@ -118,7 +118,7 @@ def test_empty_panel_suggests_next_steps(qtbot, qapp, name) -> None:
 
 
 def imported_panels(folder: Path) -> Iterator[tuple[str, str]]:
-    """Of each panel, a file or a folder, which other modules beside it it imports."""
+    """Return pairs of a panel module or package and another one that it imports."""
     for path in folder.rglob("*.py"):
         own = path.relative_to(folder).with_suffix("").parts[0]
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):

@@ -1,4 +1,4 @@
-"""A panel is one file: the window lists it, docks it, refreshes it and keeps its place."""
+"""Test of a plug-in panel in one file: listed, docked, refreshed and restored."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def plug_in(tmp_path: Path) -> Iterator[None]:
 
 
 def menu_named(where: QMenuBar | QMenu, name: str) -> QMenu:
-    """A menu of a bar or of a menu, by the words that a person reads."""
+    """Return a menu of a menu bar, or a submenu, by its displayed title."""
     return next(
         menu
         for each in where.actions()

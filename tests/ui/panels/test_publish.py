@@ -1,4 +1,4 @@
-"""The panel Publish: kept messages, what is wrong in them, the switch, sending once and again and again."""
+"""Tests of the Publish panel: saved messages, validation, arming, single and periodic sending."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How often what a person reads may change."""
+"""Tests of the limiter for updates of displayed text."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from app.ui.panels.inspector.pace import MAX_BURST, MAX_UPDATE_HZ, UpdateLimiter
 
 
 def let_through(pace: UpdateLimiter, begin_s: float, seconds: float, hz: float = 30.0) -> int:
-    """How many of so many a second came through."""
+    """Return how many updates at ``hz`` pass the limiter within ``seconds``."""
     return sum(pace.try_acquire(begin_s + turn / hz) for turn in range(round(seconds * hz)))
 
 

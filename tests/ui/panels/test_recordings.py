@@ -1,4 +1,4 @@
-"""The panel Recordings: what is in the folder, and what a person does with one."""
+"""Tests of the Recordings panel: list, renaming, deletion and export."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Three recordings: numbers, pictures, and one that was cut off."""
+    """Folder of three recordings: JSON messages, images, and a truncated file."""
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
     made = tmp_path / "Recordings"
     made.mkdir()

@@ -26,7 +26,7 @@ def painted(state: RobotState, area: QRectF = AREA, *, dark: bool = False) -> QI
 
 
 def differing(first: QImage, second: QImage) -> int:
-    """How many of every third pixel differ."""
+    """Return the number of differing pixels, sampled at every third row and column."""
     return sum(
         first.pixel(x, y) != second.pixel(x, y)
         for x in range(0, first.width(), 3)
@@ -78,8 +78,6 @@ def test_drawing_is_dimmed_in_the_dark_theme(qapp) -> None:
 
 
 def test_left_turn_of_the_robot_is_drawn_to_the_right_of_the_viewer(qapp) -> None:
-    """The eyes' colour wanders with the heading, and is hidden from behind."""
-
     def eyes(theta_deg: float) -> list[int]:
         image = painted(RobotState(theta_deg=theta_deg, eyes="#ff00ff", shoulders="#ffffff"))
         return [

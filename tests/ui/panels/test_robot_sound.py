@@ -1,4 +1,4 @@
-"""The button that mutes robots, why they are silent, and what stands in the picture of what they play."""
+"""Tests of the mute button, the reason for a missing voice, and the display of played sounds."""
 
 from __future__ import annotations
 

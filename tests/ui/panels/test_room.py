@@ -1,4 +1,4 @@
-"""A person in the room of the virtual robots: drags, adds, removes, with the mouse and with the keyboard."""
+"""Tests of editing the room of the virtual robots by mouse and keyboard."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a person says to a virtual robot in its panel, and what they let happen."""
+"""Tests of sending words and simulated events to a virtual robot from its panel."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def panel(qtbot, window) -> RobotPanel:
 
 
 def menu(panel: RobotPanel) -> QMenu:
-    """The menu that is open."""
+    """Return the open menu."""
     return next(each for each in panel.say.findChildren(QMenu) if each.isVisible())
 
 

@@ -1,4 +1,4 @@
-"""The panel Sent: every message and call in a row, copied, repeated while it is armed."""
+"""Tests of the Sent panel: list of messages and calls, copying, resending while armed."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def made(qtbot, window: Window, size: tuple[int, int] = (640, 320)) -> SentPanel
 
 
 def rows(panel: SentPanel) -> list[list[str]]:
-    """What stands in the table, without the times."""
+    """Return the texts of the table without the times."""
     return [
         [panel.table.cell_at(row, column).text for column in (2, 3, 4, 5)]
         for row in range(panel.model.rowCount())
@@ -104,7 +104,7 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
 
 
 def put_all(session: Session) -> None:
-    """One entry of each kind."""
+    """Add one record of each kind and arm the session."""
     sent = session.acting.sent
     for number, (asker, name) in enumerate(
         (("publish", "/words"), ("service", "remember_face"), ("replay", "/scan"), ("image", "/cam/point"))

@@ -1,4 +1,4 @@
-"""The panel Services: what is offered, a form for the request, the answer, and the calls before."""
+"""Tests of the Services panel: list of services, request form, reply and past calls."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ REQUEST = '{"name": "Aiko", "pictures": 12, "quality": 0.5, "replace": true, "bo
 
 
 def offer(session: Session, **services: str) -> None:
-    """The master tells that the nodes of these ids serve these services."""
+    """Let the fake master report these services, each served by the node with the given id."""
     view = session.live.graph
     assert view is not None
     infos = {
@@ -59,7 +59,7 @@ def panel(qtbot, window) -> ServicesPanel:
 
 
 def answered(window: Window, panel: ServicesPanel, qtbot) -> None:
-    """Wait until nothing is waited for."""
+    """Wait until no call is in flight."""
 
     def is_over() -> bool:
         ticks(window, panel)

@@ -1,4 +1,4 @@
-"""What of a recording is sent on the live network, chosen and armed in the Timeline."""
+"""Test of sending selected topics of a recording to the live network from the Timeline."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ COUNT = 40
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """/a and /base/cmd_vel by turns."""
+    """Recording of alternating messages on /a and /base/cmd_vel."""
     path = tmp_path / "Tour.mcap"
     record(path, [[json_message(seq, ("/a", "/base/cmd_vel")[seq % 2]) for seq in range(COUNT)]])
     return path
 
 
 def until(qtbot, window: Window, panel: TimelinePanel, true: Callable[[], object]) -> None:
-    """Tick as the timer does until something is so."""
+    """Tick the session and refresh the panel until a condition holds."""
 
     def tick() -> bool:
         window.session.tick()
@@ -42,7 +42,7 @@ def until(qtbot, window: Window, panel: TimelinePanel, true: Callable[[], object
 
 
 def chosen(panel: TimelinePanel) -> list[str]:
-    """What stands under "Sent as", row by row."""
+    """Return the texts of the "Sent as" column."""
     table = panel.chooser.table
     return [table.cell_at(row, 3).text for row in range(panel.chooser.model.rowCount())]
 

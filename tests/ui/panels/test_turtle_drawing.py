@@ -1,4 +1,4 @@
-"""The small robot's drawing: it shows where it looks, its light, and what it bumps into."""
+"""Tests of the drawing of the turtle robot: heading, light and bumper contact."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The variables of the behaviour: their values while it runs, and what is done with one."""
+"""Tests of the Variables panel: values during a run and the commands of a variable."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def shown(panel: VariablesPanel) -> list[tuple[str, str]]:
 
 
 def tells(window: Window, panel: VariablesPanel, **values: object) -> None:
-    """The program says what its variables hold."""
+    """Let the running program report these values of its variables."""
     run = window.session.runs._runner
     assert run is not None
     told = tuple(display_value(id, value) for id, value in values.items())

@@ -1,4 +1,4 @@
-"""Every panel in the pseudo-language: each word is a translated one, and longer words have their room."""
+"""Tests of the translation of every panel in the pseudo-language, which also has longer texts."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ NO_WORDS = (
     "Alt+", "Ctrl", "Esc", "NEP Studio", "Return", "Shift", "Space", "bodyLarge", "font-weight",
     "textSecondary", "textTertiary",
 )  # fmt: skip
-"""Keys, our name, roles and styles."""
+"""Untranslated texts: key names, the product name, roles and style names."""
 SAID = (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole)
 
 
 def panel_of(name: str) -> Panel:
-    """The panel; the page of the block editor has tests of its own."""
+    """Return a panel by name; the Behaviour panel has a fake block editor, which is tested separately."""
     if name != "behaviour":
         return SIZES[name][0]
     make = lambda context: behaviour.BehaviourPanel(context, Editor)  # noqa: E731
@@ -60,7 +60,7 @@ def panel_of(name: str) -> Panel:
 
 
 def rows_of(model: QAbstractItemModel, above: QModelIndex | None = None) -> Iterator[str]:
-    """What all cells of a model say, and those below them."""
+    """Return the texts of all cells of a model, including child rows."""
     above = QModelIndex() if above is None else above
     for row in range(model.rowCount(above)):
         # a list model does not tell its one column
@@ -71,7 +71,7 @@ def rows_of(model: QAbstractItemModel, above: QModelIndex | None = None) -> Iter
 
 
 def said_by(widget: QWidget) -> Iterator[tuple[str, str]]:
-    """(where, words) of all that a widget, its lists and its menus say."""
+    """Return pairs of location and text for a widget, its lists and its menus."""
     yield from texts_of(widget)
     for view in widget.findChildren(QAbstractItemView):
         is_message = isinstance(view, TreeView)  # whose keys and values are its own
@@ -80,7 +80,7 @@ def said_by(widget: QWidget) -> Iterator[tuple[str, str]]:
 
 
 def said_in(panel: PanelWidget) -> Iterator[tuple[str, str]]:
-    """All that a panel says, its title and its menus."""
+    """Return pairs of location and text for a panel, its title and its menus."""
     yield "title", panel.title()
     for action in panel.more_actions():
         yield "more", action.text().partition("\t")[0]
@@ -92,12 +92,12 @@ def said_in(panel: PanelWidget) -> Iterator[tuple[str, str]]:
 
 
 def cased(title: str) -> tuple[str, str]:
-    """A title, and as it stands at the beginning."""
+    """Return a title unchanged and with an upper-case first letter."""
     return title, title[:1].upper() + title[1:]
 
 
 def texts_in(value: object) -> Iterator[str]:
-    """All texts of a value that a robot told."""
+    """Return all texts in a value from a robot."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, Mapping):
@@ -109,7 +109,7 @@ def texts_in(value: object) -> Iterator[str]:
 
 
 def words_of(robot: Robot) -> Iterator[str]:
-    """A robot's own words: they are those of its description."""
+    """Return the texts of a robot's description, which are not translated by Studio."""
 
     def of(parameters: Iterable[Parameter]) -> Iterator[str]:
         for one in parameters:
@@ -128,7 +128,7 @@ def words_of(robot: Robot) -> Iterator[str]:
 
 
 def named_in(rules: Iterable[AlarmRule]) -> Iterator[str]:
-    """What a person, or a program, has named in alarms."""
+    """Return the names and payloads in alarms, which come from users or programs."""
     for rule in rules:
         yield from (rule.condition.name, rule.condition.path)
         for action in rule.actions:
@@ -136,7 +136,7 @@ def named_in(rules: Iterable[AlarmRule]) -> Iterator[str]:
 
 
 def data_of(session: Session) -> Iterator[str]:
-    """What comes from elsewhere, in whatever language it is."""
+    """Return texts from users, robots and the network, which are not translated."""
     yield from MESSAGE_TYPES
     for topic in session.topics:
         yield default_topic(topic.name)
@@ -169,7 +169,7 @@ def data_of(session: Session) -> Iterator[str]:
 
 @pytest.fixture
 def shown(qtbot, theme: Theme) -> Show:
-    """Shows a panel in its dock, at its usual size."""
+    """Context manager that shows a panel in its dock at its usual size."""
     theme.apply()
 
     @contextmanager
@@ -217,7 +217,7 @@ def test_table_columns_are_wide_enough_for_their_headers(pseudo, shown, name) ->
 @pytest.mark.parametrize("language", words.languages(words.LOCALE_FOLDER))
 @pytest.mark.parametrize("columns", [topics.COLUMNS, nodes.COLUMNS], ids=["topics", "nodes"])
 def test_headers_of_the_narrowest_tables_are_not_clipped_in_any_language(theme, language, columns) -> None:
-    """Else a translator finds a shorter word: the table gives a column no more room where it is narrow."""
+    """A narrow table does not widen a column for its header, so the translation must be short."""
     catalog = words.read(words.po_file(words.LOCALE_FOLDER, language), language)
     metrics = QFontMetricsF(header_font(theme))
     for column in columns:
@@ -227,7 +227,7 @@ def test_headers_of_the_narrowest_tables_are_not_clipped_in_any_language(theme, 
 
 
 def bare_words(folder: str) -> Iterator[str]:
-    """Each call that shows a person words that stand in the source and are not given to a translator."""
+    """Return each call that displays an untranslated text literal, with file and line."""
     for path in sorted((ROOT / "app" / "ui" / folder).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Call) and _name_of(node.func) in SHOWING:
@@ -242,7 +242,7 @@ def _name_of(called: ast.expr) -> str:
 
 
 def _constants(given: ast.expr) -> Iterator[str]:
-    """The words of a text, of an f-string, and of both sides of a choice."""
+    """Return the text literals of an expression, including f-strings and both branches of a conditional."""
     if isinstance(given, ast.Constant) and isinstance(given.value, str):
         yield "".join(re.findall(r"[A-Za-z ]+", given.value)).strip()
     elif isinstance(given, ast.JoinedStr):

@@ -1,4 +1,4 @@
-"""Acting by hand in the window: the commands that lead there, the status bar, and Stop."""
+"""Test of sending by hand in the main window: menu commands, status bar and Stop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A banner lies in the free area of the bar that shows: it covers no tab, title or tool, it moves nothing."""
+"""Tests of the banner, which uses the free area of a bar without covering or moving other controls."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SMALL = (960, 600)
 
 
 class Mouse:
-    """Where the mouse is, and what time it is."""
+    """Fake mouse position and clock of the banner."""
 
     def __init__(self, window: MainWindow) -> None:
         self.window, self.now, self.at = window, 100.0, QPoint(0, 0)
@@ -31,7 +31,7 @@ class Mouse:
         self.window.tick()
 
     def under_it(self) -> QWidget | None:
-        """What a press would meet."""
+        """Return the widget under the mouse, or None."""
         return self.window.childAt(self.window.mapFromGlobal(self.at))
 
 
@@ -71,7 +71,7 @@ def place(window: MainWindow, widget: QWidget) -> QRect:
 
 
 def places(window: MainWindow) -> dict[QWidget, QRect]:
-    """Where everything is that can be pressed, but for the banner and what is drawn over the window."""
+    """Return the rectangle of each visible button and of the pages, except for the banner."""
     found = (*window.findChildren(QAbstractButton), window.pages)
     return {
         each: place(window, each)

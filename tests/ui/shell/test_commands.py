@@ -1,4 +1,4 @@
-"""The table of commands: whoever names a command names one that is there, and its argument is typed."""
+"""Tests of the command table: every referenced command exists, and command arguments are typed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 IDS = {command.id for command in COMMANDS}
 ABOUT = {command.id for command in ARGUMENT_COMMANDS}
 CALLS = {"run": 0, "_run": 0, "bind": 1, "assign_command": 1, "Fix": 1, "_raise_alert": 1}
-"""Calls that are given a command, and the place of it; `setProperty` is one with "command" before it."""
+"""Functions that take a command id, with its argument position; `setProperty` is handled separately."""
 KEYWORDS = {"action", "fix_action"}
 
 
@@ -39,7 +39,7 @@ Constants = dict[str, str]
 
 
 def said(node: ast.expr, constants: Constants) -> Iterator[str]:
-    """The commands that an expression may be; a hole is "{}"."""
+    """Return the possible command ids of an expression, with "{}" for each unknown part."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         yield node.value
     elif isinstance(node, ast.Name) and node.id in constants:
@@ -53,7 +53,7 @@ def said(node: ast.expr, constants: Constants) -> Iterator[str]:
 
 
 def named(path: Path) -> Iterator[tuple[str, int]]:
-    """What a module names as a command, and its line."""
+    """Return each command id that a module references and its line."""
     tree = ast.parse(path.read_text("utf-8"))
     constants = {
         target.id: node.value.value
@@ -79,14 +79,14 @@ def named(path: Path) -> Iterator[tuple[str, int]]:
 
 
 def modules() -> list[Path]:
-    """Everything of ours that can name a command; robots have actions of their own."""
+    """Return the modules that may reference commands; those of robots define actions instead."""
     root = Path(app.__file__).parent
     outside = {root / "robots", root / "blocks" / "runtime"}
     return [path for path in root.rglob("*.py") if not outside & set(path.parents)]
 
 
 def is_known(words: str) -> bool:
-    """Whether the table has it."""
+    """Return whether the command table contains an id or a pattern with "{}"."""
     id, colon, argument = words.partition(":")
     if id == "{}" and colon:  # the menu of a tab: its commands are looked at where they are listed
         return True
@@ -97,7 +97,7 @@ def is_known(words: str) -> bool:
 
 @cache
 def found() -> list[tuple[Path, str, int]]:
-    """Who names which command in which line; takes seconds."""
+    """All command references as (file, id, line); collecting takes seconds."""
     return [(path, words, line) for path in modules() for words, line in named(path)]
 
 

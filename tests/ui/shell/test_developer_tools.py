@@ -1,4 +1,4 @@
-"""The left end of the tool bar: freezing, the layout's name, the panels."""
+"""Tests of the left end of the toolbar: freeze button, layout menu and panel menu."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def tools(qtbot, window: MainWindow, commands: Commands) -> DeveloperTools:
 
 
 def live(window: MainWindow, name: str) -> QPushButton:
-    """Let a panel show something that it can hold."""
+    """Add a freeze button to a panel and return the button."""
     panel = window.benches["developer"].docks[name].panel
     panel.freeze = QPushButton(panel)
     panel.freeze.setCheckable(True)
@@ -60,7 +60,7 @@ def test_freeze_button_is_disabled_without_live_panels(tools, window) -> None:
 
 @pytest.fixture
 def dropped(monkeypatch: pytest.MonkeyPatch) -> list[tuple[QMenu, QWidget]]:
-    """The menus that were opened, each with the button that it is below."""
+    """Opened menus, each with the button below which it was opened."""
     seen: list[tuple[QMenu, QWidget]] = []
     monkeypatch.setattr(menus, "open_below", lambda menu, anchor: seen.append((menu, anchor)))
     return seen

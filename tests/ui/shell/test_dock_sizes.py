@@ -1,4 +1,4 @@
-"""Which panel grows with the window."""
+"""Tests of the distribution of extra window space to docks."""
 
 from __future__ import annotations
 

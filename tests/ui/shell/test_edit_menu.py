@@ -1,4 +1,4 @@
-"""Cut, copy, paste and select all in the Edit menu: in text fields, else with the blocks."""
+"""Tests of cut, copy, paste and select all in the Edit menu, for text fields and for blocks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 @pytest.fixture
 def field(qtbot, window: MainWindow, commands: Commands) -> QLineEdit:
-    """A field of the window that has the keyboard."""
+    """Focused text field in the window."""
     made = QLineEdit("hello", window)
     window.show()
     made.show()

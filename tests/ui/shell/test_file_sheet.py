@@ -1,4 +1,4 @@
-"""Our own file dialog: names, places, folders, what is taken, the keyboard, and Stop meanwhile."""
+"""Tests of Studio's own file dialog: names, places, folders, keyboard, and Stop while it is open."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Opening and saving: nothing is lost, so nothing asks."""
+"""Tests of opening and saving behaviours without losing work or asking for confirmation."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def document(window: MainWindow) -> Document:
 
 
 def saved(path: Path) -> Path:
-    """A behaviour file."""
+    """Write a behaviour file and return its path."""
     other = Document(_NoJournal)  # type: ignore[arg-type,return-value]
     other.workspace = BLOCKS
     other.save(path)

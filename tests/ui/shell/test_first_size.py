@@ -1,4 +1,4 @@
-"""The window of a first start fits the screen: Stop is at its right end."""
+"""Tests of the initial window size, which fits the screen so that Stop is visible."""
 
 from __future__ import annotations
 

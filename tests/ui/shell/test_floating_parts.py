@@ -1,4 +1,4 @@
-"""What lies over the window: toast, banner, focus ring, sheet."""
+"""Tests of overlays of the window: toast, banner, focus ring and sheet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The newest edit is taken over before the window closes; an editor that hangs does not keep it open."""
+"""Tests of flushing the newest edit before the window closes, also with an editor that hangs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BLOCKS = {"blocks": {"languageVersion": 0, "blocks": [{"type": "events_started",
 
 
 class Late:
-    """An editor that answers when it is told to."""
+    """Fake editor that flushes only when a test calls the stored callback."""
 
     def __init__(self) -> None:
         self.done: list[Callable[[], None]] = []
@@ -70,7 +70,7 @@ def test_closing_the_window_saves_the_latest_edit(qtbot, window: MainWindow, com
 def test_work_that_cannot_be_saved_is_reported_before_closing(
     qtbot, window: MainWindow, commands, home: Path
 ) -> None:
-    """As on a full disk: the window stays open once, and says why."""
+    """The journal folder is a file, so saving fails as on a full disk."""
     (home / "journal").parent.mkdir(parents=True, exist_ok=True)
     (home / "journal").write_text("no folder")
     shut: list[bool] = []

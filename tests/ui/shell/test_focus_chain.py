@@ -1,4 +1,4 @@
-"""Asking where the keyboard would go next changes nothing, also when the widget that was asked is deleted."""
+"""Tests that querying the focus chain has no side effects, even if the queried widget is deleted."""
 
 from __future__ import annotations
 

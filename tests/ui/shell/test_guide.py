@@ -1,4 +1,4 @@
-"""The guide and About: pages in each language, the keys of now, found by words; versions to copy."""
+"""Tests of the guide and the About page: languages, current shortcuts, search and versions to copy."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_translated_pages_use_the_translated_command_names(
 
 
 def named_pictures(page: str) -> list[tuple[str, str, str]]:
-    """Each picture of a page: its language, its name, the words for who can't see it."""
+    """Return the language, file name and alternative text of each image of a page."""
     return [
         (language, name, words)
         for language in LANGUAGES

@@ -1,4 +1,4 @@
-"""The ring round a button: where the button is, until it is pressed, and never in the mouse's way."""
+"""Tests of the hint ring, which surrounds a button until it is pressed and ignores mouse events."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A layout as a file: saved, opened by a question and by a drop; what it is not is said."""
+"""Tests of layout files: export, import by dialog or drop, and rejection of invalid files."""
 
 from __future__ import annotations
 

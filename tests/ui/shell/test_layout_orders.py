@@ -1,4 +1,4 @@
-"""Every order of layouts, panels and the keyboard's place: the window outlives them all."""
+"""Tests of switching layouts, panels and focus in every order without a crash."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STOPS = 3  # in each panel: its first one, and what a person reaches next
 
 
 class Layouts(QStackedWidget):
-    """The workbenches of all layouts, of which one shows, as in the window."""
+    """Stack of the workbenches of all layouts, as in the main window."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -40,7 +40,7 @@ class Layouts(QStackedWidget):
         self.resize(1440, 800)
 
     def switch(self, name: str) -> Workbench:
-        """Show a layout as the window does, until everything that was put off is done."""
+        """Show a layout as the main window does and process deferred events."""
         bench = self.benches[name]
         self.setCurrentWidget(bench)
         bench.focus_main_panel()
@@ -48,7 +48,7 @@ class Layouts(QStackedWidget):
         return bench
 
     def settle(self) -> None:
-        """Tabs are made anew, old ones are deleted, sizes are taken."""
+        """Process events and deferred deletions, and refresh all workbenches."""
         for _ in range(3):
             QCoreApplication.processEvents()
             QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
@@ -67,7 +67,7 @@ def layouts(qtbot) -> Layouts:
 
 
 def rest_of(bench: Workbench) -> list[str]:
-    """What failed in a workbench, in words; nothing when all of it stands."""
+    """Return the names of the failed docks of a workbench."""
     return [name for name, dock in bench.docks.items() if dock.failed]
 
 

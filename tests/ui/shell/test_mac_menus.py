@@ -1,4 +1,4 @@
-"""The menus as a Mac takes them: three commands have a place of their own there, and nothing else moves."""
+"""Tests of the menus on macOS: three commands move to the application menu, all others stay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The window: layouts, keyboard, banner, Stop, and what comes back at the next start."""
+"""Tests of the main window: layouts, keyboard, banner, Stop and the restored state."""
 
 from __future__ import annotations
 
@@ -334,7 +334,7 @@ def test_panels_in_the_same_dock_area_are_tabs_in_the_title_bar(
 
 
 def test_dock_tabs_and_tabs_of_a_panel_are_in_separate_rows(qtbot, window: MainWindow) -> None:
-    """Nobody takes the tab of a panel for one of a file, however narrow the window is."""
+    """In one row, a dock tab could be mistaken for the tab of a file."""
 
     class Own(PlainPanel):
         def title_widget(self) -> QWidget:

@@ -1,4 +1,4 @@
-"""The menus open by Alt and a letter, which is underlined while Alt is held."""
+"""Tests of the menu mnemonics, which are underlined while Alt is held."""
 
 from __future__ import annotations
 

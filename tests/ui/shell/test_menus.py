@@ -1,4 +1,4 @@
-"""Menus in the design's look, also those of fields."""
+"""Tests of themed menus, including the context menus of text fields."""
 
 from __future__ import annotations
 

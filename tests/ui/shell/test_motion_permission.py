@@ -1,4 +1,4 @@
-"""The question before a real robot moves: over the window, below every Stop, with "Not now" first."""
+"""Tests of the permission question before a real robot moves, which never covers Stop."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ROVER: Robot = replace(parse(thing_description(ROBOT.thing_model, "Rover")), vir
 
 
 class Window(QWidget):
-    """Stands for the main window: a field that has the focus, and the question over it."""
+    """Fake main window with a focused field and the permission question."""
 
     def __init__(self, folder) -> None:
         super().__init__()
@@ -145,7 +145,7 @@ LONG = [
 @pytest.mark.parametrize("size", [(1440, 900), (640, 480)])
 @pytest.mark.parametrize("percent", [100, 150])
 def test_long_robot_name_is_shown_in_full(qtbot, tmp_path, name, size, percent) -> None:
-    """Two robots may differ in their last letter only."""
+    """Names of two robots may differ only in their last letter."""
     window = Window(tmp_path)
     qtbot.addWidget(window)
     window.question._theme.set_text_percent(percent)

@@ -1,4 +1,4 @@
-"""The sheet that lets other computers connect, and what the status bar says."""
+"""Tests of the sheet that allows remote connections, and of its state in the status bar."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from nep.system.addresses import OwnAddress
 
 @pytest.fixture
 def make(qtbot, tmp_path):
-    """A sheet over a window, and its switch; what is asked is noted."""
+    """Factory of a network access sheet with its switch and the recorded listen requests."""
     made = []
 
     def make(address="127.0.0.1:7780", here=(("192.168.1.20", "wlan0"), ("10.8.0.2", "tun0"))):

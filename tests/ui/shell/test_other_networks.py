@@ -1,4 +1,4 @@
-"""The sheet in which a person chooses other networks, with what it says of each."""
+"""Tests of the sheet that selects other networks and shows their connection state."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Slow motion: chosen in the run bar or the Run menu, also while a program runs."""
+"""Tests of slow motion, selected in the run bar or the Run menu, also during a run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 
 class Runner:
-    """Stands for the runner of a program."""
+    """Fake runner that records the pace in seconds."""
 
     def __init__(self) -> None:
         self.paces: list[float] = []

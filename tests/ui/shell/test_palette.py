@@ -1,4 +1,4 @@
-"""The command palette: what it finds, in which order, what it does, and what stays alive under it."""
+"""Tests of the command palette: matching, ranking, execution and live panels below it."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_whole_words_rank_first_and_all_matches_of_ten_thousand_entries_are_coun
 
 
 def test_fuzzy_comparison_is_limited_among_ten_thousand_topics(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What makes it quick (4 ms): the costly comparison is made for the most promising alone."""
+    """Only the best candidates get the expensive comparison, which keeps a query below 4 ms."""
     finder = Finder(
         [Entry(f"topic:/robot{n}/joint/{n % 97}", f"/robot{n}/joint/{n % 97}") for n in range(10_000)]
     )
@@ -112,7 +112,7 @@ def test_fuzzy_comparison_is_limited_among_ten_thousand_topics(monkeypatch: pyte
 
 
 class Steady(Overlay):
-    """As large and where it was, whatever the size of text."""
+    """Overlay whose size and position do not depend on the text size."""
 
     top = 300
 
@@ -125,7 +125,7 @@ class Steady(Overlay):
 
 @pytest.fixture
 def palette(qtbot, window: MainWindow, commands: Commands) -> CommandPalette:
-    """The palette, open over the Developer layout."""
+    """Command palette, opened over the Developer layout."""
     window.theme.set_motion("on")
     window.show()
     window.activateWindow()
@@ -185,7 +185,7 @@ def test_stop_button_stays_undimmed_and_clickable_above_the_palette(
 def test_overlay_cutout_follows_the_stop_button_when_the_text_size_changes(
     qtbot, palette: CommandPalette, window: MainWindow, layout: str, percent: int
 ) -> None:
-    """Whatever opens over the window: one that keeps its place is not laid out again by itself."""
+    """An overlay of constant geometry gets no resize event that would update its cutout."""
     palette.dismiss()
     window.commands.run(f"layout.{layout}")
     window.theme.set_text_percent(150)

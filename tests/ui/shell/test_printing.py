@@ -1,4 +1,4 @@
-"""Printing: where there is no printer a PDF is offered, and a PDF goes to a printer page by page."""
+"""Tests of printing, with a PDF file as the fallback when there is no printer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.ui.shell_parts import Answers
 
 
 class Editor:
-    """Has these pages."""
+    """Fake block editor that renders the given PDF."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data

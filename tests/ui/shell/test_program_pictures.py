@@ -1,4 +1,4 @@
-"""Pictures of the blocks are written under the name that was chosen, or it is said why they are not."""
+"""Tests of exporting an image of the blocks to a file or the clipboard, with errors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.ui.shell_parts import Answers
 
 
 class Editor:
-    """Has one picture."""
+    """Fake block editor that renders the given image."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data

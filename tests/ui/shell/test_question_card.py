@@ -1,4 +1,4 @@
-"""The card with the question of a running behaviour: keyboard, Enter, Esc, pause; it covers no Stop."""
+"""Tests of the card with a question of the running behaviour: keyboard, pause and position beside Stop."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ AGE = AskedQuestion(1, 2, "How old are you?")
 
 @pytest.fixture
 def card(qtbot, window: MainWindow) -> QuestionCard:
-    """The card of a window that shows; what is answered is in ``said``."""
+    """Question card of a visible, active window."""
     window.show()
     qtbot.waitExposed(window)
     window.activateWindow()
@@ -102,7 +102,7 @@ def test_card_stays_inside_the_window_and_does_not_cover_stop(card, window, word
 
 
 class Answered:
-    """Stands for a runner."""
+    """Fake runner that records answers to questions."""
 
     def __init__(self, run: int) -> None:
         self.run = run

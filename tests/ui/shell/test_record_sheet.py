@@ -1,4 +1,4 @@
-"""Recording in the window: Ctrl+R, F9, the buttons of the tool bar, the status bar, and the sheet."""
+"""Tests of recording in the main window: shortcuts, toolbar, status bar and recording sheet."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|
 
 
 class Recorder:
-    """Stands for the recorder's process: writes orders down, and tells what a test says."""
+    """Fake recorder process that records orders and sends the reports given by a test."""
 
     def __init__(self, session: Session) -> None:
         self.line, self.session = OrdersOnly(), session

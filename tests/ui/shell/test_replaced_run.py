@@ -1,4 +1,4 @@
-"""Run in another tab stops what runs, and says so."""
+"""Tests that starting a behaviour in another tab stops the running one and reports it."""
 
 from __future__ import annotations
 

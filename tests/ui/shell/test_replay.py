@@ -1,4 +1,4 @@
-"""A recording in the real window: its panels show what was said then, and live goes on beside it."""
+"""Tests of a recording in the main window: panels show recorded messages while live reception continues."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidg
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory) -> Path:
-    """/a 10 ms apart, every tenth a picture."""
+    """Recording of messages on /a, 10 ms apart, where every tenth message is an image."""
     path = tmp_path_factory.mktemp("recordings") / "Tour.mcap"
     messages = [picture(seq) if seq % 10 == 5 else json_message(seq, "/a") for seq in range(COUNT)]
     record(path, [messages[:30], messages[30:60], messages[60:]])
@@ -57,7 +57,7 @@ def window(qtbot, theme: Theme, session: Session, answers: Answers) -> Iterator[
 
 
 def until(qtbot, window: MainWindow, true: Callable[[], object]) -> None:
-    """Tick as the timer does until something is so."""
+    """Tick the window until a condition holds."""
 
     def tick() -> bool:
         window.tick()
@@ -67,7 +67,7 @@ def until(qtbot, window: MainWindow, true: Callable[[], object]) -> None:
 
 
 def opened(qtbot, window: MainWindow, path: Path) -> Replay:
-    """The recording is open, and its first message is there."""
+    """Open the recording, wait until it is loaded and return the replay."""
     window.commands.run(f"recording.open:{path}")
     replay = window.session.replay
     assert replay is not None
@@ -87,7 +87,7 @@ def go_to(qtbot, window: MainWindow, at_ns: int) -> None:
 
 
 def live(session: Session, seq: int) -> Message:
-    """A message of today on the topic that the recording has, too."""
+    """Post a live message on /a, a topic that the recording has too, and return it."""
     message = json_message(seq, "/a")
     session._mailbox.post("/a", [message])
     return message

@@ -1,4 +1,4 @@
-"""Runs, alarms and bookmarks in the time line of the real window: seen, pressed, renamed, deleted."""
+"""Tests of runs, alarms and bookmarks in the timeline: clicks, renaming and deletion."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def run(name: str, since: int, until: int, result: str, words: str = "") -> dict
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory) -> Path:
-    """A second of /odom with a note, two runs, and an alarm of the topic."""
+    """Recording of one second of /odom with a note, two runs and an alarm for the topic."""
     path = tmp_path_factory.mktemp("recordings") / "Tour.mcap"
     alarm = {
         "id": "a", "name": "/odom has been silent", "since_ns": at(60), "until_ns": at(70),
@@ -77,7 +77,7 @@ def window(qtbot, theme: Theme, session: Session, answers: Answers) -> Iterator[
 
 
 def until(qtbot, window: MainWindow, true: Callable[[], object]) -> None:
-    """Tick as the timer does until something is so."""
+    """Tick the window until a condition holds."""
 
     def tick() -> bool:
         window.tick()
@@ -87,7 +87,7 @@ def until(qtbot, window: MainWindow, true: Callable[[], object]) -> None:
 
 
 class Shown:
-    """A recording that is open in the window, with all that there is in its time line."""
+    """Recording opened in the main window with its complete timeline."""
 
     def __init__(self, qtbot, window: MainWindow, path: Path) -> None:
         self.qtbot, self.window = qtbot, window
@@ -104,7 +104,7 @@ class Shown:
         until(self.qtbot, self.window, true)
 
     def place(self, words: str) -> QPoint:
-        """Where to press what has these words."""
+        """Return a clickable position on the mark whose text contains the words."""
 
         def found() -> list[LaneMark]:
             self.canvas.grab()
@@ -143,7 +143,7 @@ def test_click_seeks_to_a_run_or_alarm_and_both_are_marked(shown):
     canvas = shown.canvas
 
     def colours(step: int, middle: float) -> list[str]:
-        """A column of pixels of what is painted at a time, 10 px up and down."""
+        """Return the colours of the pixel column at a time step, from 10 px above to 10 px below."""
         seen, ratio = canvas.viewport().grab().toImage(), canvas.devicePixelRatioF()
         x = round(canvas.x_of(at(step)) * ratio)
         return [seen.pixelColor(x, round((middle + offset) * ratio)).name() for offset in range(-10, 11)]

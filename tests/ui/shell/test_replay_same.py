@@ -1,4 +1,4 @@
-"""What panels hold of a recording is what they held live, message after message, byte for byte."""
+"""Test that a replay gives panels the same bytes as the live messages."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ VALUES = (
 
 
 def messages() -> list[Message]:
-    """Of every kind that a panel shows, with the extremes of numbers and letters."""
+    """Return messages of every displayed kind, with extreme numbers and characters."""
     chance, made = random.Random(20), []
 
     def add(topic: str, data: bytes, codec: str, msg_type: str = "") -> None:
@@ -104,7 +104,7 @@ def view() -> GraphView:
 
 
 class Studio:
-    """The window with its real panels: Topics, Inspector, Image, Plot and Console."""
+    """Main window with the real Topics, Inspector, Image, Plot and Console panels."""
 
     def __init__(self, qtbot, theme: Theme, home: Path) -> None:
         self.qtbot = qtbot
@@ -153,7 +153,7 @@ class Studio:
         self.qtbot.waitUntil(tick, timeout=60_000)
 
     def holds(self, came: list[Message]) -> dict[str, object]:
-        """All that the panels hold, once they have taken in what came."""
+        """Wait until the panels have processed the messages and return the panels' contents."""
         held: dict[str, object] = {}
         newest = {message.topic: message for message in came}
         inspector = self.panel("inspector", InspectorPanel)
@@ -196,7 +196,7 @@ class Studio:
 
 
 def rows(model, parent: QModelIndex) -> list[object]:
-    """What every row says, with the rows below it."""
+    """Return the texts of all rows with their child rows."""
     found = []
     for row in range(model.rowCount(parent)):
         index = model.index(row, 0, parent)

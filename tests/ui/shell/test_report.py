@@ -1,4 +1,4 @@
-"""The sheet of a report: what it says, what it writes, what becomes of it; and the page of new versions."""
+"""Tests of the report sheet (contents, saving, result) and of the link to new versions."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SECRET = {"blocks": {"blocks": [{"type": "events_started", "id": "of-mine"}]}}
 
 
 class Opened:
-    """What was given to the system to be shown."""
+    """Fake of `QDesktopServices.openUrl` that records URLs."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.urls: list[str] = []
@@ -51,7 +51,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> Opened:
 
 @pytest.fixture
 def session(session: Session, monkeypatch: pytest.MonkeyPatch) -> Session:
-    """Session whose doctor has run and found nothing."""
+    """Session whose doctor does not run and has no findings."""
     monkeypatch.setattr(session.doctor, "start", lambda: None)
     return session
 

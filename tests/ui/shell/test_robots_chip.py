@@ -1,4 +1,4 @@
-"""What the app bar's chip says of the robots."""
+"""Tests of the robots chip in the app bar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The six states of Run and Stop, large and compact, in the words of picture 10."""
+"""Tests of the six states of Run and Stop, large and compact, as in design image 10."""
 
 from __future__ import annotations
 

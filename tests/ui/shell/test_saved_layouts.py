@@ -1,4 +1,4 @@
-"""Layouts are kept as they were left, have names of their own, and survive damaged settings."""
+"""Tests of saved layouts: names, restoring after a restart and damaged settings."""
 
 from __future__ import annotations
 

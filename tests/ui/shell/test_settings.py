@@ -1,4 +1,4 @@
-"""The settings: each choice applies at once and is there again at the next start."""
+"""Tests that each setting applies immediately and is restored at the next start."""
 
 from __future__ import annotations
 
@@ -185,7 +185,7 @@ def test_settings_show_whether_the_robot_voice_is_available(
         is_busy = False
 
         def stop(self) -> None:
-            """Nobody speaks."""
+            """Do nothing, as there is no voice to stop."""
 
     assert sheet.voice.text()
     sheet.dismiss()

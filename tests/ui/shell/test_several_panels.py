@@ -1,4 +1,4 @@
-"""Several panels of a kind side by side, each with its own topic, now and at the next start."""
+"""Tests of several panels of one kind, each with its own topic, also after a restart."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MORE = "Open another panel to the side"
 
 
 class TopicPanel(PlainPanel):
-    """Shows a topic in its title, as an inspector does, and keeps it."""
+    """Panel that shows a topic in its title and saves it in its state, like the inspector."""
 
     def show_topic(self, name: str) -> None:
         self.set_title(self._title, name)

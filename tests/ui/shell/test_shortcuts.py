@@ -1,4 +1,4 @@
-"""Shortcuts: one table, each key changeable, Stop's F12 never."""
+"""Tests of the keyboard shortcuts: defaults, customisation, and F12 for Stop, which cannot be changed."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_ctrl_y_triggers_redo(window: MainWindow, commands: Commands, keys: Shor
 
 
 def test_macos_shortcuts_avoid_system_keys_and_option_characters(qapp: object, tmp_path: Path) -> None:
-    """Ctrl is Cmd there, Meta the key that says Ctrl; Option types signs, Cmd+Tab changes the program."""
+    """On macOS, Qt maps Ctrl to Cmd and Meta to Ctrl; Option types characters, Cmd+Tab switches programs."""
     keys = Shortcuts(Settings(tmp_path), lambda _sentence: None, COMMANDS, platform="darwin")
     given = [key for row in COMMANDS for key in keys.keys_of(row.id)]
     assert sorted(given) == sorted(set(given))

@@ -1,4 +1,4 @@
-"""The window at every size, with every size of text: nothing is cut, nothing overlaps, Stop is whole."""
+"""Tests of the window at many window and text sizes: no clipping or overlap, and Stop fully visible."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidg
 
 @pytest.fixture
 def window(qtbot, theme: Theme) -> Iterator[MainWindow]:
-    """The window with its real panels, a robot and everything that it tells."""
+    """Main window with the real panels, a robot and sample data."""
     panels = {**PanelRegistry(), "behaviour": BLOCKS}
     examples = read_examples(resources.folder() / "examples")
     made = MainWindow(Session.full(), theme, panels, examples, dialogs=Answers())
@@ -60,7 +60,7 @@ def window(qtbot, theme: Theme) -> Iterator[MainWindow]:
 
 
 def settle(qtbot, window: MainWindow) -> None:
-    """Let layouts come to rest and panels show what is new: what one turn lays out, the next may fit anew."""
+    """Tick the window until its layout is stable; a layout pass can require another one."""
     rests, before = 0, places(window)
     while rests < RESTS:
         qtbot.wait(SETTLE_MS)
@@ -72,7 +72,7 @@ def settle(qtbot, window: MainWindow) -> None:
 
 
 def places(window: MainWindow) -> list[tuple[int, QRect]]:
-    """Where everything is that can be seen."""
+    """Return the id and geometry of each visible widget."""
     return [(id(each), each.geometry()) for each in window.findChildren(QWidget) if each.isVisible()]
 
 
@@ -81,7 +81,7 @@ def place(widget: QWidget) -> QRect:
 
 
 def stops(window: MainWindow) -> Iterator[str]:
-    """What is wrong with the Stops that can be seen, and that there is none."""
+    """Return the problems of the visible Stop buttons: missing, too small or partly outside the window."""
     seen = [stop for stop in window.findChildren(StopButton) if stop.isVisible()]
     if not any(stop.window() is window for stop in seen):
         yield "no Stop"
@@ -93,7 +93,7 @@ def stops(window: MainWindow) -> Iterator[str]:
 
 
 def overlaps(window: MainWindow) -> Iterator[str]:
-    """What lies on each other in a bar, in a title, and among the docks."""
+    """Return overlapping widgets in bars and titles, and overlapping docks."""
     bars = [
         bar for kind in (AppBar, RunBar, ToolBar, StatusBar, DockTitle) for bar in window.findChildren(kind)
     ]
@@ -148,7 +148,7 @@ FOLDING = {"robot", "camera", "sensors", "problems", "variables"}
 
 
 def tabs_of(bench: Workbench, name: str) -> set[str]:
-    """The panels of `FOLDING` that are tabs of this one."""
+    """Return the panels of `FOLDING` that are tabified with a panel."""
     there = {
         dock.description.name
         for dock in bench.tabifiedDockWidgets(bench.docks[name])

@@ -1,4 +1,4 @@
-"""The start page: what it offers, and that nothing stands there which is not there."""
+"""Tests of the start page: cards, examples and open work."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_start_page_has_exactly_one_primary_button(page: StartPage) -> None:
 
 
 def cards(page: StartPage) -> list[StartCard]:
-    """The large cards from left to right."""
+    """Return the start cards from left to right."""
     return sorted(page.findChildren(StartCard), key=lambda card: (card.y(), card.x()))
 
 

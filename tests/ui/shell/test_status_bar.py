@@ -1,4 +1,4 @@
-"""The status bar says what is true with its number, and nothing that is not known."""
+"""Tests of the status bar, which shows known values only."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stop works with everything open: nothing is modal, and Stop's keys reach it before anything else."""
+"""Tests that Stop works with any sheet, menu or drag: no widget is modal, and its keys have priority."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ KEYS = [
 
 @pytest.fixture
 def stops(qtbot, window: MainWindow, commands: Commands) -> Iterator[list[str]]:
-    """How often Stop was done; the window shows the Developer layout and has the keyboard."""
+    """One entry per execution of Stop, in an active window with the Developer layout."""
     done: list[str] = []
     commands.actions["run.stop"].triggered.connect(lambda: done.append("stop"))
     window.theme.set_motion("on")
@@ -139,7 +139,7 @@ def test_stop_works_with_any_sheet_or_menu_open(
 
 @pytest.fixture
 def presses(window: MainWindow, stops: list[str]) -> list[str]:
-    """How often the button was clicked."""
+    """One entry per click on the Stop button of the toolbar."""
     done: list[str] = []
     window.tool_bar.stop.clicked.connect(lambda: done.append("stop"))
     return done
@@ -198,7 +198,7 @@ def test_no_widget_in_the_window_is_modal() -> None:
 def test_stop_works_during_drag_and_drop_of_a_field(
     qtbot, window: MainWindow, commands: Commands, stops: list[str], monkeypatch, key
 ) -> None:
-    """Qt's loop of a drag stands still until it is cancelled; what it does with keys is its own."""
+    """`QDrag.exec` is faked: its event loop blocks until cancelled and handles keys itself."""
     ended: list[str] = []
 
     def drag(_drag: QDrag, _action: Qt.DropAction) -> None:

@@ -1,4 +1,4 @@
-"""New, renamed, deleted and found variables: which names can't be, and what the editor is told."""
+"""Tests of the commands to create, rename, delete, find and set variables."""
 
 from __future__ import annotations
 

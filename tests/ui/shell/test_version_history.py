@@ -1,4 +1,4 @@
-"""The list of earlier versions: what it says of each, and that opening one writes over nothing."""
+"""Tests of the list of earlier versions, which open as copies and overwrite no file."""
 
 from __future__ import annotations
 

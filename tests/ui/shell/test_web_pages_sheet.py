@@ -1,4 +1,4 @@
-"""The sheet "Web pages and tablets": its switches, settings, connected pages and refusals."""
+"""Tests of the sheet "Web pages and tablets": switches, settings, connected pages and rejections."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ BUTTONS = PageTopic("/buttons", True, rate_hz=0.1, bytes_per_s=6.0)
 
 
 class Desk:
-    """The sheet over a window, with fake servers; `said` are the toasts and their buttons."""
+    """Sheet over a window with fake servers; `said` lists toasts with their button functions."""
 
     def __init__(self, qtbot, theme: Theme, web: WebPages, events: queue.Queue) -> None:
         self.web, self.events = web, events

@@ -1,4 +1,4 @@
-"""The window in the pseudo-language: each word is a translated one, and longer words have their room."""
+"""Tests of the translation of the window in the pseudo-language, which also has longer texts."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ DATA = (
     *(title for title, _accepts in NAMES.values()),
     "Greeting", "Mine", "Rover", "Turtle", "topic list", "NEP_MASTER", "wlan0", "tun0", "lo",
 )  # fmt: skip
-"""What comes from elsewhere: plain panels, which nobody translates, files and robots."""
+"""Untranslated texts: titles of plain panels, files, examples and robots."""
 KEYS = ("Delete", "PgUp", "PgDown")
 ANSWERED, SILENT = RobotStop("Rover", True, 41.4), RobotStop("Turtle", False, None)
 RUNS = (
@@ -76,7 +76,7 @@ RUNS = (
     RunState("unanswered", "Greeting", report=StopReport((ANSWERED, SILENT), 41.4)),
 )
 OF_QT = ("#qt_dockwidget_", "#ScrollLeftButton", "#ScrollRightButton")
-"""Buttons that Qt makes itself, with its own words: in a title that we replace, at the ends of tabs."""
+"""Buttons created and labelled by Qt: in dock titles, which Studio replaces, and for tab scrolling."""
 OVER = (
     "palette.open",
     "help.shortcuts",
@@ -89,14 +89,14 @@ OVER = (
 
 
 def views() -> Iterator[RunView]:
-    """Every state of Run and Stop, also of a behaviour whose tab does not show."""
+    """Return every state of Run and Stop, also for a behaviour in a background tab."""
     for run in RUNS:
         for elsewhere in (False, True):
             yield view_of(run, ["Rover", "Turtle"], 3.0, elsewhere=elsewhere)
 
 
 def said_by(root: QWidget) -> Iterator[tuple[str, str]]:
-    """(where, words) of all that a widget, its lists and the facts of its status bar say."""
+    """Return pairs of location and text for a widget, its lists and its status items."""
     for place, text in texts_of(root):
         if not any(name in place for name in OF_QT):
             yield place, text
@@ -113,7 +113,7 @@ def said_by(root: QWidget) -> Iterator[tuple[str, str]]:
 
 
 def forgotten(root: QWidget, *data: str) -> list[str]:
-    """What of it is in no language but English."""
+    """Return the untranslated texts of a widget with their locations."""
     return [f"{place}: {text}" for place, text in said_by(root) if untranslated(text, *DATA, *KEYS, *data)]
 
 
@@ -137,7 +137,7 @@ def language(request: pytest.FixtureRequest) -> Iterator[str]:
 
 @pytest.fixture
 def whole(qtbot, language: str, session: Session, theme: Theme, tmp_path: Path) -> Iterator[MainWindow]:
-    """The window with an example of everything that it can show around the panels."""
+    """Main window with sample content for everything except the panels."""
     session.settings.add_recent(saved(tmp_path / "Mine.nepb"))
     window = MainWindow(session, theme, PANELS, EXAMPLES, dialogs=Answers())
     qtbot.addWidget(window)
@@ -151,7 +151,7 @@ Look = Callable[[str, QWidget], None]
 
 
 def everything(qtbot, window: MainWindow, look: Look) -> None:
-    """Show each bar, page and sheet, and look at it."""
+    """Show each bar, page and sheet, and pass each to ``look``."""
     commands = window.commands
     window.tick()
     look("start page", window)

@@ -1,4 +1,4 @@
-"""What a start tells: crashes, and what a newer Studio keeps here; and how it is asked to end."""
+"""Tests of the alerts at startup (crashes, data of a newer Studio) and of termination signals."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 
 class Run:
-    """A run of Studio whose predecessors crashed so."""
+    """Fake run of Studio with the given crashes of earlier runs."""
 
     def __init__(self, *left: Crash) -> None:
         self._left = list(left)

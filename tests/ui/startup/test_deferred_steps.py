@@ -1,4 +1,4 @@
-"""What is done after the first paint: in order, one step in a turn, and without a paint a little later."""
+"""Tests of the startup steps after the first paint: one per event loop pass, in order, or after a timeout."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_deferred_steps_do_not_run_before_the_first_paint(qtbot: QtBot) -> None:
 
 
 class Ear(QObject):
-    """Hears events that were posted to it, as a click is."""
+    """Object that records events posted to it, in place of a click."""
 
     def __init__(self, heard: list[str]) -> None:
         super().__init__()
@@ -105,7 +105,7 @@ def test_deferred_steps_import_every_panel() -> None:
 
 
 def test_window_is_built_without_importing_panels_editor_and_heavy_packages(tmp_path: Path) -> None:
-    """What the first paint needs: a line more here is time that every start takes."""
+    """Every import before the first paint delays each start."""
     late = ["PySide6.QtWebEngineCore", "PySide6.QtNetwork", "cv2", "numpy", "psutil", "nep.programs.doctor"]
     late += ["pyqtgraph", "app.ui.blockly.view", "app.ui.panels.console.panel", "importlib.metadata"]
     program = (

@@ -1,4 +1,4 @@
-"""The entries of ``python -m app``: the window, behaviours without one, children of a frozen build."""
+"""Tests of the entry points of ``python -m app``: window, headless run, child processes of a frozen build."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An error in what Qt calls ends nothing: it is told once a call, and Qt gets an answer."""
+"""Tests of exceptions in Qt overrides: each is logged once per call, and Qt gets a neutral result."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def fail(request: pytest.FixtureRequest) -> Callable[[], object]:
 
 @pytest.fixture
 def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What was told, by its type."""
+    """Names of the exception types passed to `sys.excepthook`."""
     found: list[str] = []
     monkeypatch.setattr("sys.excepthook", lambda kind, _error, _trace: found.append(kind.__name__))
     return found
@@ -117,7 +117,7 @@ def test_exception_in_a_method_that_is_no_qt_override_propagates(qapp) -> None:
 
 
 def test_every_qt_override_is_guarded() -> None:
-    """A name with a capital inside is Qt's: guarded, or known to need no guard."""
+    """A camelCase name is a Qt override: it must be guarded or known to need no guard."""
     # Qt does not call them (pyqtgraph does, where it paints), or a table of Qt has them (a protocol).
     ours = {"setText", "installEventFilter", "insertWidget", "pictureOfCarried", "columnWidth"}
     ours |= {"tickSpacing", "tickStrings"}

@@ -1,4 +1,4 @@
-"""Where there is no graphics processor, Qt draws by itself."""
+"""Tests of the selection of software rendering on computers without a GPU."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files dropped on the window, and opened by the system."""
+"""Tests of files dropped on the window or opened by the operating system."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def mime(*urls: str) -> QMimeData:
 
 
 def drop(window: QWidget, data: QMimeData) -> bool:
-    """Drag something over the window and let it go; whether it would have been taken."""
+    """Drag data over the window and drop it if accepted; return whether it was accepted."""
     over = QDragEnterEvent(QPoint(5, 5), COPY, data, LEFT, NONE)
     over.ignore()
     QApplication.sendEvent(window, over)
@@ -87,7 +87,7 @@ sys.exit(0)
 
 
 def test_file_open_events_are_received_before_and_after_the_web_engine_is_loaded() -> None:
-    """What macOS does, which tells the application; a filter of all events ended Studio (SIGSEGV) there."""
+    """macOS sends them to the application, where an event filter for all objects crashed Studio (SIGSEGV)."""
     environ = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"

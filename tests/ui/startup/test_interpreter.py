@@ -1,6 +1,6 @@
-"""Python's settings: a busy thread lets the window have its turn, and standing garbage is put aside.
+"""Tests of the interpreter settings: a short switch interval and frozen long-lived objects.
 
-What comes later is still collected.
+Objects created later are still collected.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def test_long_lived_objects_are_frozen_and_later_garbage_is_collected() -> None:
 
 
 class Deleted:
-    """Where things of Qt's that stood in circles were deleted."""
+    """Record of the thread ids in which Qt objects of reference cycles were deleted."""
 
     def __init__(self) -> None:
         self.by: list[int] = []

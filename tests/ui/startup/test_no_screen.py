@@ -1,4 +1,4 @@
-"""Where no window can open, Studio says why and what to do; it does not die without a word."""
+"""Tests of the error message of Studio when no window can open."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The desktop's file dialogs: only where its portal answers, and nothing is asked where there is no bus."""
+"""Tests of the desktop portal's file dialogs, used only where the portal responds."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ print(before.stdout.strip(), after.stdout.strip(), before.stderr, after.stderr)
 
 
 def chosen(environ: dict[str, str], platform: str, *, answers: bool = True) -> tuple[str, int]:
-    """The theme that is chosen, and how often the bus was asked."""
+    """Return the selected platform theme and the number of portal queries."""
     asked = []
 
     def answer() -> bool:

@@ -1,4 +1,4 @@
-"""What Qt and Chromium say on a machine without a graphics card, and what must be heard."""
+"""Tests of the log: irrelevant messages of Qt and Chromium are dropped, all others are kept."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_log_records_are_buffered_until_drained_by_the_console() -> None:
 
 
 class Stuck(io.StringIO):
-    """A terminal that takes nothing until somebody presses Ctrl+Q."""
+    """Stream that blocks in `write` until released, like a terminal stopped by Ctrl+S."""
 
     def __init__(self):
         super().__init__()

@@ -1,4 +1,4 @@
-"""The block editor's browser where the system forbids name spaces: found out before it would end Studio."""
+"""Tests of the browser sandbox on systems that restrict namespaces, where it would crash Studio."""
 
 from __future__ import annotations
 
@@ -44,11 +44,14 @@ def told(*of):
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 print(told(), told(UNSHARE, 0x10000000, 13), told(UNSHARE, 0x20000000, 1), told(CHROOT, 0, 1))
 """
-"""Whether it is allowed: unguarded; no user's name space; none beside it; nowhere to be shut in."""
+"""Program that prints whether the sandbox is allowed under each of four restrictions.
+
+These are: none, no user namespaces, no other namespaces within one, no chroot.
+"""
 
 
 class Told(SandboxTrial):
-    """A trial whose outcome is known."""
+    """Sandbox trial with a given result."""
 
     def __init__(self, outcome: bool) -> None:
         self._outcome = outcome

@@ -1,4 +1,4 @@
-"""A second start hands its files to the window that runs."""
+"""Tests of the single instance: a second start passes its files to the running window."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ sys.exit(0 if send_request(sys.argv[1], StartRequest(files)) else 3)
 
 
 def meet(name: str, do: Callable[[StartRequest], object]) -> SingleInstanceServer:
-    """As Studio makes it: Qt owns it. One that only its connections keep goes in the midst of their end."""
+    """Return a server with a Qt parent, as in Studio; without one it could be deleted while disconnecting."""
     return SingleInstanceServer(name, do, QApplication.instance())
 
 
@@ -174,7 +174,7 @@ def test_socket_is_accessible_to_the_same_user_only(qtbot, name: str) -> None:
 
 @pytest.fixture
 def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """The user's runtime folder, as a login makes it: with a short name, for a socket's name is short."""
+    """Runtime folder of the user, with a short name because the length of socket names is limited."""
     with tempfile.TemporaryDirectory(prefix="run") as made:
         monkeypatch.setenv("XDG_RUNTIME_DIR", made)
         monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
@@ -216,7 +216,7 @@ def test_runtime_folder_accessible_to_others_is_not_used(
 def test_without_a_private_folder_studio_starts_without_a_socket(
     runtime: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A stranger has made the folders before us."""
+    """The folders belong to another user."""
     monkeypatch.setattr(os, "geteuid", lambda: 4242)
     assert socket_name(tmp_path) == ""
     assert send_request("", StartRequest()) is False
@@ -285,7 +285,7 @@ def test_start_request_is_parsed_or_rejected() -> None:
 def test_closing_the_window_during_a_later_start_raises_no_error(
     qtbot, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Qt deletes the connection with the window, and says then that it is disconnected."""
+    """Qt deletes the connection with the window and emits `disconnected` during the deletion."""
     raised: list[BaseException] = []
     monkeypatch.setattr(sys, "excepthook", lambda _kind, error, _trace: raised.append(error))
     window = QObject()

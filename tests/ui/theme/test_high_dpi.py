@@ -1,4 +1,4 @@
-"""The window on screens of 1.25 and 1.5: Qt takes its scale once, so each has a process of its own."""
+"""Test of the window at scale factors 1.25 and 1.5, each in its own process as Qt reads the factor once."""
 
 from __future__ import annotations
 

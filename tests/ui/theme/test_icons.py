@@ -1,4 +1,4 @@
-"""Icons: one file for all themes, sharp at every ratio, and every name that the design uses is shipped."""
+"""Tests of icons: theme colours, device pixel ratio, and completeness of the shipped set."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 
 def inks(image: QImage) -> set[str]:
-    """The colours of all pixels that are fully painted."""
+    """Return the colours of all opaque pixels."""
     colours = set()
     for y in range(image.height()):
         for x in range(image.width()):
@@ -80,7 +80,7 @@ def test_unknown_icon_is_logged_and_replaced_by_a_fallback(qapp, caplog, name: s
 
 
 def test_every_icon_used_in_the_code_is_shipped() -> None:
-    """Words in the code that stand where icons stand: what a person mistyped is found here."""
+    """Icon names are found by a regular expression over the source."""
     before = r'(?:paint_icon(?:_again)?\([^"\n]*|\bicon\(|icon=|Button\(theme, "[^"]*", )'
     given = re.compile(before + r'"([a-z0-9-]+)"')
     root = Path(icons.__file__).parents[2]

@@ -1,4 +1,4 @@
-"""Text of 100 to 200 per cent, and words a third longer than ours: nothing is cut off anywhere."""
+"""Tests that no text is clipped at sizes from 100 to 200 % and with texts that are a third longer."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _text_as_before(qapp) -> Iterator[None]:
 
 
 def settle(qtbot, root, *, longer: bool) -> None:
-    """Let layouts come to rest, with longer words if those are wanted."""
+    """Wait until the layouts are stable, with longer texts on request."""
     if longer:
         lengthen(root)
     for _ in range(2):
@@ -134,7 +134,7 @@ def test_action_card_can_be_used_without_horizontal_scrolling_at_every_text_size
 
 @pytest.fixture
 def whole(qtbot, session: Session, theme: Theme, tmp_path: Path) -> Iterator[tuple[MainWindow, Commands]]:
-    """The window with an example of everything that it can show around the panels."""
+    """Main window with sample content for everything except the panels, and its commands."""
     file = tmp_path / "Story with emotions.nepb"
     file.write_text("{}", "utf-8")
     session.settings.add_recent(file)

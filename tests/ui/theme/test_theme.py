@@ -1,4 +1,4 @@
-"""The theme: every value comes from the tokens; a change of mode repaints at once."""
+"""Tests of the theme: values from the design tokens and an immediate repaint when the mode changes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ UI = Path(__file__).parents[3] / "app" / "ui"
 
 
 class Hints(QObject):
-    """A system whose colours can be changed."""
+    """Fake style hints with a settable colour scheme."""
 
     colorSchemeChanged = Signal()  # noqa: N815
 

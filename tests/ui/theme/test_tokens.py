@@ -1,4 +1,4 @@
-"""The design tokens hold what the design promises: contrast, edges, colours that everybody tells apart."""
+"""Tests of the design tokens: contrast, edges and colours distinguishable with colour vision deficiencies."""
 
 from __future__ import annotations
 

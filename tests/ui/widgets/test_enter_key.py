@@ -1,4 +1,4 @@
-"""Enter on a button: once for each press, and only when nothing but the button is meant."""
+"""Tests of the Enter key on buttons: one click per key press, no effect on other widgets."""
 
 from __future__ import annotations
 

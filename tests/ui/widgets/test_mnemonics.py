@@ -1,4 +1,4 @@
-"""The letters that choose entries of menus, in every language."""
+"""Tests of the mnemonics of menu entries in every language."""
 
 from __future__ import annotations
 

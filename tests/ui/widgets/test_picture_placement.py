@@ -1,4 +1,4 @@
-"""Zoom, move, turn and flip: what is at which point of the view."""
+"""Tests of the placement of an image in a view: zoom, pan, rotation and flip."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ def test_visible_rows_are_updated_with_a_single_signal(qapp, view, model) -> Non
 
 
 class Brush(QObject):
-    """Notes where a view is painted again."""
+    """Event filter that records the repainted region of a view."""
 
     def __init__(self, view: TableView[Row]) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The painted widgets: what they show, and how they are used without a mouse."""
+"""Tests of the custom-painted widgets: appearance and keyboard control."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 
 def colours(widget: QWidget) -> set[str]:
-    """The colours that are really painted."""
+    """Return the colours of all pixels of a widget."""
     image = widget.grab().toImage()
     return {image.pixelColor(x, y).name() for x in range(image.width()) for y in range(image.height())}
 
@@ -219,7 +219,7 @@ def test_sparkline_paints_a_stroke(qtbot, theme: Theme) -> None:
 
 
 def stroke(values: list[float]) -> list[int]:
-    """In which rows of 16 a sparkline of this has ink."""
+    """Return the rows (0 to 15) in which a sparkline of the values has dark pixels."""
     image = QImage(56, 16, QImage.Format.Format_RGB32)
     image.fill(Qt.GlobalColor.white)
     painter = QPainter(image)

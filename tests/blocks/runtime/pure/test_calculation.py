@@ -13,7 +13,7 @@ LARGE = 2**64 - 1
 
 
 def worked_out(name: str, *values: object) -> object:
-    """What the function gives, or the sentence that appears on its block."""
+    """Return the function's result, or the error message that is shown on its block."""
     try:
         return getattr(calculation, name)(*values)
     except (BehaviourError, ArithmeticError) as error:

@@ -1,4 +1,4 @@
-"""Lists: what their blocks do, and what they say when they can't."""
+"""Tests of the list blocks and their error messages."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ operations = st.lists(
 @settings(max_examples=500, deadline=None)
 @given(operations)
 def test_list_changes_match_reference_implementation(steps) -> None:
-    """Against a reference that counts from 0 and knows no errors."""
+    """The reference uses indices from 0 and raises no errors."""
     mine: list[object] = []
     reference: list[object] = []
     for what, place, value in steps:

@@ -1,1 +1,4 @@
-"""A simulated lab for Stop: virtual time, an unreliable network, robots, strangers and Studio's session."""
+"""Simulated lab for tests of Stop.
+
+It has virtual time, an unreliable network, robots, a hostile program and Studio's session.
+"""

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 SETTLE_LIMIT_S = 30.0
-"""Real seconds after which a history is given up as deadlocked."""
+"""Real time in seconds after which a simulation is assumed to be deadlocked."""
 _END = float("inf")
 _MIN_S = 1e-6
 _LOOK_S = 0.0005  # real seconds between two looks whether all threads rest
@@ -40,7 +40,7 @@ class _Timer:
 
 
 class SimulatedClock:
-    """Time that passes in `advance` only, and only while every simulated thread waits.
+    """Virtual clock that advances only in `advance`, and only while every simulated thread waits.
 
     A thread is simulated when its name begins with one of the prefixes given to `follow`.
     """
@@ -62,18 +62,18 @@ class SimulatedClock:
             self._prefixes.append(prefix)
 
     def call_at(self, due: float, call: Callable[[], None]) -> None:
-        """Call something in the thread of `advance` once it is `due`."""
+        """Schedule a call in the thread of `advance` at the virtual time `due`."""
         heapq.heappush(self._timers, _Timer(due, next(self._numbers), call))
 
     def end(self) -> None:
-        """End the history: from now on waits are short, and every time limit is over."""
+        """End the simulation: pending waits return soon, and every deadline has passed."""
         with self._changed:
             self._has_ended = True
             self._now += 1e6
         self.wake_all()
 
     def join(self) -> None:
-        """Wait for the end of every simulated thread after `end`."""
+        """Join every simulated thread after `end`."""
         for thread in self._simulated():
             thread.join(SETTLE_LIMIT_S)
             assert not thread.is_alive(), self._where()
@@ -83,9 +83,10 @@ class SimulatedClock:
     def wait(
         self, event: threading.Event, timeout_s: float | None, is_frozen: Callable[[], bool] = _never
     ) -> bool:
-        """Wait until the event is set (True) or the time is over (False), as `app.robots.driver.call.Clock`.
+        """Wait for the event; return True if it is set, or False after the timeout.
 
-        While `is_frozen`, neither ends the wait: the process is halted.
+        Same interface as `app.robots.driver.call.Clock`. While `is_frozen` returns true, neither ends
+        the wait, because the process is halted.
         """
         condition = event._cond  # type: ignore[attr-defined]  # the only way to wake one wait without setting it
 
@@ -138,14 +139,14 @@ class SimulatedClock:
     # -- time, in the thread of the test
 
     def wake_all(self) -> None:
-        """Let every thread look again: a process goes on."""
+        """Wake every waiting thread to check its condition again, as after its process resumed."""
         with self._changed:
             waiters = list(self._waiters.values())
         for waiter in waiters:
             waiter.wake()
 
     def settle(self) -> None:
-        """Return once every simulated thread waits for something that has not happened."""
+        """Block until every simulated thread waits for an event that has not occurred."""
         limit = time.monotonic() + SETTLE_LIMIT_S
         while not self._is_settled():
             if time.monotonic() > limit:
@@ -172,13 +173,13 @@ class SimulatedClock:
         return all(thread in resting for thread in self._simulated())
 
     def next_due(self) -> float:
-        """When the next thread or timer is due."""
+        """Return the virtual time at which the next thread or timer is due."""
         with self._changed:
             due = [each.deadline for each in self._waiters.values() if not each.is_frozen()]
         return min([*due, *(timer.due for timer in self._timers[:1])], default=_END)
 
     def move_to(self, now: float) -> None:
-        """Let it be this time; wake the threads and call the timers that are due."""
+        """Set the virtual time; wake the threads and call the timers that are due."""
         with self._changed:
             self._now = max(self._now, now)
             due = [each for each in self._waiters.values() if each.deadline <= self._now]
@@ -189,7 +190,7 @@ class SimulatedClock:
 
 
 class SimulatedCondition(threading.Condition):
-    """A condition whose waits take virtual time."""
+    """Condition whose waits take virtual time."""
 
     def __init__(self, clock: SimulatedClock) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""A simulated lab: Studio, robots and a stranger on one network, in virtual time."""
+"""Simulated lab: Studio, robots and a hostile program on one network, in virtual time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ def _do_nothing() -> None:
 
 
 class SimulatedLab:
-    """Everything that takes part in a test of Stop. Things happen in `settle`, time passes in `advance`."""
+    """All participants of a test of Stop.
+
+    `settle` processes the pending events; `advance` moves the virtual time.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.before_delivery: Callable[[], object] = _do_nothing
@@ -35,7 +38,7 @@ class SimulatedLab:
         self.settle()
 
     def close(self) -> None:
-        """End the history and join every thread."""
+        """End the simulation and join every thread."""
         self.clock.end()
         for robot in self.robots:
             robot.node.is_frozen = robot.node.is_dead = False
@@ -50,7 +53,7 @@ class SimulatedLab:
         self.clock.call_at(self.clock.now() + GRAPH_POLL_S, self._poll_graph)
 
     def settle(self) -> None:
-        """Let everything happen that happens at this moment; Studio looks once the network is quiet."""
+        """Process all events of the current moment; Studio ticks once the network is quiet."""
         before = None
         while True:
             self.clock.settle()
@@ -65,7 +68,7 @@ class SimulatedLab:
             self.studio.tick()
 
     def advance(self, seconds: float) -> None:
-        """Let time pass, from one moment in which something is due to the next."""
+        """Advance the virtual time from one due moment to the next, and settle at each."""
         until = self.clock.now() + seconds
         while self.clock.now() < until:
             self.clock.move_to(min(until, self.clock.next_due()))
@@ -75,13 +78,13 @@ class SimulatedLab:
     # -- robots and people
 
     def start_robot(self, name: str, *, connects_late: bool = False) -> SimulatedRobot:
-        """Start a process that is a robot; others do not notice before `settle`."""
+        """Start a robot process; other participants notice it in the next `settle`."""
         robot = SimulatedRobot(self.network, self.clock, name, connects_late=connects_late)
         self.robots.append(robot)
         return robot
 
     def wait_for_link(self, name: str) -> RobotLink:
-        """Let Studio look at the graph and return the robot, connected, as Studio sees it then."""
+        """Advance until Studio has polled the graph, and return its link to the connected robot."""
         self.advance(GRAPH_POLL_S)
         link = self.studio.session.fleet.link(name)
         assert link is not None
@@ -90,13 +93,13 @@ class SimulatedLab:
         return link
 
     def stop(self) -> None:
-        """Press Stop and let time pass until Studio has its report."""
+        """Press Stop and advance until Studio has its report."""
         self.studio.session.runs.stop()
         self.settle()
         self.wait_for_report()
 
     def wait_for_report(self) -> None:
-        """Let time pass until Studio has the report of the Stop that was pressed."""
+        """Advance until Studio has the report of the Stop that was pressed."""
         runs = self.studio.session.runs
         while runs.state.state == "stopping":
             self.advance(GRAPH_POLL_S)
@@ -110,7 +113,7 @@ class SimulatedLab:
 
     @property
     def stop_ids(self) -> list[str]:
-        """Ids of the stops that Studio sent, the oldest first."""
+        """Return the IDs of the stops that Studio sent, oldest first."""
         return _stops(each.message for each in self.network.sent if each.publisher.node is self.studio.node)
 
 

@@ -1,4 +1,4 @@
-"""A simulated network: nodes, topics, a master's view, and links that delay, drop and connect late."""
+"""Simulated network: nodes, topics, a master's graph, and links that delay, drop and connect late."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, Subscrib
 
 Sink = Callable[[Sequence[Message]], None]
 LEASE_S = 1.5
-"""The master drops a node this long after its last sign of life."""
+"""Time in seconds after its last renewal at which the master removes a node."""
 
 
 class Sent(NamedTuple):
-    """A published message, and the ids of the nodes to which it is on its way."""
+    """Published message, and the IDs of the nodes that will receive it."""
 
     publisher: SimulatedPublisher
     message: Message
@@ -25,7 +25,7 @@ class Sent(NamedTuple):
 
 
 class Delivery(NamedTuple):
-    """A message on its way to one subscriber."""
+    """Message in flight to one subscriber."""
 
     publisher: SimulatedPublisher
     subscriber: SimulatedSubscriber
@@ -33,7 +33,7 @@ class Delivery(NamedTuple):
 
 
 class SimulatedNetwork:
-    """Delivers messages in the order in which they were sent, in `deliver`, which the test calls."""
+    """Simulated network that delivers messages in publishing order when a test calls `deliver`."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         self.now = now
@@ -55,7 +55,7 @@ class SimulatedNetwork:
         return next(self._ids)
 
     def view(self) -> GraphView:
-        """What the master lists: nodes whose lease is not over, also dead and frozen ones."""
+        """Return the master's graph: nodes with a valid lease, including dead and frozen ones."""
         for node in list(self.nodes.values()):
             if not node.is_running and self.now() - node.halted_s >= LEASE_S and not node.is_unlisted:
                 node.unlist()
@@ -84,7 +84,7 @@ class SimulatedNetwork:
         return GraphView(1, self.revision, infos, topics)
 
     def connect(self) -> None:
-        """Let every subscriber of a running node connect to every publisher that it was told of."""
+        """Connect every subscriber of a running node to every publisher that the master announced to it."""
         wiring = (
             self.revision,
             [
@@ -113,7 +113,10 @@ class SimulatedNetwork:
             self.queue.append(Delivery(publisher, subscriber, publisher.kept))
 
     def deliver(self) -> bool:
-        """Hand over what can be: frozen nodes and held links keep theirs; True when there was anything."""
+        """Deliver queued messages and return whether there were any.
+
+        Messages to frozen nodes, and to or from held ones, stay in the queue.
+        """
         held: list[Delivery] = []
         was_busy = False
         for _turn in range(len(self.queue)):
@@ -132,7 +135,7 @@ class SimulatedNetwork:
 
 
 class SimulatedNode:
-    """What robots, Studio's fleet and its stopper use of `nep.Node`."""
+    """Fake of the parts of `nep.Node` that robots, Studio's fleet and its stopper use."""
 
     def __init__(self, network: SimulatedNetwork, id: str, name: str, host: str, pid: int) -> None:
         self.network, self.id, self.name, self.host, self.pid = network, id, name, host, pid
@@ -173,7 +176,7 @@ class SimulatedNode:
         return self.network.view()
 
     def halt(self, *, is_dead: bool) -> None:
-        """Freeze (SIGSTOP) or end (SIGKILL) its process."""
+        """Freeze (SIGSTOP) or kill (SIGKILL) the node's process."""
         self.is_frozen, self.is_dead = not is_dead, is_dead
         self.halted_s = self.network.now()
         if is_dead:
@@ -186,7 +189,7 @@ class SimulatedNode:
                 publisher.connected = [each for each in publisher.connected if each.node is not self]
 
     def unlist(self) -> None:
-        """Let its lease end at the master; its connections stay up."""
+        """Expire the node's lease at the master; its connections stay open."""
         self.is_unlisted = True
         self.network.revision += 1
 
@@ -196,7 +199,7 @@ class SimulatedNode:
         self.network.revision += 1
 
     def close(self) -> None:
-        """Leave the network properly: the master drops it at once."""
+        """Leave the network in order: the master removes the node immediately."""
         self.is_dead = True
         self.disconnect()
         self.unlist()
@@ -225,7 +228,7 @@ class SimulatedPublisher:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Names of the nodes that subscribe and are not connected."""
+        """Names of the subscribed nodes that are not connected."""
         everybody = [each for node in self.node.network.nodes.values() for each in node.subscribers]
         waited_for = [each for each in everybody if each.topic == self.topic and each not in self.connected]
         return tuple(each.node.name for each in waited_for if not each.node.is_unlisted)
@@ -234,7 +237,7 @@ class SimulatedPublisher:
         self.send(bytes(self._codec.encode(payload).data))
 
     def send(self, data: bytes, publisher: int | None = None) -> None:
-        """Publish encoded bytes; `publisher` forges the id in the header."""
+        """Publish encoded bytes; `publisher` replaces the ID in the header by a forged one."""
         self._seq += 1
         message = Message(
             self.topic,
@@ -271,7 +274,7 @@ class SimulatedSubscriber:
 
 
 class SimulatedSource:
-    """`app.core.network.source.Source` on a simulated network: jobs are done at once."""
+    """Fake of `app.core.network.source.Source` on a simulated network; it runs jobs immediately."""
 
     def __init__(
         self,

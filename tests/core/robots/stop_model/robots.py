@@ -1,4 +1,4 @@
-"""Simulated robots: the real driver kit on a simulated body, clock and network; and strangers."""
+"""Simulated robots with the real driver kit on a simulated body, clock and network; a hostile program."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WATCHDOG_S = 1.0
 
 
 class Rover:
-    """A body that can drive on (until it is stopped) and turn (for a second)."""
+    """Robot body that can drive until it is stopped, and turn for a second."""
 
     def __init__(self, link: Link) -> None:
         self.link = link
@@ -59,7 +59,7 @@ ROVER = Kind(model="rover", title="Rover", body=Rover)
 
 
 class RobotClock:
-    """The clock of one robot's process, which stands still for a frozen or dead one."""
+    """Clock of one robot's process; its waits don't end while the process is frozen or dead."""
 
     def __init__(self, clock: SimulatedClock, node: SimulatedNode) -> None:
         self._clock, self._node = clock, node
@@ -75,7 +75,7 @@ class RobotClock:
 
 
 class SimulatedRobot:
-    """One process that is a robot; another of the same name is another one."""
+    """Robot process; several processes can have the same robot name."""
 
     def __init__(
         self, network: SimulatedNetwork, clock: SimulatedClock, name: str, *, connects_late: bool
@@ -101,12 +101,12 @@ class SimulatedRobot:
 
     @property
     def is_deciding(self) -> bool:
-        """Whether the thread that decides what the robot does is alive."""
+        """Return whether the robot's command and stop threads are alive."""
         names = {thread.name for thread in threading.enumerate()}
         return names >= {f"{self.name} commands", f"{self.name} stop"}
 
     def thaw(self) -> None:
-        """Let its process go on."""
+        """Resume the frozen process (SIGCONT) and register its node again if its lease has ended."""
         self.node.is_frozen = False
         if self.node.is_unlisted:
             self.node.register()
@@ -120,7 +120,7 @@ class SimulatedRobot:
 
 
 class Stranger:
-    """A hostile program: it forges answers, sends deep values and announces robots that are not there."""
+    """Hostile program that forges replies, sends deeply nested values and announces nonexistent robots."""
 
     def __init__(self, network: SimulatedNetwork) -> None:
         self.network = network
@@ -134,18 +134,18 @@ class Stranger:
         return self._made[topic]
 
     def announce(self, name: str) -> None:
-        """Announce a robot that is not there; its description never comes."""
+        """Announce a nonexistent robot without ever sending its description."""
         self.node.new_pub(f"/{name}/description", DESCRIPTION_TYPE, latched=True)
 
     def answer(self, name: str, ids: list[str], *, times: int) -> None:
-        """Answer every stop in the name of a robot, many times."""
+        """Forge the robot's reply to each of these stops, `times` times."""
         publisher = self._publisher(f"/{name}/answer", "robot/answer")
         for _each in range(times):
             for id in ids or ["stop-none"]:
                 publisher.publish({"id": id, "op": "stop", "state": "succeeded"})
 
     def send_deep(self, topic: str, depth: int) -> None:
-        """Send a value that is nested deeply where a command or an answer is expected."""
+        """Publish a deeply nested value on a topic that expects a command or a reply."""
         value = b"[" * depth + b"]" * depth
         message = b'{"op":"invoke","id":"z","from":"e","state":"succeeded","action":' + value + b"}"
         self._publisher(topic, "robot/command" if topic.endswith("command") else "json").send(message)

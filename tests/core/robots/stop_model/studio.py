@@ -1,4 +1,4 @@
-"""Studio's session on a simulated network, with a person who moves robots and presses Stop."""
+"""Studio's session on a simulated network, with the actions of a user who moves robots and presses Stop."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ ALIVE_S = GRAPH_POLL_S  # at the same moments, so that fewer have to be simulate
 
 
 class SimulatedHeartbeat:
-    """`app.robots.heartbeat.Heartbeat` in virtual time, without a thread."""
+    """Fake of `app.robots.heartbeat.Heartbeat` in virtual time, without a thread."""
 
     def __init__(self, clock: SimulatedClock, sender: str) -> None:
         self._clock, self._sender = clock, sender
@@ -65,7 +65,7 @@ class SimulatedHeartbeat:
 
 
 class SimulatedRunner:
-    """A program that tells robots to drive, in a process of its own."""
+    """Fake runner of a program that commands robots to drive."""
 
     _runs = 0
 
@@ -118,7 +118,7 @@ class SimulatedRunner:
 
 
 class _Driving(RequestedRun):
-    """A behaviour that drives robots."""
+    """Requested run of a behaviour that drives robots."""
 
     __slots__ = ("robots",)
 
@@ -133,7 +133,7 @@ class _Driving(RequestedRun):
 
 
 class SimulatedStudio:
-    """Studio without its window, its master and its processes; everything else is the real code."""
+    """Studio without its window, master and processes; everything else is the real code."""
 
     def __init__(self, network: SimulatedNetwork, clock: SimulatedClock, folder: Path) -> None:
         self.network, self.clock = network, clock
@@ -164,7 +164,7 @@ class SimulatedStudio:
         self.session.tick()
 
     def hand_to_stopper(self, topic: str, messages: Sequence[Message]) -> None:
-        """Deliver a batch to the stopper at once, and to nothing else in Studio."""
+        """Deliver a batch immediately, and only to the stopper."""
         watched = self._source.watched.get(topic)
         stopper = [each for each in self.node.subscribers if each.topic == topic and each is not watched]
         assert stopper, f"the stopper does not subscribe to {topic}"
@@ -174,12 +174,12 @@ class SimulatedStudio:
     # -- what a person does
 
     def allow(self) -> None:
-        """Answer the question whether robots may move with yes."""
+        """Give the permission to move robots if Studio asks for it."""
         if self.session.fleet.permission.question is not None:
             self.session.fleet.permission.answer(let=True)
 
     def move(self, name: str, action: str) -> None:
-        """Try an action with its form."""
+        """Invoke an action as its form does, and give the permission if it is required."""
         try:
             self.session.fleet.invoke(name, action, {})
         except AppError:
@@ -192,7 +192,7 @@ class SimulatedStudio:
         self.allow()
 
     def send_from_shelf(self, name: str) -> None:
-        """Send a message of the publish shelf, as its button and its key do."""
+        """Send a saved message from the shelf, as its button and shortcut do."""
         acting = self.session.acting
         message = SavedMessage("m", "drive", f"/{name}/command", "robot/command", _drive_text(name))
         acting.send(message)
@@ -202,14 +202,14 @@ class SimulatedStudio:
             self.allow()
 
     def send_from_alarm(self, name: str) -> None:
-        """Let an alarm come on that sends a command."""
+        """Trigger an alarm that sends a command."""
         action = AlarmAction("send", f"/{name}/command", orjson.loads(_drive_text(name)), "robot/command")
         event = AlarmEvent("on", AlarmRule("a", AlarmCondition("appears", "/door"), (action,)), 0.0)
         self.session.alarms._send(event, action, lambda _ok, _said: None)
         self.allow()
 
     def replay(self, name: str) -> None:
-        """Replay a command that was recorded: what `ReplayOutbox` tells and does for each route."""
+        """Publish a recorded command, with the same permission and notification as `ReplayOutbox`."""
         topic = f"/{name}/command"
         if self.session.fleet.gate.request_permission(topic, lambda: self.replay(name)):
             self.session.acting.notify_moved(Target("topic", topic), "replay")
@@ -224,7 +224,7 @@ class SimulatedStudio:
 
 
 class SimulatedBridge:
-    """A bridge in a process of its own, which carries commands from another network."""
+    """Separate bridge process that forwards commands from another network."""
 
     def __init__(self, network: SimulatedNetwork) -> None:
         self.network = network

@@ -1,4 +1,4 @@
-"""How often a plot is drawn."""
+"""Tests of the refresh rate of plots."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The plot: what comes is drawn by its own time, what a person does with mouse and keys, what is kept."""
+"""Tests of the plot panel: time axis, mouse and keyboard, saved state."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def sine(begin: float, end: float, step: float = 0.05) -> list[tuple[float, obje
 
 
 def drawn(panel: PlotPanel, colour: QColor) -> list[int]:
-    """The columns of the canvas in which a colour is painted."""
+    """Return the columns of the plot area that contain a colour, in logical pixels."""
     if panel.canvas.height() % 2:  # the middle of what is shown lies between two rows: none has its colour
         panel.canvas.resize(panel.canvas.width(), panel.canvas.height() - 1)
         panel._draw()
