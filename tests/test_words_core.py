@@ -155,14 +155,14 @@ def test_health_alerts_are_translated() -> None:
         SimpleNamespace(
             name=name,
             robot=robot,
-            virtual=robot.virtual,
+            is_virtual=robot.virtual,
             is_connected=on,
             unended_actions="",
             rejected=ReportedCount(12, now[0]),
             errors=ReportedCount(1, now[0]),
             motion_warning="",
             stop_problem="",
-            silent=None,
+            silence_reason=None,
         )
         for name, robot, on in (
             ("Nao", real, False),

@@ -121,7 +121,7 @@ class _Pixels:
     @classmethod
     def join(cls, parts: Sequence[_Pixels]) -> _Pixels:
         # The parts must be adjacent.
-        names = ("keys", "times", "values", "broken")
+        names = ("keys", "times", "values", "gaps")
         arrays = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
         return cls(parts[0].first, parts[-1].end, *arrays)
 

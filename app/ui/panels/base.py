@@ -32,7 +32,7 @@ class ShowToast(Protocol):
     """Signature of the function that shows a toast for some seconds.
 
     Args:
-        words: Text of the toast, such as "Copied robots.Pepper.pose.y".
+        text: Text of the toast, such as "Copied robots.Pepper.pose.y".
         button: Text of the button; "" for no button.
         run: Called when the button is clicked.
         until: The toast closes early once this function returns True.

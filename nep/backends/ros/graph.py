@@ -34,7 +34,7 @@ _GENERATION = "ros"
 
 
 @dataclass(frozen=True)
-class LocalNode:
+class LocalRosNode:
     """nep node of this process, with its statistics.
 
     Attributes:
@@ -54,7 +54,7 @@ class LocalNode:
     clients: tuple[tuple[str, SubscriberCount], ...] = ()
 
 
-def graph_view(state: RosSystemState, local_nodes: list[LocalNode]) -> GraphView:
+def graph_view(state: RosSystemState, local_nodes: list[LocalRosNode]) -> GraphView:
     """Return the graph of a ROS network.
 
     The process's own ROS node is listed as its nep nodes. The rates of other nodes are unknown, because ROS
@@ -85,8 +85,8 @@ def graph_view(state: RosSystemState, local_nodes: list[LocalNode]) -> GraphView
 
 def _foreign_entries(
     nodes_by_name: Mapping[str, Sequence[str]],
-    local_nodes: list[LocalNode],
-    rows_of: Callable[[LocalNode], Sequence[tuple[object, ...]]],
+    local_nodes: list[LocalRosNode],
+    rows_of: Callable[[LocalRosNode], Sequence[tuple[object, ...]]],
 ) -> Iterator[tuple[str, str]]:
     # Yields (topic or service, node name) of nodes other than this process's nep nodes.
     mine = {(row[0], each.ros_name) for each in local_nodes for row in rows_of(each)}
@@ -102,7 +102,7 @@ def _server_request(node: NodeRecord, server_id: int, service: str, uri: str = "
     )
 
 
-def _add_local_node(graph: Graph, local_node: LocalNode, uri: str) -> None:
+def _add_local_node(graph: Graph, local_node: LocalRosNode, uri: str) -> None:
     node = replace(local_node.node, generation=_GENERATION)
     for topic, kind, is_latched, count in local_node.publishers:
         codec = _CODECS.get(kind, "ros")

@@ -10,7 +10,7 @@ from typing import Any
 
 from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
-from nep.backends.ros.graph import LocalNode, graph_view
+from nep.backends.ros.graph import LocalRosNode, graph_view
 from nep.backends.ros.library import get_rospy
 from nep.backends.ros.master import RosMaster, RosMasterUnreachable
 from nep.backends.ros.process import RosProcess, RosShutdownError, get_process
@@ -292,7 +292,7 @@ class RospyTransport:
         local_nodes = [each.local_node(address) for each in list(_transports) if not each._is_closed]  # noqa: SLF001
         return graph_view(state, local_nodes)
 
-    def local_node(self, address: str) -> LocalNode:
+    def local_node(self, address: str) -> LocalRosNode:
         """Return this node's publishers, subscribers and services at the ROS master at `address`."""
         outs: list[RospyPublisher] = [
             each for each in self._publishers if each.process.master.address == address
@@ -303,7 +303,7 @@ class RospyTransport:
         servers = [each for each in self._servers if each.process.master.address == address]
         clients = [each for each in self._clients if each.process.master.address == address]
         names = [each.process.name for part in (outs, ins, servers, clients) for each in part]
-        return LocalNode(
+        return LocalRosNode(
             self.node,
             names[0] if names else "",
             tuple((o.topic, o.ros_type, o.spec.is_latched, o.counts()) for o in outs),

@@ -27,7 +27,7 @@ def page(
 
 
 class FakeWebServer:
-    """Fake web server that records its settings; tests set `pages` and `refusals`."""
+    """Fake web server that records its settings; tests set `pages` and `rejections`."""
 
     def __init__(self, settings: WebSettings | None = None) -> None:
         self.settings = settings if settings is not None else WebSettings()
@@ -36,7 +36,7 @@ class FakeWebServer:
         self.allow_moving: Collection[str] = self.settings.allow_moving
         self.foxglove = self.settings.foxglove
         self.pages: tuple[ConnectedPage, ...] = ()
-        self.refusals: tuple[Rejection, ...] = ()
+        self.rejections: tuple[Rejection, ...] = ()
         self.rosbridge = self.settings.rosbridge
         self.kept_out: set[int] = set()
         self.has_ended = False

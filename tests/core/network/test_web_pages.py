@@ -168,7 +168,7 @@ def test_page_is_slow_while_it_drops_messages() -> None:
 def test_rejection_notices_offer_a_fix_until_allowed_or_dismissed(studio: Studio) -> None:
     server = studio.switch_on()
     origin = "http://192.168.1.77:5173"
-    server.refusals = (
+    server.rejections = (
         Rejection(1.0, origin, "refused", origin, "origin"),
         Rejection(2.0, "192.168.1.78", "wrong", kind="token"),
         Rejection(3.0, origin, "refused", kind="robot", robot="Turtle"),
@@ -191,7 +191,7 @@ def test_page_disconnected_by_user_can_be_allowed_again(studio: Studio) -> None:
     studio.web.block_page(first)
     assert (server.pages, server.kept_out) == ((), {1})
     assert notices(studio.web) == ()
-    server.refusals = (Rejection(5.0, first.origin, "disconnected", kind="kept out"),)
+    server.rejections = (Rejection(5.0, first.origin, "disconnected", kind="kept out"),)
     (notice,) = notices(studio.web)
     assert (notice.next_step, notice.value) == ("let in", "1")
     studio.web.unblock_page(1)

@@ -85,7 +85,7 @@ class Taker:
     def process(self, batch: Batch, now_ns: int) -> None:
         self.seqs += [message.seq for message in batch.messages]
 
-    def rewind(self) -> None:
+    def reset(self) -> None:
         self.seqs.clear()
 
 

@@ -297,7 +297,7 @@ def test_replayed_topic_is_received_under_its_new_name_until_stop(
         tick_until(session, lambda: all(sent.is_ready and sent.subscriber_count for sent in going))
         replay.play()
         expected = [m for _ns, m in whole if m.topic in ("/a", "/camera")]
-        tick_until(session, lambda: sum(each.count + each.skipped for each in going) == len(expected))
+        tick_until(session, lambda: sum(each.count + each.dropped_count for each in going) == len(expected))
         tick_until(session, lambda: len(heard_of(heard)) == sum(each.count for each in going))
         left = iter([(m.msg_type, bytes(m.data)) for m in expected])
         came = [(m.msg_type, bytes(m.data)) for m in heard_of(heard)]

@@ -38,7 +38,7 @@ class Pictures:
     def offer(self, messages):
         self.shown.update({each.topic: each for each in messages})
 
-    def rewind(self, topics):
+    def reset(self, topics):
         self.shown = {topic: each for topic, each in self.shown.items() if topic in topics}
 
 

@@ -69,7 +69,7 @@ def test_graph_alert_spans_until_the_first_list_without_that_alert(found):
         (6, "alerts", {"alerts": []}),
         (8, "alerts", {"alerts": [alert]}),
     )
-    assert [(each.name, each.is_over, each.topic) for each in made.alarms] == [
+    assert [(each.name, each.has_ended, each.topic) for each in made.alarms] == [
         ("two types on /camera", True, "/camera"),
         ("clocks differ", True, ""),
         ("two types on /camera", False, "/camera"),

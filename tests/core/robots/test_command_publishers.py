@@ -14,7 +14,7 @@ def test_failed_publisher_is_reported_with_robot_and_reason(name: str) -> None:
     reports: list[str] = []
     publishers = CommandPublishers(lambda what, _job: reports.append(what))
     link = SimpleNamespace(
-        name=name, publisher=None, world=None, is_opening=False, robot=SimpleNamespace(topics=None)
+        name=name, publisher=None, world_publisher=None, is_opening=False, robot=SimpleNamespace(topics=None)
     )
     publishers.open(link)  # type: ignore[arg-type]
     link.publisher = SimpleNamespace(close=lambda: None)

@@ -118,9 +118,9 @@ def robot(*, virtual: bool, connected: bool = False) -> SimpleNamespace:
     shown = SimpleNamespace(sensors=())
     return SimpleNamespace(
         name="Rover",
-        virtual=virtual,
+        is_virtual=virtual,
         is_connected=connected,
-        silent=None,
+        silence_reason=None,
         robot=shown,
         unended_actions="",
         rejected=ReportedCount(),
@@ -214,11 +214,11 @@ def test_hidden_camera_of_second_robot_is_not_reported_as_silent(case: Case) -> 
     case.topics.add("/Pepper/camera", Batch([Message("/Pepper/camera", b"", "image", "image")]), 49)
     case.topics.update_ages(50, 60 * 10**9)
     case.health.check()
-    assert [link.silent for link in case.links] == [None, None]
+    assert [link.silence_reason for link in case.links] == [None, None]
     assert case.alert() is None
     case.topics.update_ages(53, 60 * 10**9)
     case.health.check()
     alert = case.alert()
     assert alert is not None, "the one that is looked at is silent"
     assert alert.title == "The camera of Pepper has sent nothing for 4 s."
-    assert [link.silent for link in case.links] == ["camera silent", None]
+    assert [link.silence_reason for link in case.links] == ["camera silent", None]

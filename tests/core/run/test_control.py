@@ -82,7 +82,7 @@ def test_stop_of_one_robot_is_unconfirmed_when_the_stopper_raises(monkeypatch: p
 
 
 @pytest.mark.parametrize(
-    "place", ["control.result_text", "stop_news.stop_text", "stop_news.unconfirmed_texts"]
+    "place", ["control.result_text", "stop_reports.stop_text", "stop_reports.unconfirmed_texts"]
 )
 def test_error_in_stop_message_does_not_leave_run_stopping(
     session: Session, monkeypatch: pytest.MonkeyPatch, place: str

@@ -21,9 +21,9 @@ ROOT = Path(__file__).parents[3]
 HANGS = """
 import os, subprocess, sys, threading
 from pathlib import Path
-from app.core.self_test import SelfTest, bounds, prepare
+from app.core.self_test import SelfTest, prepare, timeouts
 
-bounds.STEP_TIMEOUTS_S["window"], bounds.GRACE_S = 0.2, 0.2
+timeouts.STEP_TIMEOUTS_S["window"], timeouts.GRACE_S = 0.2, 0.2
 test = SelfTest(prepare(Path(sys.argv[1]), os.environ, is_root=False), {})
 child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
 print(child.pid, flush=True)

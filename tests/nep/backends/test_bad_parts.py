@@ -237,7 +237,7 @@ def test_publisher_survives_invalid_subscriptions(
             assert message is not None
             assert bytes(message.data) == b"still here"
 
-        refused = pub._transport.refusals  # type: ignore[attr-defined]
+        refused = pub._transport.rejections  # type: ignore[attr-defined]
         rogue.send(b"\x01nobody knows that")
         attack()
         assert refused.count >= 1

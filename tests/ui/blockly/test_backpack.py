@@ -40,7 +40,7 @@ class Window:
         self.backpack = Backpack(folder)
         self.keeper = BackpackController(self, self.backpack, view)  # type: ignore[arg-type]
 
-    def toast(self, words: str, _button: str = "", run=None) -> None:
+    def show_toast(self, words: str, _button: str = "", run=None) -> None:
         self.said.append(words)
         self.undo.append(run)
 

@@ -281,7 +281,7 @@ class Cameras:
     def topics(self) -> Sequence[str]:
         return ["/Pepper/camera"]
 
-    def stream(self, topic: str) -> fakes.ImageStream:
+    def open_stream(self, topic: str) -> fakes.ImageStream:
         assert topic == "/Pepper/camera"
         return self.made
 

@@ -151,7 +151,7 @@ def test_removed_node_is_struck_through_for_ten_seconds(panel, window) -> None:
     line = shown(panel)[0]
     assert (line[0], line[5]) == ("camera_driver", "gone for 4 s")
     cell = panel.model.data(panel.model.index(0, 0), CELL_ROLE)
-    assert (cell.struck, cell.role) == (True, "textDisabled")
+    assert (cell.is_struck_out, cell.role) == (True, "textDisabled")
     nodes.update_ages(11.1)
     panel.refresh()
     assert [line[0] for line in shown(panel)] == ["rize", "studio"]

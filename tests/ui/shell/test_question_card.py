@@ -42,49 +42,49 @@ def said(card: QuestionCard, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int,
 def test_question_gets_focus_and_enter_answers(card, said, window) -> None:
     before = window.bar.home
     before.setFocus()
-    card.show_question(NAME, held=False)
+    card.show_question(NAME, paused=False)
     assert card.isVisible()
     assert QApplication.focusWidget() is card.field
     assert card.words.text() == card.field.accessibleName() == "What is your name?"
     QTest.keyClicks(card.field, "Ada")
     QTest.keyClick(card.field, Qt.Key.Key_Return)
     assert said == [(1, "Ada")]
-    card.show_question(None, held=False)
+    card.show_question(None, paused=False)
     assert not card.isVisible()
 
 
 def test_escape_answers_with_an_empty_text(card, said) -> None:
-    card.show_question(NAME, held=False)
+    card.show_question(NAME, paused=False)
     QTest.keyClicks(card.field, "Ada")
     QTest.keyClick(card.field, Qt.Key.Key_Escape)
     assert said == [(1, "")]
 
 
 def test_button_answers_and_the_next_question_starts_empty(card, said) -> None:
-    card.show_question(NAME, held=False)
+    card.show_question(NAME, paused=False)
     QTest.keyClicks(card.field, "Ada")
     QTest.mouseClick(card.button, Qt.MouseButton.LeftButton)
-    card.show_question(AGE, held=False)
+    card.show_question(AGE, paused=False)
     assert (said, card.field.text(), card.words.text()) == ([(1, "Ada")], "", "How old are you?")
     assert QApplication.focusWidget() is card.field
 
 
 def test_refresh_keeps_the_typed_text(card, said) -> None:
-    card.show_question(NAME, held=False)
+    card.show_question(NAME, paused=False)
     QTest.keyClicks(card.field, "Ad")
-    card.show_question(NAME, held=False)
+    card.show_question(NAME, paused=False)
     QTest.keyClicks(card.field, "a")
     assert card.field.text() == "Ada"
 
 
 def test_input_is_disabled_while_paused(card, said) -> None:
-    card.show_question(NAME, held=False)
+    card.show_question(NAME, paused=False)
     QTest.keyClicks(card.field, "Ada")
-    card.show_question(NAME, held=True)
+    card.show_question(NAME, paused=True)
     QTest.keyClicks(card.field, "x")
     QTest.keyClick(card.field, Qt.Key.Key_Return)
     assert (said, card.field.text(), card.button.isEnabled()) == ([], "Ada", False)
-    card.show_question(NAME, held=False)
+    card.show_question(NAME, paused=False)
     QTest.keyClick(card.field, Qt.Key.Key_Return)
     assert said == [(1, "Ada")]
 
@@ -93,7 +93,7 @@ def test_input_is_disabled_while_paused(card, said) -> None:
 @pytest.mark.parametrize("size", [(1024, 600), (1440, 900)])
 def test_card_stays_inside_the_window_and_does_not_cover_stop(card, window, words, size) -> None:
     window.resize(*size)
-    card.show_question(AskedQuestion(1, 1, words), held=False)
+    card.show_question(AskedQuestion(1, 1, words), paused=False)
     assert window.rect().contains(card.geometry())
     assert card.words.text()
     stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stop_buttons_in(window)]
@@ -136,13 +136,13 @@ def test_only_the_current_question_can_be_answered_and_only_once() -> None:
 
 
 def test_choices_are_large_buttons_and_a_click_answers(card, said) -> None:
-    card.show_question(PET, held=False)
+    card.show_question(PET, paused=False)
     assert [each.text() for each in card.choices.buttons] == ["cat", "dog", "cow"]
     assert all(each.height() >= 48 and each.isVisible() for each in card.choices.buttons)
     assert not card.field.isVisible()
     QTest.mouseClick(card.choices.buttons[1], Qt.MouseButton.LeftButton)
     assert said == [(3, "dog")]
-    card.show_question(NAME, held=False)
+    card.show_question(NAME, paused=False)
     assert card.field.isVisible()
     assert QApplication.focusWidget() is card.field
     assert not card.choices.buttons
@@ -161,7 +161,7 @@ def test_choices_are_large_buttons_and_a_click_answers(card, said) -> None:
     ],
 )
 def test_choices_are_selected_by_keyboard(card, said, keys, answer) -> None:
-    card.show_question(PET, held=False)
+    card.show_question(PET, paused=False)
     for key in keys:
         focus = QApplication.focusWidget()
         assert focus is not None
@@ -170,21 +170,21 @@ def test_choices_are_selected_by_keyboard(card, said, keys, answer) -> None:
 
 
 def test_number_key_without_a_matching_choice_has_no_effect(card, said) -> None:
-    card.show_question(PET, held=False)
+    card.show_question(PET, paused=False)
     QTest.keyClick(card.choices.buttons[0], Qt.Key.Key_4)
     QTest.keyClick(card.choices.buttons[0], Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
     assert said == []
 
 
 def test_choices_are_disabled_while_paused_and_keys_are_ignored(card, said) -> None:
-    card.show_question(PET, held=False)
-    card.show_question(PET, held=True)
+    card.show_question(PET, paused=False)
+    card.show_question(PET, paused=True)
     assert QApplication.focusWidget() is card
     for key in (Qt.Key.Key_Return, Qt.Key.Key_2, Qt.Key.Key_Escape):
         QTest.keyClick(card, key)
     QTest.mouseClick(card.choices.buttons[1], Qt.MouseButton.LeftButton)
     assert said == []
-    card.show_question(PET, held=False)
+    card.show_question(PET, paused=False)
     assert QApplication.focusWidget() is card.choices.buttons[0]
     QTest.keyClick(card.choices.buttons[0], Qt.Key.Key_2)
     assert said == [(3, "dog")]
@@ -194,7 +194,7 @@ def test_choices_are_disabled_while_paused_and_keys_are_ignored(card, said) -> N
 def test_long_choices_wrap_and_many_choices_scroll_to_the_focused_choice(card, window, size, qtbot) -> None:
     window.resize(*size)
     many = tuple(f"{number} " + "a choice of some length " * 8 for number in range(12))
-    card.show_question(AskedQuestion(1, 4, "Which one? " * 20, many), held=False)
+    card.show_question(AskedQuestion(1, 4, "Which one? " * 20, many), paused=False)
     assert window.rect().contains(card.geometry())
     stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stop_buttons_in(window)]
     assert not [stop for stop in stops if stop.intersects(card.geometry())]
@@ -214,19 +214,19 @@ def test_long_choices_wrap_and_many_choices_scroll_to_the_focused_choice(card, w
 def test_question_with_more_choices_than_the_previous_question_shows_all_choices(
     card, qtbot, away_between: bool
 ) -> None:
-    card.show_question(AskedQuestion(1, 7, "Play?", ("yes", "no")), held=False)
+    card.show_question(AskedQuestion(1, 7, "Play?", ("yes", "no")), paused=False)
     QTest.qWait(1)
     if away_between:
-        card.show_question(None, held=False)
+        card.show_question(None, paused=False)
         QTest.qWait(1)
-    card.show_question(AskedQuestion(1, 8, "Which?", ("red", "green", "a blue like the sky")), held=False)
+    card.show_question(AskedQuestion(1, 8, "Which?", ("red", "green", "a blue like the sky")), paused=False)
     qtbot.waitUntil(
         lambda: all(each.visibleRegion().boundingRect() == each.rect() for each in card.choices.buttons)
     )
 
 
 def test_short_choices_are_placed_side_by_side(card) -> None:
-    card.show_question(AskedQuestion(1, 5, "Play?", ("yes", "no")), held=False)
+    card.show_question(AskedQuestion(1, 5, "Play?", ("yes", "no")), paused=False)
     yes, no = card.choices.buttons
     assert yes.y() == no.y()
     assert yes.geometry().right() < no.x()

@@ -226,7 +226,7 @@ def test_cell_paints_its_sparkline(qapp, view, model) -> None:
     image = QImage(80, 26, QImage.Format.Format_RGB32)
     image.fill(view.theme.colour("panel"))
     painter = QPainter(image)
-    delegate._paint_cell(painter, QRectF(0, 0, 80, 26), Cell(curve=(0.0, 1.0)), "text", figures=False)
+    delegate._paint_cell(painter, QRectF(0, 0, 80, 26), Cell(curve=(0.0, 1.0)), "text", is_numeric=False)
     painter.end()
     inked = [
         x for x in range(80) if any(image.pixelColor(x, y) != view.theme.colour("panel") for y in range(26))

@@ -249,6 +249,6 @@ class TryList(QWidget):
         self.rows = []
         for invocation in reversed(ended):
             row = TryRow(self._theme, self._action, invocation)
-            row.clicked.connect(lambda _on=False, made=invocation: self.selected.emit(dict(made.given)))
+            row.clicked.connect(lambda _on=False, made=invocation: self.selected.emit(dict(made.input)))
             self._column.addWidget(row)
             self.rows.append(row)
