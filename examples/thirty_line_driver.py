@@ -8,7 +8,7 @@ Angle = Annotated[float, Range(-360, 360, 5, "deg", "angle")]
 
 
 class Turntable:
-    """Turns what stands on it, and has a lamp."""
+    """Turntable with a lamp."""
 
     angle = sensor(Annotated[float, Range(0, 360, unit="deg")], title="angle", text="angle", icon="compass")
 

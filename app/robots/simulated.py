@@ -19,8 +19,8 @@ from app.robots.driver.common_actions import drives, moves
 from app.robots.driver.declare import Kind, action, safe_stop
 from app.robots.driver.process import main as drive
 from app.robots.driver.schema import Colour, Range, Suggested, Text, Title, Words
-from app.robots.virtual.acting import FEEDBACK_INTERVAL_S, SimulatedActions
 from app.robots.virtual.body import START_PITCH
+from app.robots.virtual.robot import FEEDBACK_INTERVAL_S, SimulatedRobot
 from app.robots.virtual.room import Room
 from app.robots.virtual.sounds import SOUNDS, Notes, SoundName
 from nep.i18n import _, number
@@ -55,7 +55,7 @@ def _rize_light(rize_input: str, options: Mapping[str, object]) -> Mapping[str, 
     return {"where": "eyes" if rize_input == "eyes" else "both", "colour": f"#{colour}"}
 
 
-class VirtualPepper(SimulatedActions):
+class VirtualPepper(SimulatedRobot):
     """Virtual Pepper: a humanoid on wheels with head, arms, voice and lights."""
 
     # ---- speech -----------------------------------------------------------------------------------

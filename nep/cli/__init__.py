@@ -1,6 +1,7 @@
 """Command-line program `nep`.
 
-`app` assembles the commands; each command is one module, such as `echo` for `nep topic echo`.
+`app` assembles the commands. Each module contains one command, such as `echo` (`nep topic echo`), or a
+command group, such as `parameters` (`nep param`).
 """
 
 from __future__ import annotations

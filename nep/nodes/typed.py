@@ -44,7 +44,10 @@ def codec_of(backend: Backend, msg_type: MsgType) -> Codec:
 
 
 def wrap_sink(msg_type: MsgType, sink: Sink | None) -> Sink | None:
-    """Return a sink that passes messages with typed payloads to `sink`. Raises `ValueError`."""
+    """Return a sink that passes messages with typed payloads to `sink`, or `sink` itself for a type name.
+
+    Returns None for None. Raises `ValueError` if `sink` isn't callable.
+    """
     if sink is None or not isinstance(msg_type, type):
         return None if sink is None else check_function("sink", sink)
     give, reader = check_function("sink", sink), typed.TypedReader(typed.message_type(msg_type))

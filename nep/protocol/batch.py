@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 BATCH_FORM_FLAG = BATCH << 16
-"""Flag `BATCH`, shifted to its position in the result of `form_of`."""
+"""Flag `BATCH`, shifted to its position in the result of `encode_form`."""
 MAX_BATCH_MESSAGES = 256
 """Maximum number of messages in a batch; larger batches are rejected."""
 _COUNT = struct.Struct("<I")
@@ -71,7 +71,7 @@ def encode_batch(
 
     Args:
         topic: Topic part.
-        form: Result of `form_of` for each message.
+        form: Result of `encode_form` for each message.
         seq: Sequence number of the first message.
         publisher: Id of the publisher.
         stamps_ns: Time stamps of the messages.

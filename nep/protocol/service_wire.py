@@ -208,8 +208,8 @@ def error_reply(kind: CallKind, name: str, reason: str) -> Reply:
     """Return an error reply.
 
     Args:
-        kind: `ERROR` or `REFUSED`.
-        name: Class name of the exception; "" for `REFUSED`.
+        kind: `ERROR` or `REJECTED`.
+        name: Class name of the exception; "" for `REJECTED`.
         reason: Message of the exception.
     """
     # lone surrogates become "?"

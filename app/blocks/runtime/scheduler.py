@@ -126,7 +126,7 @@ class Scheduler:
     def start_run(self) -> None:
         """Begin a run of the calling script: wait until it is its turn.
 
-        Raises Stopped when the program ends.
+        Raises `StopProgram` when the program ends.
         """
         script = self._current_script()
         with self._lock:

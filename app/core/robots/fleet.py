@@ -125,10 +125,10 @@ class Fleet:
 
     @property
     def current(self) -> RobotLink | None:
-        """Robot shown by panels that show one robot, or None.
+        """Robot shown by panels that show one robot, or None if there is none.
 
         This is the chosen robot if it is connected, else a connected virtual robot, else the first
-        connected robot.
+        connected robot, else the chosen robot although it is disconnected.
         """
         chosen = self._links.get(self._chosen)
         if chosen is not None and chosen.is_connected:

@@ -317,14 +317,14 @@ class BlocklyView(BlocklyHost):
         self._backpack = [dict(item) for item in items]
         self._send_command("backpack", self._backpack)
 
-    def set_first_step(self, first: str, robot: bool) -> None:
+    def set_canvas_hint(self, label: str, has_robot: bool) -> None:
         """Set the hint on the empty canvas, which suggests dragging a first block there.
 
         Args:
-            first: Type of the suggested block.
-            robot: True if a robot is connected.
+            label: Label of the suggested block, such as “when started”.
+            has_robot: True if a robot is connected.
         """
-        state: Json = {"first": first, "robot": robot}
+        state: Json = {"first": label, "robot": has_robot}
         if state != self._first_step:
             self._first_step = state
             self._send_command("begin", state)

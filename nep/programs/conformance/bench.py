@@ -162,7 +162,7 @@ class Bench:
         return f"/check/{next(self._numbers)}"
 
     def new_pub(self, topic: str, msg_type: str = "json", **members: object) -> int:
-        """Open a publisher in the adapter and return its number. Raises `AdapterError`.
+        """Open a publisher in the adapter and return its id. Raises `AdapterError`.
 
         Args:
             topic: Name of the topic.
@@ -173,7 +173,7 @@ class Bench:
         return self._add_opened("close_publisher", "pub", reply)
 
     def new_sub(self, topic: str, msg_type: str = "json", **members: object) -> int:
-        """Open a subscriber in the adapter and return its number. Raises `AdapterError`.
+        """Open a subscriber in the adapter and return its id. Raises `AdapterError`.
 
         Args:
             topic: Name of the topic.
@@ -329,7 +329,7 @@ class Bench:
         """Create a publisher of the tester and a subscriber of the adapter, and wait for the hello.
 
         Returns:
-            The publisher, and the number of the subscriber.
+            The publisher, and the adapter's id of the subscriber.
         """
         publisher = self.create_publisher(topic, msg_type)
         sub = self.new_sub(topic, msg_type)

@@ -148,7 +148,9 @@ class PageConnection:
                 return data
 
     def _close_slow_page(self) -> None:
-        _logger.warning("the page '%s' is closed: it does not read the answers that it asked for", self.name)
+        _logger.warning(
+            "the page '%s' is disconnected: it doesn't read the replies to its requests", self.name
+        )
         self.start_closing("the page does not read its answers")
 
     def _log_connection(self) -> None:

@@ -24,7 +24,7 @@ FIRST = ".blocklyFlyout .blocklyDraggable"
 
 @pytest.fixture
 def empty(view: BlocklyView, person: Callable[..., Person]) -> Person:
-    view.set_first_step("when started", False)
+    view.set_canvas_hint("when started", False)
     made = person()
     made.wait_for(SHOWN)
     return made
@@ -52,7 +52,7 @@ def test_empty_canvas_shows_the_first_step_and_offers_a_robot_until_a_robot_conn
     empty.click(".nepBegin button:nth-child(1)", dx=20)
     empty.click(".nepBegin button:nth-child(3)", dx=20)
     empty.until(lambda: asked == ["robot", "examples"], "the window hears what was pressed")
-    view.set_first_step("when started", True)
+    view.set_canvas_hint("when started", True)
     empty.wait_for(BUTTONS, ["Show me", "Open an example"])
 
 
@@ -94,7 +94,7 @@ def test_empty_canvas_hint_is_next_to_the_open_flyout(empty: Person) -> None:
 def test_behaviour_with_blocks_has_no_empty_canvas_hint(
     view: BlocklyView, person: Callable[..., Person]
 ) -> None:
-    view.set_first_step("when started", False)
+    view.set_canvas_hint("when started", False)
     made = person(START)
     made.wait_for("document.querySelectorAll('.blocklyBlockCanvas [data-id=start]').length", 1)
     made.wait_for(SHOWN, False)

@@ -259,13 +259,13 @@ def test_empty_canvas_shows_the_first_step_and_its_buttons_run_commands(qtbot, q
     qtbot.addWidget(panel)
     assert isinstance(panel, BehaviourPanel)
     qtbot.addWidget(panel.title_widget())
-    assert editor(panel).told[-1] == ("set_first_step", "when started", False)
+    assert editor(panel).told[-1] == ("set_canvas_hint", "when started", False)
     editor(panel).canvas_button_pressed.emit("robot")
     editor(panel).canvas_button_pressed.emit("examples")
     assert window.commands == ["robots.virtual", "help.examples"]
     window.session.join(pepper())
     panel.refresh()
-    assert [call for call in editor(panel).told if call[0] == "set_first_step"][-1][2] is True
+    assert [call for call in editor(panel).told if call[0] == "set_canvas_hint"][-1][2] is True
 
 
 def test_highlighted_block_shows_its_name_and_where_to_drop_the_block(panel, window) -> None:

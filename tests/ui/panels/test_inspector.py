@@ -289,7 +289,7 @@ def test_large_json_message_is_decoded_in_another_thread_and_shown_when_ready(qt
     assert message.size_bytes > LARGE_BYTES
     panel.refresh()
     assert panel.body.page == LARGE
-    assert panel.body.large._text.text() == "Reading the message."
+    assert panel.body.large._text.text() == "Reading the message…"
     qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == TREE)[1])
     assert panel.model.rowCount() == 2
     rows_index = panel.model.index(0, 0)

@@ -1,4 +1,4 @@
-"""Manual publishing and calling in a session: the shelf, the switch, and messages in progress.
+"""Manual publishing and service calls in a session: saved messages, arming, and repeated messages.
 
 All messages go to the live network. While a recording is shown, manual messages and calls are disabled,
 but recorded messages can be published (`app.core.recording.replay.sending`).

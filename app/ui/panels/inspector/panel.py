@@ -214,7 +214,7 @@ class InspectorPanel(PanelWidget):
         elif not self.reader.submit_throttled(message, self.clock()):
             return
         if self._shown is None or self.body.page == LARGE:
-            self.body.show_large(message.size_bytes, _("Reading the message."))
+            self.body.show_large(message.size_bytes, _("Reading the message…"))
             self._show_page(LARGE)
 
     def _show_decoded(self, reading: ReadResult) -> None:
@@ -300,7 +300,7 @@ class InspectorPanel(PanelWidget):
             self._allowed = self._shown
             self.freeze.setChecked(True)
             self.reader.submit(self._shown)
-            self.body.show_large(self._shown.size_bytes, _("Reading the message."))
+            self.body.show_large(self._shown.size_bytes, _("Reading the message…"))
 
     def _show_page(self, page: int) -> None:
         self.body.show_page(page, comparing=self.is_comparing)

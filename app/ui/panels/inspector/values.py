@@ -108,7 +108,7 @@ def clipboard_text(value: object) -> str:
 def decode_now(message: Message) -> ReadResult:
     """Decode a small message, or summarize an image, on the calling thread.
 
-    Errors are not raised, but returned in the `Reading`.
+    Errors are not raised, but returned in the `ReadResult`.
     """
     if message.codec != "image":
         return read(message)

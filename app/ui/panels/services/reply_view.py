@@ -216,7 +216,7 @@ class ReplyView(QWidget):
             return
         self.facts.setText(clock_text(record))
         if record.state == "waiting":
-            self.sentence.setText(_("Waiting for the reply."))
+            self.sentence.setText(_("Waiting for the reply…"))
         elif record.state != "answered":
             self.sentence.setText(record.error)
         elif not record.is_retained:

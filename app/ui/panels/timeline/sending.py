@@ -176,7 +176,7 @@ class SendChooser(QWidget):
         self._show_rows()
         hint = _("While armed, these topics are also sent to the live network during playback.")
         moving = _("Topics that move a robot are marked and need confirmation.")
-        reading = _("Checking which topics move robots.")
+        reading = _("Checking which topics move robots…")
         self.words.setText(f"{hint} {moving if sending.is_analyzed else reading}")
         self.problem.setVisible(bool(self.problem.text()))
         self.arm.setEnabled(bool(sending.routes) and sending.is_analyzed)

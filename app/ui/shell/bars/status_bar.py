@@ -61,7 +61,7 @@ class StatusFormatter:
         return icon, text.format(count=len(alerts)), status
 
     def health(self) -> StatusEntry:
-        """Return the number of alerts, else with the health of the robots.
+        """Return the number of alerts, or the health of the robots if there are none.
 
         A robot that hasn't reported its state yet is only described as "connected".
         """

@@ -86,7 +86,7 @@ class SensorDeclarations:
     )
 
 
-class SimulatedActions(SensorDeclarations):
+class SimulatedRobot(SensorDeclarations):
     """Base class of the virtual Pepper: owns the simulation and provides helpers for actions."""
 
     start_room: ClassVar[Room] = Room()
