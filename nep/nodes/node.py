@@ -107,8 +107,8 @@ class Node(ServiceNode):
         transport: Back end: "zeromq" (alias "ZMQ"), "memory" (nodes of this process only), "zenoh",
             "nanomsg", "ros" or "ros2" (docs/backends.md).
         master: Address of the master. Default: $NEP_MASTER, else 127.0.0.1:7780.
-        wait_s: Time in seconds to wait for a master when a publisher, subscriber, server, client or surveyor is
-            created; None waits without limit.
+        wait_s: Time in seconds to wait for a master when a publisher, subscriber, server, client or surveyor
+            is created; None waits without limit.
         generation: Kind of node reported in the graph; gateways to other systems use other values.
         language: Programming language reported in the graph; "web" for the web pages of `nep web`.
         strict: Make every publisher raise `EncodeError` for payloads that can't be encoded
