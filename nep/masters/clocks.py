@@ -55,12 +55,12 @@ class Clocks:
         own_clock = member.clock
         if own_clock is None:
             return {}
-        found: ClockDifferences = {}
+        differences: ClockDifferences = {}
         for other in self._registry.remote_nodes_of(member):
             if other.clock is not None:
                 uncertainty_ns = _uncertainty_ns(own_clock, now) + _uncertainty_ns(other.clock, now)
-                found[other.node.id] = other.clock.offset_ns - own_clock.offset_ns, uncertainty_ns
-        return found
+                differences[other.node.id] = other.clock.offset_ns - own_clock.offset_ns, uncertainty_ns
+        return differences
 
     def renewal_timestamps(
         self, member: RegisteredNode, received_ns: int, wall: Callable[[], int] | None = None

@@ -81,7 +81,7 @@ class RequestedRun:
             return ""
         labels: Mapping[str, str] = program.labels
         return labels.get(self.stack.id) or next(
-            (words for block, words in labels.items() if block != SHOW_BLOCK_ID), program.name
+            (label for block, label in labels.items() if block != SHOW_BLOCK_ID), program.name
         )
 
 

@@ -61,7 +61,7 @@ class Action:
 
     def parameter(self, name: str) -> Parameter | None:
         """Return the parameter with this name, or None."""
-        return next((found for found in self.parameters if found.name == name), None)
+        return next((parameter for parameter in self.parameters if parameter.name == name), None)
 
     def check(self, values: object) -> tuple[str, ...]:
         """Return one message per problem of an input; empty if it is valid.
@@ -194,12 +194,12 @@ class Robot:
 
     def action(self, name: str) -> Action | None:
         """Return the action with this name, or None."""
-        return next((found for found in self.actions if found.name == name), None)
+        return next((action for action in self.actions if action.name == name), None)
 
     def sensor(self, name: str) -> Sensor | None:
         """Return the sensor with this name, or None."""
-        return next((found for found in self.sensors if found.name == name), None)
+        return next((sensor for sensor in self.sensors if sensor.name == name), None)
 
     def event(self, name: str) -> Event | None:
         """Return the event with this name, or None."""
-        return next((found for found in self.events if found.name == name), None)
+        return next((event for event in self.events if event.name == name), None)

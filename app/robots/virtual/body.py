@@ -173,9 +173,9 @@ class Body:
         Args:
             side: "left" or "right".
         """
-        made = Wave(self.arms[side], self.elbows[side])
-        self._waves.append(made)
-        return made
+        wave = Wave(self.arms[side], self.elbows[side])
+        self._waves.append(wave)
+        return wave
 
     def stand(self) -> None:
         """Lower the arms and turn the head to its start position."""

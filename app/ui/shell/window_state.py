@@ -86,8 +86,8 @@ class WindowState:
 
     def layouts(self) -> Mapping[str, object]:
         """Return the saved arrangements of all layouts, by name."""
-        kept: SettingsDict = self._settings.get("layouts", {})
-        return kept
+        layouts: SettingsDict = self._settings.get("layouts", {})
+        return layouts
 
     def layout_state(self, name: str) -> Mapping[str, object]:
         """Return the saved arrangement of a layout; empty if there is none."""

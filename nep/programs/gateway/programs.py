@@ -152,8 +152,8 @@ class ProgramTable:
         members: dict[TopicLine, frozenset[str]] = {}
         for registration in self._port_map.registrations:
             if registration.language is not None:
-                known = members.get(registration.line, frozenset())
-                members[registration.line] = known | {registration.language}
+                languages = members.get(registration.line, frozenset())
+                members[registration.line] = languages | {registration.language}
         return members
 
     def members(self) -> list[Member]:

@@ -71,8 +71,8 @@ class RequestServer:
     @property
     def ports(self) -> tuple[int, ...]:
         """Numbers of the enabled ports."""
-        wanted = (self._ports.requests_a, self._ports.requests_b, self._ports.broadcast)
-        return tuple(port for port in wanted if port)
+        ports = (self._ports.requests_a, self._ports.requests_b, self._ports.broadcast)
+        return tuple(port for port in ports if port)
 
     def open(self) -> bool:
         """Bind the ports that are not bound yet; return True if a request port was bound."""

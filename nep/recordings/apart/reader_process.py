@@ -63,7 +63,7 @@ class RecordingService:
         """Execute a request and return the reply. Errors are returned in the reply, not raised."""
         path = str(request.get("path", ""))
         try:
-            answer = dict(self._operations[request["op"]](request))
+            reply = dict(self._operations[request["op"]](request))
         except RecordingError as error:
             return {
                 "error": error.reason,
@@ -76,8 +76,8 @@ class RecordingService:
             return {"error": str(error), "path": path}
         except (TypeError, ValueError, KeyError, OSError) as error:
             return {"error": str(error) or type(error).__name__, "path": path}
-        self._add_corruption(answer, request.get("file", answer.get("file")))
-        return answer
+        self._add_corruption(reply, request.get("file", reply.get("file")))
+        return reply
 
     def _add_corruption(self, reply: dict[str, object], number: object) -> None:
         # Adds the damage of a file if it has grown since the last reply.

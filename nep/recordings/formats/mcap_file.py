@@ -64,13 +64,13 @@ class ChannelTable:
 
     def number(self, definition: ChannelDefinition) -> int | None:
         """Return the number of a channel, assigning one if needed; None if there are too many channels."""
-        known = self._numbers.get(definition)
-        if known is None:
+        number = self._numbers.get(definition)
+        if number is None:
             if self._next > MAX_CHANNELS:
                 return None
-            known = self._next
-            self._add(known, definition)
-        return known
+            number = self._next
+            self._add(number, definition)
+        return number
 
     def add_numbered(self, number: int, definition: ChannelDefinition) -> None:
         """Add a channel with a given number, unless the number is already assigned."""

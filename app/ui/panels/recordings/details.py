@@ -237,10 +237,10 @@ class RecordingDetails(QWidget):
             return None
         included, unwanted = self.topics.patterns()
         try:
-            made = select_part(preview, self.strip.begin_ns, self.strip.end_ns, included, unwanted)
+            part = select_part(preview, self.strip.begin_ns, self.strip.end_ns, included, unwanted)
         except BadTopicError:
             return None
-        return made if made.topics is None or made.topics else None
+        return part if part.topics is None or part.topics else None
 
     def _set_list_visible(self, is_visible: bool) -> None:
         self.list.setVisible(is_visible)

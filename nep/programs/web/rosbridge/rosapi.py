@@ -121,14 +121,14 @@ class RosApi:
     def publishers(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the names of the nodes that publish a topic."""
         topic = self._view.topics.get(_text(args, "topic"))
-        found = () if topic is None else topic.publishers
-        return {"publishers": list(dict.fromkeys(self._name(each.node_id) for each in found))}
+        publishers = () if topic is None else topic.publishers
+        return {"publishers": list(dict.fromkeys(self._name(each.node_id) for each in publishers))}
 
     def subscribers(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the names of the nodes that subscribe to a topic."""
         topic = self._view.topics.get(_text(args, "topic"))
-        found = () if topic is None else topic.subscribers
-        return {"subscribers": list(dict.fromkeys(self._name(each.node_id) for each in found))}
+        subscribers = () if topic is None else topic.subscribers
+        return {"subscribers": list(dict.fromkeys(self._name(each.node_id) for each in subscribers))}
 
     def message_details(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the fields of a message type."""
