@@ -194,7 +194,7 @@ class RobotValueError(AppError, ValueError):
     def __init__(self, template: str, place: str = "", **holes: object) -> None:
         # `words` is a `lazy` text; its placeholder `place` and the others are filled here.
         self.place = place
-        self._words, self._holes = template, holes
+        self._template, self._holes = template, holes
         super().__init__(_(template).format(place=place or _("the value"), **holes))
 
     def nested_in(self, outer: str) -> RobotValueError:
@@ -204,7 +204,7 @@ class RobotValueError(AppError, ValueError):
             outer: Name of the part of the outer value that contains the invalid value.
         """
         location = _("{place} {inner}").format(place=outer, inner=self.place) if self.place else outer
-        return RobotValueError(self._words, location, **self._holes)
+        return RobotValueError(self._template, location, **self._holes)
 
 
 class UnknownRobotError(AppError):

@@ -298,7 +298,7 @@ class _LateRobotMonitor:
     def __init__(self, node: nep.Node, runner: Runner) -> None:
         self._node, self._runner = node, runner
         self._next_s = time.monotonic() + LATE_ROBOT_CHECK_INTERVAL_S
-        self._known: tuple[str, ...] = ()
+        self._known_topics: tuple[str, ...] = ()
 
     def poll(self) -> None:
         if time.monotonic() < self._next_s:
@@ -306,12 +306,12 @@ class _LateRobotMonitor:
         with suppress(NepError):
             view = self._node.graph()
             topics = tuple(sorted(description_topics(view)))
-            if topics != self._known:
+            if topics != self._known_topics:
                 discovered = find_robots(self._node, LATE_ROBOT_CHECK_INTERVAL_S)
                 unread = set(topics) - {robot.topics.description for robot in discovered.robots}
                 moving = moving_topics(view, map(controls_of, discovered.robots), unread)
                 self._runner.set_robots({}, moving.topics)
-                self._known = topics if not unread else ()
+                self._known_topics = topics if not unread else ()
         self._next_s = time.monotonic() + LATE_ROBOT_CHECK_INTERVAL_S
 
 
@@ -319,7 +319,7 @@ class _RunEvents:
     """Handler of the runner's events: writes them as lines and stores the result of the run."""
 
     def __init__(self, write_line: Callable[[str], None]) -> None:
-        self._say = write_line
+        self._write_line = write_line
         self._last = ""
         self.ok = True
         self.silent: tuple[str, ...] = ()
@@ -328,13 +328,13 @@ class _RunEvents:
         if event.kind == "running" and event.description != self._last:
             self._last = event.description
             if event.description:
-                self._say(event.description)
+                self._write_line(event.description)
         elif event.kind in ("print", "error") or (event.kind == "ended" and event.text):
-            self._say(event.text)
+            self._write_line(event.text)
         if event.kind == "ended":
             self.ok, self.silent = event.is_ok, event.unresponsive_robots
             if event.elapsed_s is not None:
-                self._say(_("ended after {seconds} s").format(seconds=number(event.elapsed_s, ".1f")))
+                self._write_line(_("ended after {seconds} s").format(seconds=number(event.elapsed_s, ".1f")))
 
 
 def stop_lines(report: StopReport) -> list[str]:

@@ -82,7 +82,7 @@ class Figures:
 def placed(panel: GraphPanel) -> bool:
     """Return True once the newest graph has its layout and is shown."""
     scene = panel.canvas.scene
-    return scene is not None and scene.graph == panel._asked and not panel._thread.is_busy  # noqa: SLF001
+    return scene is not None and scene.graph == panel._requested_graph and not panel._thread.is_busy  # noqa: SLF001
 
 
 def show(name: str, row: Row, painted: int) -> None:

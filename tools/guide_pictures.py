@@ -139,16 +139,16 @@ class GuidePictures(SelfDrive):
     def __init__(self, window: MainWindow, folder: Path, home: Path, theme: str) -> None:
         self._home, self._theme = home, theme
         self._crops: dict[str, Callable[[], QRect]] = {
-            "toolbox": lambda: QRect(self._place_of("behaviour").topLeft(), QSize(WIDE, 400)),
+            "toolbox": lambda: QRect(self._panel_rect("behaviour").topLeft(), QSize(WIDE, 400)),
             "running": lambda: QRect(0, window.run_bar.geometry().top(), WIDE, 400),
-            "variables": lambda: self._place_of("behaviour") | self._place_of("variables"),
-            "problems": lambda: self._place_of("behaviour") | self._place_of("problems"),
-            "backpack": lambda: self._place_of("behaviour"),
-            "room": lambda: self._place_of("robot"),
+            "variables": lambda: self._panel_rect("behaviour") | self._panel_rect("variables"),
+            "problems": lambda: self._panel_rect("behaviour") | self._panel_rect("problems"),
+            "backpack": lambda: self._panel_rect("behaviour"),
+            "room": lambda: self._panel_rect("robot"),
         }
         self._mouse: QPoint | None = None  # where the image shows it, in window coordinates
-        self._way: list[QPoint] = []  # remaining points of a mouse movement
-        self._answers: dict[str, object] = {}
+        self._mouse_path: list[QPoint] = []  # remaining points of a mouse movement
+        self._element_rects: dict[str, object] = {}
         super().__init__(window, folder)
 
     def _plan(self) -> list[Step]:
@@ -208,26 +208,33 @@ class GuidePictures(SelfDrive):
         last = f"{TAB}.querySelector('[data-id={TALK}] > .blocklyPath')"
 
         def open_it() -> None:
-            position = self._place(movement).center()
+            position = self._element_rect(movement).center()
             QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=position)
 
         def carry() -> None:
-            start, end = self._place(turn_block).topLeft() + QPoint(12, 18), self._place(last).bottomLeft()
+            start, end = (
+                self._element_rect(turn_block).topLeft() + QPoint(12, 18),
+                self._element_rect(last).bottomLeft(),
+            )
             QTest.mouseMove(self._target, start)
             QTest.mousePress(self._target, Qt.MouseButton.LeftButton, pos=start)
-            self._way = [start + (end + QPoint(36, 34) - start) * part / WAY for part in range(1, WAY + 1)]
+            self._mouse_path = [
+                start + (end + QPoint(36, 34) - start) * part / WAY for part in range(1, WAY + 1)
+            ]
 
         def move() -> bool:
             # One step per call, so that the page repaints in between.
-            if self._way:
-                position = self._way.pop(0)
+            if self._mouse_path:
+                position = self._mouse_path.pop(0)
                 QTest.mouseMove(self._target, position)
                 self._mouse = self._target.mapTo(self._window, position)
-            return not self._way
+            return not self._mouse_path
 
         return [
-            Step("its categories", lambda: None, lambda: self._is_there(movement), 20),
-            Step("a category", open_it, lambda: self._is_there(turn_block) and self._is_there(last), 20),
+            Step("its categories", lambda: None, lambda: self._has_element(movement), 20),
+            Step(
+                "a category", open_it, lambda: self._has_element(turn_block) and self._has_element(last), 20
+            ),
             Step("a block in the hand", carry, move, 10, "toolbox", 1.0),
             Step("it is let go", self._let_go, lambda: True, settle_s=1.0),
         ]
@@ -243,7 +250,7 @@ class GuidePictures(SelfDrive):
         first = f"{TAB}.querySelector('.blocklyBlockCanvas .robot_pepper_do_turn > .blocklyPath')"
 
         def choose() -> None:
-            position = self._place(first).topLeft() + QPoint(10, 12)
+            position = self._element_rect(first).topLeft() + QPoint(10, 12)
             QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=position)
 
         def pack() -> None:
@@ -251,14 +258,16 @@ class GuidePictures(SelfDrive):
             QTest.keyClick(self._target, Qt.Key.Key_P, keys)
 
         def look_into() -> None:
-            position = self._place(button).center()
+            position = self._element_rect(button).center()
             QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=position)
 
         return [
-            Step("the blocks", lambda: None, lambda: self._is_there(first) and self._is_there(button), 20),
+            Step(
+                "the blocks", lambda: None, lambda: self._has_element(first) and self._has_element(button), 20
+            ),
             Step("one is chosen", choose, lambda: True),
             Step("it is packed", pack, lambda: True),
-            Step("the backpack", look_into, lambda: self._is_there(sheet), 10, "backpack", 8.0),
+            Step("the backpack", look_into, lambda: self._has_element(sheet), 10, "backpack", 8.0),
         ]
 
     def _robot_there(self) -> bool:
@@ -286,31 +295,31 @@ class GuidePictures(SelfDrive):
     def _page_is_there(self) -> bool:
         return getattr(getattr(self._window.editor(), "editor", None), "is_ready", False)
 
-    def _is_there(self, element: str) -> bool:
+    def _has_element(self, element: str) -> bool:
         # True if the page contains the element; each call queries its position again.
-        self._ask(element)
-        return self._answers.get(element) is not None
+        self._query_rect(element)
+        return self._element_rects.get(element) is not None
 
-    def _place(self, element: str) -> QRect:
+    def _element_rect(self, element: str) -> QRect:
         # The last known position.
-        rect = self._answers[element]
+        rect = self._element_rects[element]
         if not isinstance(rect, list):
             raise TypeError(f"{element} is not there")
         return QRect(*(round(each) for each in rect))
 
-    def _ask(self, element: str) -> None:
+    def _query_rect(self, element: str) -> None:
         script = (
             f"(e => {{ const r = e?.getBoundingClientRect();"
             f" return r ? JSON.stringify([r.left, r.top, r.width, r.height]) : ''; }})({element})"
         )
 
         def take(result: object) -> None:
-            self._answers[element] = json.loads(result) if isinstance(result, str) and result else None
+            self._element_rects[element] = json.loads(result) if isinstance(result, str) and result else None
 
         if self._page_is_there() and self._editor.web is not None:
             self._editor.web.page.runJavaScript(script, take)
 
-    def _place_of(self, panel: str) -> QRect:
+    def _panel_rect(self, panel: str) -> QRect:
         bench = self._window.bench
         if bench is None:
             raise TypeError("no panels show")

@@ -413,13 +413,13 @@ class Reference:
             full_name = match.group(1)
             page = self._pages.get(full_name.removeprefix("nep.").partition(".")[0])
             name = full_name.removeprefix("nep.")
-            if page is None or not self._is_place(name):
+            if page is None or not self._has_heading(name):
                 return match.group(0)
             return f"[`{full_name}`]({page}.md#{_anchor(name)})"
 
         return _PAGE.sub(r"[\1](../\1)", re.sub(r"`([A-Za-z_][\w.]*)`", link, text))
 
-    def _is_place(self, name: str) -> bool:
+    def _has_heading(self, name: str) -> bool:
         # True if the name has a heading of its own.
         owner, _, member = name.partition(".")
         if owner not in self._pages or owner[0].islower():

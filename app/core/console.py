@@ -52,7 +52,7 @@ class Console:
         self._clock = clock
         self._lines: deque[ConsoleRecord | Message] = deque(maxlen=capacity)
         self._unread = 0
-        self._own: deque[int] = deque(maxlen=MAX_IGNORED_PROCESSES)
+        self._ignored_pids: deque[int] = deque(maxlen=MAX_IGNORED_PROCESSES)
         self._errors = log_handler.NewErrorFilter()
         self._count = 0
         self.left_out = 0
@@ -94,7 +94,7 @@ class Console:
             pid: Process id; None has no effect.
         """
         if pid is not None:
-            self._own.append(pid)
+            self._ignored_pids.append(pid)
 
     def clear(self) -> None:
         """Remove all records."""
@@ -133,7 +133,9 @@ class Console:
         except NepError:
             return ()  # an alert reports it, as for every topic
         return [
-            self._decode_record(each) for each in records if each.pid is None or each.pid not in self._own
+            self._decode_record(each)
+            for each in records
+            if each.pid is None or each.pid not in self._ignored_pids
         ]
 
     def _decode_record(self, log_record: log_handler.LogRecord) -> ConsoleRecord:

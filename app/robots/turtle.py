@@ -49,7 +49,7 @@ class VirtualWheels:
         self._lock = threading.Lock()
         self._ended = threading.Event()
         self._camera = Camera(self.body.room)
-        self._seen: set[str] = set()
+        self._visible_colours: set[str] = set()
         like = OtherRobot(link.name, 0.0, 0.0, 0.0, RADIUS, HEIGHT, "turtle")
         self._shared = SharedRoom(link, clock, self.body, self._lock, like)
         self._stepped_s = clock.now()
@@ -162,9 +162,9 @@ class VirtualWheels:
             if is_watched:
                 self._link.sense("camera", image)
             colours = colours_in(image)
-            for name in colours.keys() - self._seen:
+            for name in colours.keys() - self._visible_colours:
                 self._link.happen("colour", name=name, x=colours[name].x, area=colours[name].area)
-            self._seen = set(colours)
+            self._visible_colours = set(colours)
 
     def apply_change(self, change: Mapping[str, object]) -> None:
         """Apply a change of the world by the user.

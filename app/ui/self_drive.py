@@ -109,8 +109,8 @@ class SelfDrive(QObject):
         self.pictures: list[Path] = []
         self._steps = iter(steps if steps is not None else self._plan())
         self._step: Step | None = None
-        self._began = 0.0
-        self._seen_at: float | None = None
+        self._step_started_s = 0.0
+        self._visible_since_s: float | None = None
         window.resize(DEFAULT_SIZE)
         folder.mkdir(parents=True, exist_ok=True)
         self._timer = QTimer(self)
@@ -173,8 +173,8 @@ class SelfDrive(QObject):
 
     def _start_next_step(self) -> None:
         self._step = next(self._steps, None)
-        self._seen_at = None
-        self._began = time.monotonic()
+        self._visible_since_s = None
+        self._step_started_s = time.monotonic()
         if self._step is None:
             self._finish(True, f"the main job was done; {len(self.pictures)} pictures are in {self._folder}")
             return
@@ -196,16 +196,16 @@ class SelfDrive(QObject):
             raise
 
     def _check_step(self, step: Step, now: float) -> None:
-        if self._seen_at is None and step.is_visible():
-            self._seen_at = now
-        if self._seen_at is not None:
-            if now - self._seen_at >= step.settle_s:
+        if self._visible_since_s is None and step.is_visible():
+            self._visible_since_s = now
+        if self._visible_since_s is not None:
+            if now - self._visible_since_s >= step.settle_s:
                 self._save_screenshot(step.picture)
                 self._listener.step_finished(step)
                 self._start_next_step()
         elif reason := step.failure_reason():
             self._fail(step, reason)
-        elif now - self._began > step.timeout_s:
+        elif now - self._step_started_s > step.timeout_s:
             self._fail(step, "")
 
     def _fail(self, step: Step, reason: str) -> None:

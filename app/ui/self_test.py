@@ -58,13 +58,13 @@ class FirstPaint(QObject):
     def __init__(self, window: MainWindow, done: Callable[[], object]) -> None:
         # `done` is called in the event loop iteration after the paint event.
         super().__init__(window)
-        self._window, self._done = window, done
+        self._window, self._callback = window, done
         window.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Paint and watched is self._window:
             self._window.removeEventFilter(self)
-            QTimer.singleShot(0, self, self._done)
+            QTimer.singleShot(0, self, self._callback)
         return False
 
 
@@ -76,10 +76,10 @@ class WindowSteps:
         self._window, self._session, self._test, self._web = window, window.session, test, web
         self._painted = False
         self._drawn = b""
-        self._asked = False
+        self._is_drawing_requested = False
         self._watched = False
         self._rest: Mapping[str, object] = {}
-        self._spoken = self._moved = ""
+        self._speech = self._moved = ""
         self._stopped_after: object = None
         FirstPaint(window, self._on_painted)
 
@@ -150,7 +150,7 @@ class WindowSteps:
             case "run":
                 return session.runs.view().title
             case "moves":
-                return f"“{self._spoken}”, {self._moved}"
+                return f"“{self._speech}”, {self._moved}"
             case "stop":
                 return session.runs.view().result or ""
         return ""
@@ -193,13 +193,13 @@ class WindowSteps:
 
     def _has_blocks(self) -> bool:
         editor = self._window.editor()
-        if not self._asked and isinstance(editor, SupportsPictures):
-            self._asked = True
+        if not self._is_drawing_requested and isinstance(editor, SupportsPictures):
+            self._is_drawing_requested = True
             editor.picture("svg", True, self._on_drawing)
         return bool(self._drawn)
 
     def _on_drawing(self, drawing: bytes) -> None:
-        self._asked, self._drawn = False, drawing
+        self._is_drawing_requested, self._drawn = False, drawing
         if drawing:
             self._test.report.record_time("editor_ready")
 
@@ -220,11 +220,11 @@ class WindowSteps:
         turned = (
             name for name in state if name.startswith(JOINT_PREFIXES) and state[name] != self._rest.get(name)
         )
-        self._spoken = self._spoken or str(state.get("speech") or "")
+        self._speech = self._speech or str(state.get("speech") or "")
         self._moved = self._moved or next(
             (f"{name} {self._rest.get(name)} → {state[name]}" for name in turned), ""
         )
-        return bool(self._spoken and self._moved)
+        return bool(self._speech and self._moved)
 
     def _stop(self) -> None:
         self._stopped_after = self._newest_message()

@@ -333,7 +333,7 @@ class QtSpeaker(QObject):
         self._orders: deque[Request] = deque()
         self._desk: _SpeechWorker | None = None
         self._thread: threading.Thread | None = None
-        self._turns: dict[str, int] = {"say": 0, "play": 0}
+        self._generations: dict[str, int] = {"say": 0, "play": 0}
         self._busy = False
         self._problems: dict[str, str] = {}
         self._closed = False
@@ -355,7 +355,7 @@ class QtSpeaker(QObject):
             kind: Kind of the request, "say" or "play".
             generation: Counter of its kind when the request was queued.
         """
-        return not self._closed and generation >= self._turns[kind]
+        return not self._closed and generation >= self._generations[kind]
 
     def speak(self, text: str, language: str, volume: float) -> None:
         """Queue a text to be spoken; an earlier text is cancelled.
@@ -365,7 +365,7 @@ class QtSpeaker(QObject):
             language: Language code, such as "en".
             volume: Volume from 0 to 1.
         """
-        self._turns["say"] += 1
+        self._generations["say"] += 1
         self._busy = True
         self._enqueue("say", text, language, volume)
 
@@ -391,10 +391,10 @@ class QtSpeaker(QObject):
 
     def _stop(self, which: str) -> None:
         if which != "tones":
-            self._turns["say"] += 1
+            self._generations["say"] += 1
             self._busy = False
         if which != "voice":
-            self._turns["play"] += 1
+            self._generations["play"] += 1
         if self._thread is not None:
             self._enqueue("stop", which)
 
@@ -409,7 +409,7 @@ class QtSpeaker(QObject):
     def _enqueue(self, kind: str, *args: object) -> None:
         if self._closed:
             return
-        self._orders.append((kind, args, self._turns.get(kind, 0)))
+        self._orders.append((kind, args, self._generations.get(kind, 0)))
         if self._thread is None:
             self._thread = threading.Thread(target=self._run_thread, name="robots' voice", daemon=True)
             self._thread.start()
@@ -426,7 +426,7 @@ class QtSpeaker(QObject):
         self._desk = None
 
     def _on_ended(self, generation: int) -> None:
-        if generation == self._turns["say"]:
+        if generation == self._generations["say"]:
             self._busy = False
 
     def _on_reported(self, kind: str, problem: str) -> None:

@@ -20,16 +20,16 @@ class AlertTracker:
     """Tracker of alerts that returns the difference between successive graph snapshots."""
 
     def __init__(self) -> None:
-        self._known: dict[str, Alert] = {}
+        self._alerts: dict[str, Alert] = {}
 
     def update(self, view: GraphView) -> tuple[Sequence[Alert], Sequence[Alert]]:
         """Return (new or changed alerts, resolved alerts) since the previous call."""
         now = {alert.id: alert for alert in view.alerts}
         resolved = [
-            self._known.pop(id) for id in [alert_id for alert_id in self._known if alert_id not in now]
+            self._alerts.pop(id) for id in [alert_id for alert_id in self._alerts if alert_id not in now]
         ]
-        new = [alert for id, alert in now.items() if self._known.get(id) != alert]
-        self._known.update({alert.id: alert for alert in new})
+        new = [alert for id, alert in now.items() if self._alerts.get(id) != alert]
+        self._alerts.update({alert.id: alert for alert in new})
         return new, resolved
 
 

@@ -327,7 +327,7 @@ class _PlainReport(_Report):
 
     def __init__(self, running: Bridge) -> None:
         super().__init__(running)
-        self._shown: dict[str, tuple[str, ...]] = {}
+        self._last_counts: dict[str, tuple[str, ...]] = {}
         self._width = 0
 
     def show(self) -> None:
@@ -339,8 +339,8 @@ class _PlainReport(_Report):
             lines.append(self._line(_("topic"), [_(heading) for heading in _HEADINGS]))
         for row in rows:
             counts = row.cells[1:]
-            if self._shown.get(row.name) != counts:
-                self._shown[row.name] = counts
+            if self._last_counts.get(row.name) != counts:
+                self._last_counts[row.name] = counts
                 lines.append(self._line(row.name, row.cells))
         if lines:
             write("".join(f"{line}\n" for line in lines))

@@ -271,7 +271,7 @@ class MessagePrinter:
         self._names_topic = names_topic
         self._console = console()
         self._paint = json_highlighter() if self._console.is_terminal else None
-        self._whole = in_full or self._paint is None
+        self._is_untruncated = in_full or self._paint is None
 
     def __call__(self, message: Message) -> None:
         """Print one message."""
@@ -283,9 +283,9 @@ class MessagePrinter:
             values = self._fields.extract(message)
             if values is None:
                 return
-            body = format_payload(self._fields.as_dict(values), in_full=self._whole)
+            body = format_payload(self._fields.as_dict(values), in_full=self._is_untruncated)
         else:
-            body = _format_body(message, room, in_full=self._whole)
+            body = _format_body(message, room, in_full=self._is_untruncated)
         if self._paint is None or len(body) > _MAX_COLOURED_CHARACTERS:
             write(f"{header}  {body}\n")
         else:

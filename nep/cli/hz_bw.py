@@ -136,8 +136,8 @@ class _Report:
         measure: Callable[[RateWindow, float], tuple[Frequency | Bandwidth | Delay | None, Sequence[str]]],
     ) -> None:
         self._windows: Mapping[str, RateWindow] = {topic: RateWindow(window_s) for topic in topics}
-        self._heads = headings
-        self._figures = measure
+        self._headings = headings
+        self._measure = measure
         self._subscribers: dict[str, Subscriber] = {}
         self._totals: dict[str, int] = {}
         self._never = threading.Event()
@@ -162,7 +162,7 @@ class _Report:
                 self._subscribers[topic] = opened.enter_context(subscription)
             if not as_json:
                 print_status(_("measuring; press Ctrl+C to stop"))
-                write(f"{self._format_line(_('topic'), [_(heading) for heading in self._heads])}\n")
+                write(f"{self._format_line(_('topic'), [_(heading) for heading in self._headings])}\n")
             started = time.monotonic()
             for number in itertools.count(1):
                 while (remaining_s := started + number * _REPORT_PERIOD_S - time.monotonic()) > 0:
@@ -204,7 +204,7 @@ class _Report:
         return node.new_sub(topic, msg_type, sink=on_messages)
 
     def _show(self, topic: str) -> None:
-        measured, cells = self._figures(self._windows[topic], time.monotonic())
+        measured, cells = self._measure(self._windows[topic], time.monotonic())
         lost = self._subscribers[topic].lost
         message_count = str(measured.messages) if measured else "0"
         write(
@@ -212,7 +212,7 @@ class _Report:
         )
 
     def _show_json(self, topic: str) -> None:
-        measured, _ = self._figures(self._windows[topic], time.monotonic())
+        measured, _ = self._measure(self._windows[topic], time.monotonic())
         window = self._windows[topic]
         stats: Stats = asdict(measured) if measured else {"messages": 0}
         lost = self._subscribers[topic].lost

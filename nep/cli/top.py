@@ -269,29 +269,29 @@ class _LiveTables:
     """Full-screen tables, truncated to the terminal's height. Loss counts that have increased are yellow."""
 
     def __init__(self, printer: _GraphPrinter, live: Live) -> None:
-        self._shown, self._live = printer, live
+        self._printer, self._live = printer, live
         self._lost: dict[str, int] = {}
 
     def show(self, graph: GraphView, problem: str) -> None:
         from rich.console import Group  # noqa: PLC0415 - only a terminal needs it
         from rich.text import Text  # noqa: PLC0415
 
-        topics, nodes = topic_rows(graph, self._shown.pattern, self._shown.order), node_rows(graph)
+        topics, nodes = topic_rows(graph, self._printer.pattern, self._printer.order), node_rows(graph)
         notes = [Text(f"! {problem}", "yellow")] if problem else []
         notes += [Text(f"! {escaped(alert.sentence)}", "yellow", no_wrap=True) for alert in graph.alerts]
         room = max(2, shutil.get_terminal_size().lines - _FRAME_LINES - len(notes[:_NODE_ROWS_DIVISOR]))
         for_nodes = max(min(len(nodes), room // _NODE_ROWS_DIVISOR), room - len(topics))
         above, below = topics[: room - min(len(nodes), for_nodes)], nodes[:for_nodes]
-        parts: list[RenderableType] = [Text(self._shown.summary(graph), "dim", no_wrap=True)]
+        parts: list[RenderableType] = [Text(self._printer.summary(graph), "dim", no_wrap=True)]
         parts += notes[:_NODE_ROWS_DIVISOR]
-        rows = [self._shown.topic_cells(graph, each) for each in above]
+        rows = [self._printer.topic_cells(graph, each) for each in above]
         grown = {
             index
             for index, each in enumerate(above)
             if (each.lost or 0) > self._lost.get(each.name, each.lost or 0)
         }
         parts.append(_create_table(_TOPIC_COLUMNS, rows, len(topics) - len(above), grown))
-        rows = [self._shown.node_cells(*each) for each in below]
+        rows = [self._printer.node_cells(*each) for each in below]
         parts.append(_create_table(_NODE_COLUMNS, rows, len(nodes) - len(below), set()))
         self._lost = {each.name: each.lost for each in topics if each.lost is not None}
         self._live.update(Group(*parts), refresh=True)

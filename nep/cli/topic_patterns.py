@@ -34,7 +34,7 @@ class TopicPatterns:
         # `known`: topics that are already subscribed. Raises `BadTopicError` for an invalid pattern.
         self.patterns = tuple(map(check_topic, patterns))
         self._node = node
-        self._known = set(subscribed)
+        self._known_topics = set(subscribed)
         self._reported: set[str] = set()
         self._poll_at = 0.0
 
@@ -53,10 +53,10 @@ class TopicPatterns:
                     print_status(template.format(pattern=pattern))
         matching = [
             (name, published[name].msg_type)
-            for name in sorted(published.keys() - self._known)
+            for name in sorted(published.keys() - self._known_topics)
             if any(matches(pattern, name) for pattern in self.patterns)
         ]
-        self._known.update(name for name, _type in matching)
+        self._known_topics.update(name for name, _type in matching)
         return matching
 
     def poll(self) -> list[tuple[str, str]]:

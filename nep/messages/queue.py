@@ -100,7 +100,7 @@ class ReadAhead:
     """
 
     def __init__(self, max_messages: int) -> None:
-        self._most = max(1, min(MAX_READ_AHEAD, max_messages))
+        self._max_messages = max(1, min(MAX_READ_AHEAD, max_messages))
         self.now = 1
         """Current number of messages per read."""
         self.span_s = _FAST_READ_INTERVAL_S
@@ -108,7 +108,7 @@ class ReadAhead:
 
     def increase(self) -> int:
         """Increase the number of messages for a fast reader, and return it."""
-        self.now = min(2 * self.now, self._most)
+        self.now = min(2 * self.now, self._max_messages)
         self.span_s = self.now * _FAST_READ_INTERVAL_S
         return self.now
 

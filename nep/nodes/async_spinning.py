@@ -76,7 +76,7 @@ class _LoopWaiter:
     def __init__(self, work: Work, loop: asyncio.AbstractEventLoop, watcher: LoopWait) -> None:
         self._work = work
         self._loop = loop
-        self._waits = watcher
+        self._loop_wait = watcher
         self._ready = asyncio.Event()
         self._watched: dict[SubscriberTransport, Callable[[], None]] = {}
         self._queues: list[CallQueue] = []
@@ -92,7 +92,7 @@ class _LoopWaiter:
         for subscriber in self._work.waiting_subscribers:
             if subscriber not in self._watched:
                 call = self._watched[subscriber] = self._ready_callback(subscriber)
-                self._waits.watch(subscriber, call)
+                self._loop_wait.watch(subscriber, call)
         for queue in self._work.services.queues:
             if queue not in self._queues:
                 if not queue.enter_wait(self.wake):
@@ -115,7 +115,7 @@ class _LoopWaiter:
 
     def close(self) -> None:
         for subscriber, call in self._watched.items():
-            self._waits.unwatch(subscriber, call)
+            self._loop_wait.unwatch(subscriber, call)
         self._watched.clear()
         for queue in self._queues:
             queue.leave_wait(self.wake)

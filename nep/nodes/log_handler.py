@@ -124,18 +124,18 @@ class NewErrorFilter:
     """
 
     def __init__(self) -> None:
-        self._shown: dict[tuple[str, int, str], None] = {}
+        self._shown_errors: dict[tuple[str, int, str], None] = {}
 
     def is_new(self, record: LogRecord) -> bool:
         """Return True if a record has not been shown yet, or if it is not an error."""
         if record.level not in _ERROR_LEVELS:
             return True
         key = (record.node, record.stamp_ns, record.text[:100])
-        if key in self._shown:
+        if key in self._shown_errors:
             return False
-        self._shown[key] = None
-        if len(self._shown) > _MAX_SHOWN_ERRORS:
-            del self._shown[next(iter(self._shown))]
+        self._shown_errors[key] = None
+        if len(self._shown_errors) > _MAX_SHOWN_ERRORS:
+            del self._shown_errors[next(iter(self._shown_errors))]
         return True
 
     def new_records(self, payload: object) -> list[LogRecord]:

@@ -78,7 +78,7 @@ class LoopWait:
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = weakref.ref(loop)
         self._id = id(loop)
-        self._wait = SharedWait()
+        self._shared_wait = SharedWait()
         self._calls: dict[SubscriberTransport, list[Call]] = {}
         self._requests: deque[tuple[bool, SubscriberTransport]] = deque()
         self._is_stopped = False
@@ -90,7 +90,7 @@ class LoopWait:
         try:
             self._thread.start()
         except BaseException:
-            self._wait.close()
+            self._shared_wait.close()
             raise
         _run_to_first_yield(self._shutdown_hook.asend(None))
 
@@ -117,7 +117,7 @@ class LoopWait:
     def close(self) -> None:
         """Stop the thread."""
         self._is_stopped = True
-        self._wait.wake()
+        self._shared_wait.wake()
         if threading.current_thread() is not self._thread:
             self._thread.join(_JOIN_TIMEOUT_S)
 
@@ -130,7 +130,7 @@ class LoopWait:
 
     def _request(self, is_armed: bool, subscriber: SubscriberTransport) -> None:
         self._requests.append((is_armed, subscriber))
-        self._wait.wake()
+        self._shared_wait.wake()
 
     def _call_ready(self, subscribers: list[SubscriberTransport]) -> None:
         # Runs in the loop.
@@ -143,13 +143,13 @@ class LoopWait:
     def _run(self) -> None:
         try:
             while not self._is_stopped:
-                ready = self._wait.wait(_LOOP_CHECK_INTERVAL_S)
+                ready = self._shared_wait.wait(_LOOP_CHECK_INTERVAL_S)
                 ready += self._apply_requests()
                 if not self._notify_loop(ready):
                     return
         finally:
             self._is_stopped = True
-            self._wait.close()
+            self._shared_wait.close()
             with _lock:
                 if _waits.get(self._id) is self:
                     del _waits[self._id]
@@ -160,8 +160,8 @@ class LoopWait:
         while self._requests:
             is_armed, subscriber = self._requests.popleft()
             if not is_armed:
-                self._wait.disarm(subscriber)
-            elif not self._wait.arm(subscriber):
+                self._shared_wait.disarm(subscriber)
+            elif not self._shared_wait.arm(subscriber):
                 ready.append(subscriber)
         return ready
 

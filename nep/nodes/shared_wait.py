@@ -20,12 +20,12 @@ class _ReadyCallback:
     """Object that a transport wakes when its subscriber may have a message. Implements `Wakeable`."""
 
     def __init__(self, shared_wait: SharedWait, subscriber: SubscriberTransport) -> None:
-        self._waits = shared_wait
+        self._shared_wait = shared_wait
         self._subscriber = subscriber
 
     def wake(self) -> None:
         # Thread-safe.
-        self._waits.set_ready(self._subscriber)
+        self._shared_wait.set_ready(self._subscriber)
 
 
 class SharedWait:

@@ -107,7 +107,7 @@ class RecorderService:
         """Start the thread that reports the state of recordings. The node stays open after `close`."""
         self._clock = clock
         self._node, self._report = node, report
-        self._tell_lock = threading.Lock()
+        self._report_lock = threading.Lock()
         self._lock = threading.RLock()
         """Lock that is held while a recording or the ring starts or stops."""
         self._recording: _ActiveRecording | None = None
@@ -170,7 +170,7 @@ class RecorderService:
             event: Name of the event.
             content: Further fields of the event.
         """
-        with self._tell_lock:
+        with self._report_lock:
             self._report({"event": event, **content})
 
     def _report_problem(self, op: str, message: str, path: str = "") -> None:

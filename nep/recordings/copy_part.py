@@ -75,7 +75,7 @@ class _PartCopier:
                 self._numbers[channel] = self._channel_number(channel)
         self.channels = frozenset((*self._roles, *self._numbers))
         writer.write_channels(dict.fromkeys(self._numbers.values()))
-        self._figures = _StatsCounter(recording) if recording.stats() else None
+        self._stats_counter = _StatsCounter(recording) if recording.stats() else None
         self._last_entries: dict[tuple[str, str], object] = {}
         self._entry_count = 0
         self._chunk_ns: int | None = None
@@ -95,8 +95,8 @@ class _PartCopier:
         self._write_message(self._numbers[raw.channel], raw)
         self.count += 1
         self._copied()
-        if self._figures is not None:
-            self._figures.add(raw)
+        if self._stats_counter is not None:
+            self._stats_counter.add(raw)
             self._write_stats(raw.log_ns)
 
     def _write_message(self, number: int, raw: RawMessage) -> None:
@@ -124,7 +124,7 @@ class _PartCopier:
             self._write_message(self._channel_number(raw.channel), raw)
 
     def _write_stats(self, at_ns: int, *, is_final: bool = False) -> None:
-        record = None if self._figures is None else self._figures.record(at_ns, is_final=is_final)
+        record = None if self._stats_counter is None else self._stats_counter.record(at_ns, is_final=is_final)
         number = None if record is None else self._writer.table.number(recorder_channel("figures"))
         if record is not None and number is not None:
             self._writer.add(number, (at_ns, at_ns), 0, b"", record)
@@ -133,7 +133,7 @@ class _PartCopier:
         recording, writer = self._recording, self._writer
         self._write_stats(self._last_ns, is_final=True)
         writer.flush()
-        if self._figures is not None or recording.recorder_metadata:
+        if self._stats_counter is not None or recording.recorder_metadata:
             metadata = {
                 "started_ns": str(writer.start_ns or 0),
                 "ended_ns": str(writer.end_ns),
@@ -141,8 +141,8 @@ class _PartCopier:
                 "end": "",
             }
             writer.add_metadata("nep.recording", metadata)
-        if self._figures is not None:
-            writer.add_metadata("nep.figures", self._figures.to_plain())
+        if self._stats_counter is not None:
+            writer.add_metadata("nep.figures", self._stats_counter.to_plain())
         for name, values in recording.info.metadata:
             if name not in _RECORDER_METADATA:
                 writer.add_metadata(name, values)

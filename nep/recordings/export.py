@@ -218,12 +218,12 @@ class _Progress:
 
     def __init__(self, total: int, progress: Progress | None) -> None:
         self._total, self._progress = total, progress
-        self._done = 0
+        self._done_count = 0
 
     def add(self) -> None:
-        self._done += 1
-        if self._progress is not None and (self._done % 100 == 0 or self._done >= self._total):
-            self._progress(min(self._done, self._total), self._total)
+        self._done_count += 1
+        if self._progress is not None and (self._done_count % 100 == 0 or self._done_count >= self._total):
+            self._progress(min(self._done_count, self._total), self._total)
 
 
 class _Source:

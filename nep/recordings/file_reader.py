@@ -213,7 +213,7 @@ class FileReader:
             self._latest_ends = array("Q")
             self._in_chunks: dict[int, array[int]] = {}
             self._index_chunks()
-            self._facts = self._read_info()
+            self._info = self._read_info()
         except OSError as error:
             self._file.close()
             raise disk_error(self.path, error) from error
@@ -259,7 +259,7 @@ class FileReader:
     @property
     def info(self) -> FileInfo:
         """Properties of the file."""
-        return self._facts
+        return self._info
 
     @property
     def corruption(self) -> Sequence[CorruptRange]:

@@ -208,13 +208,13 @@ class RecordingWriter:
         self._queue: deque[tuple[int, Sequence[Message]] | _Entry] = deque()
         self._queued_bytes = self._queued_messages = 0
         self._dropped_counts: dict[tuple[str, int | None], list[int]] = {}
-        self._flush_wanted = self._flush_done = 0
+        self._last_requested_flush = self._last_completed_flush = 0
         self._is_closing = self._has_ended = False
         self._problem = ""
         self._last_ns = 0
         self._counters: dict[str, TopicCounter] = {}
-        self._known: dict[int, _KindCache] = {}
-        self._figures: dict[str, TopicStats] = {}
+        self._kind_cache: dict[int, _KindCache] = {}
+        self._stats: dict[str, TopicStats] = {}
         self._first_ns: int | None = None
         self._own_sequence = 0
         self._part = _Part()
@@ -296,11 +296,12 @@ class RecordingWriter:
             False if the time limit has passed or an error has stopped the writer.
         """
         with self._lock:
-            self._flush_wanted += 1
-            flush_number = self._flush_wanted
+            self._last_requested_flush += 1
+            flush_number = self._last_requested_flush
             self._lock.notify_all()
             is_done = self._lock.wait_for(
-                lambda: self._flush_done >= flush_number or self._has_ended or bool(self._problem), timeout_s
+                lambda: self._last_completed_flush >= flush_number or self._has_ended or bool(self._problem),
+                timeout_s,
             )
             return is_done and not self._problem
 
@@ -315,8 +316,8 @@ class RecordingWriter:
                 self._size_bytes,
                 0.0 if first is None else max(0, self._last_ns - first) / 1e9,
                 self._queued_bytes,
-                waiting + sum(each.unkept for each in self._figures.values()),
-                dict(self._figures),
+                waiting + sum(each.unkept for each in self._stats.values()),
+                dict(self._stats),
                 self._problem,
             )
 
@@ -382,18 +383,22 @@ class RecordingWriter:
         look_at = time.monotonic() + self._limits.stats_interval_s
         while True:
             with self._lock:
-                if not self._queue and not self._is_closing and self._flush_done >= self._flush_wanted:
+                if (
+                    not self._queue
+                    and not self._is_closing
+                    and self._last_completed_flush >= self._last_requested_flush
+                ):
                     self._lock.wait(max(0.0, min(flush_at, look_at) - time.monotonic()))
                 batch = list(self._queue)
                 self._queue.clear()
-                is_closing, flush_number = self._is_closing, self._flush_wanted
+                is_closing, flush_number = self._is_closing, self._last_requested_flush
             self._write_batch(batch)
             now = time.monotonic()
-            if flush_number > self._flush_done or now >= flush_at:
+            if flush_number > self._last_completed_flush or now >= flush_at:
                 self._flush()
                 flush_at = now + self._limits.flush_interval_s
                 with self._lock:
-                    self._flush_done = flush_number
+                    self._last_completed_flush = flush_number
                     self._lock.notify_all()
             if now >= look_at:
                 look_at = now + self._limits.stats_interval_s
@@ -437,7 +442,7 @@ class RecordingWriter:
         return log_ns
 
     def _write_message(self, message: Message, log_ns: int) -> None:
-        cached = self._known.get(id(message.kind))
+        cached = self._kind_cache.get(id(message.kind))
         if cached is None or cached.publisher != message.publisher:
             cached = self._cache_kind(message)
         encoding = encoding_of(message, log_ns)
@@ -461,10 +466,10 @@ class RecordingWriter:
             self._flush()
 
     def _cache_kind(self, message: Message) -> _KindCache:
-        if len(self._known) >= _MAX_CACHED_KINDS:
-            self._known.clear()
+        if len(self._kind_cache) >= _MAX_CACHED_KINDS:
+            self._kind_cache.clear()
         cached = _KindCache(message.kind, message.publisher, self._counter(message.topic))
-        self._known[id(message.kind)] = cached  # `known` keeps the kind alive, so its id stays unique
+        self._kind_cache[id(message.kind)] = cached  # `known` keeps the kind alive, so its id stays unique
         return cached
 
     def _counter(self, topic: str) -> TopicCounter:
@@ -505,7 +510,7 @@ class RecordingWriter:
         self._add_metadata(file, "")
         self._destination.next_file()
         self._update_counts(file)
-        self._part = self._part.next_part(self._figures, self._message_count, self._size_bytes)
+        self._part = self._part.next_part(self._stats, self._message_count, self._size_bytes)
         for message in self._part.latched.values():  # each file must be playable alone
             encoding = encoding_of(message, self._last_ns)
             number, encoding = self._channel(message, encoding, self._last_ns)
@@ -526,7 +531,7 @@ class RecordingWriter:
         for counter in counters.values():
             counter.is_changed = False
         with self._lock:
-            self._figures = {**self._figures, **stats_by_topic}
+            self._stats = {**self._stats, **stats_by_topic}
         part_stats = {
             topic: each.to_plain() for topic, each in self._part.stats_of_part(stats_by_topic).items()
         }
@@ -557,7 +562,7 @@ class RecordingWriter:
         file.add_metadata("nep.recording", values)
         encoded_stats = {
             topic: orjson.dumps(each.to_plain()).decode()
-            for topic, each in sorted(self._part.stats_of_part(self._figures).items())
+            for topic, each in sorted(self._part.stats_of_part(self._stats).items())
         }
         if encoded_stats:
             file.add_metadata("nep.figures", encoded_stats)

@@ -247,7 +247,7 @@ class MasterNameResolver:
         """Address with a numeric host, or "" until the name is resolved."""
         self._host, self._port = host_of(address), address.rpartition(":")[2]
         self._on_change = on_change
-        self._look_up = look_up
+        self._resolve_host = look_up
         self._thread: threading.Thread | None = None
         self._retry_at = 0.0
         self._is_failure_logged = False
@@ -290,7 +290,7 @@ class MasterNameResolver:
 
     def _resolve(self) -> None:
         try:
-            address = f"{self._look_up(self._host)}:{self._port}"
+            address = f"{self._resolve_host(self._host)}:{self._port}"
         except (OSError, UnicodeError) as error:
             if not self._is_failure_logged:
                 self._is_failure_logged = True

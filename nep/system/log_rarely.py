@@ -29,14 +29,14 @@ class SuppressedErrors:
             operation: Name of the work; the log message is "WORK failed (N so far)".
         """
         self.count = 0
-        self._logger, self._what = logger, operation
+        self._logger, self._operation = logger, operation
 
     def add(self, error: BaseException) -> None:
         """Count an exception and log it at increasing intervals."""
         self.count += 1
         if is_logged(self.count):
             with suppress(Exception):  # logging may fail without memory or stack
-                self._logger.error("%s failed (%d so far)", self._what, self.count, exc_info=error)
+                self._logger.error("%s failed (%d so far)", self._operation, self.count, exc_info=error)
 
     def __enter__(self) -> None:
         return None

@@ -26,21 +26,21 @@ class Waker:
     def __init__(self) -> None:
         self._lock = threading.RLock()  # the number of a closed descriptor may already belong to another file
         self._event = -1
-        self._ends: tuple[socket.socket, ...] = ()
+        self._sockets: tuple[socket.socket, ...] = ()
         try:
             if _HAS_EVENTFD:
                 self._event = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
             else:
-                self._ends = socket.socketpair()
+                self._sockets = socket.socketpair()
         except OSError as error:
             if is_descriptor_shortage(error.errno):
                 raise TooManyFilesError(
                     _("a waiting thread"), open_descriptor_count(), descriptor_limit()
                 ) from error
             raise
-        for end in self._ends:
+        for end in self._sockets:
             end.setblocking(False)
-        self.fd = self._ends[0].fileno() if self._ends else self._event
+        self.fd = self._sockets[0].fileno() if self._sockets else self._event
         """File descriptor to poll for reading."""
         watch(self)
 
@@ -49,16 +49,16 @@ class Waker:
         with self._lock, contextlib.suppress(OSError):  # full: already readable
             if self._event >= 0:
                 os.eventfd_write(self._event, 1)
-            elif self._ends:
-                self._ends[1].send(b"\0")
+            elif self._sockets:
+                self._sockets[1].send(b"\0")
 
     def clear(self) -> None:
         """Make `fd` unreadable. The waiting thread calls this before it checks for work."""
         with self._lock, contextlib.suppress(OSError):
             if self._event >= 0:
                 os.eventfd_read(self._event)
-            elif self._ends:
-                while self._ends[0].recv(4096):
+            elif self._sockets:
+                while self._sockets[0].recv(4096):
                     pass
 
     def close(self) -> None:
@@ -76,7 +76,7 @@ class Waker:
 
     def _close(self) -> None:
         event, self._event = self._event, -1
-        sockets, self._ends = self._ends, ()
+        sockets, self._sockets = self._sockets, ()
         if event >= 0:
             os.close(event)
         for end in sockets:

@@ -21,16 +21,16 @@ class UniqueTexts:
 
     def __init__(self, before_number: str, taken: Iterable[str] = ()) -> None:
         self._before_number = before_number
-        self._taken = set(taken)
+        self._used_texts = set(taken)
         self._next: dict[str, int] = {}  # next number to try: 4000 scripts may share a name
 
     def make_unique(self, text: str) -> str:
         """Return the text, or the text with the first unused number if it is not unique."""
         candidate, number = text, self._next.get(text, 2)
-        while candidate in self._taken:
+        while candidate in self._used_texts:
             candidate, number = f"{text}{self._before_number}{number}", number + 1
         self._next[text] = number
-        self._taken.add(candidate)
+        self._used_texts.add(candidate)
         return candidate
 
 

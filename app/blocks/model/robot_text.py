@@ -40,7 +40,7 @@ class BlockTemplate:
         self.shown: frozenset[str] = frozenset(
             name for name in _PLACEHOLDER.findall(text) if name in self.arguments
         )
-        self._placed: set[str] = set()
+        self._inserted_arguments: set[str] = set()
         self.text = _PLACEHOLDER.sub(self._replace_placeholder, text)
         if "%ROBOT" not in self.text:
             self.text = f"%ROBOT {self.text}"
@@ -48,9 +48,9 @@ class BlockTemplate:
     def _replace_placeholder(self, match: re.Match[str]) -> str:
         name = "ROBOT" if match[1] == "robot" else self.arguments.get(match[1])
         # Drop unknown placeholders, which would be read as block arguments, and duplicates.
-        if name is None or name in self._placed:
+        if name is None or name in self._inserted_arguments:
             return ""
-        self._placed.add(name)
+        self._inserted_arguments.add(name)
         return f"%{name}"
 
 

@@ -62,7 +62,7 @@ class RunnerOutput:
         self._stream = stream
         self._lock = threading.Lock()
         self._printed: queue.Queue[str] = queue.Queue(LINES_PER_SAMPLE)
-        self._left = MAX_LINES
+        self._remaining_lines = MAX_LINES
         self.told: Callable[[str], object] = lambda _line: None
         """Called with each line that the program prints."""
         self._dropped = 0
@@ -93,13 +93,13 @@ class RunnerOutput:
 
     def send_printed(self) -> None:
         """Send the queued lines, at most `MAX_LINES` in total."""
-        while self._left > 0:
+        while self._remaining_lines > 0:
             try:
                 self.send("print", text=self._printed.get_nowait())
             except queue.Empty:
                 break
-            self._left -= 1
-            if self._left == 0:
+            self._remaining_lines -= 1
+            if self._remaining_lines == 0:
                 self.send(
                     "print",
                     text=_("no more lines are shown: the limit of {count} lines has been reached").format(

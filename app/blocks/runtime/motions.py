@@ -41,7 +41,7 @@ class Motions:
         stand: Callable[[Robot], None],
         invoke: Callable[[str, str, Mapping[str, object]], object],
     ) -> None:
-        self._stop, self._stand, self._invoke = stop, stand, invoke
+        self._stop, self._stop_motion, self._invoke = stop, stand, invoke
         self._lock = threading.Lock()
         self._unanswered: dict[str, _Motion] = {}  # by command id, until it is answered
         self._motions: dict[tuple[str, str], _Motion] = {}  # by robot and action
@@ -89,7 +89,7 @@ class Motions:
         if rests:  # started by a single step of a paused program
             self._stop(motion.robot)
         elif slow:
-            self._stand(motion.robot)
+            self._stop_motion(motion.robot)
 
     def stop_all(self) -> tuple[str, ...]:
         """Stop all motions until `resume_all`, and return the names of the stopped robots."""
@@ -123,7 +123,7 @@ class Motions:
             rests = self._paused
         for robot in moving.values():
             if not rests:
-                self._stand(robot)
+                self._stop_motion(robot)
         yield
         # Not reached if the program was stopped, so that nothing starts again.
         with self._lock:

@@ -173,7 +173,7 @@ class Network:
         for topic in listens:
             self._subscribe(topic)
         with suppress(NepError):  # the master is down: owners are resolved later
-            self._look_up_senders()
+            self._resolve_senders()
         for robot in self._robots.values():
             if robot.dialect != "rize":
                 self._alive.start(robot.name, self._publishers[robot.topics.command].publish)
@@ -311,7 +311,7 @@ class Network:
         self._ending = True
         if timeout_s:
             with suppress(NepError):
-                self._look_up_senders()
+                self._resolve_senders()
         for robot in self._robots.values():
             if robot.dialect == "rize":
                 continue
@@ -359,7 +359,7 @@ class Network:
             self._subscribed.add(topic)
         self._node.new_sub(topic, sink=self._receive_messages)
 
-    def _look_up_senders(self) -> None:
+    def _resolve_senders(self) -> None:
         # Queries the graph and resolves senders. Never call it in the node's own thread, which it would
         # block.
         view = self._node.graph()
@@ -390,7 +390,7 @@ class Network:
         while self._lookup_requested.wait() and not self._closed.is_set():
             self._lookup_requested.clear()
             with self._errors, suppress(NepError):
-                self._look_up_senders()
+                self._resolve_senders()
             self._closed.wait(LOOKUP_INTERVAL_S)
 
     def _is_from_robot(self, message: Message) -> bool:

@@ -54,7 +54,7 @@ class Questions:
     """
 
     def __init__(self, scheduler: Scheduler, on_question: QuestionCallback | None) -> None:
-        self._scheduler, self._asked = scheduler, on_question
+        self._scheduler, self._on_question = scheduler, on_question
         self._lock = threading.Lock()
         self._ids = itertools.count(1)
         self._waiting: list[ProgramQuestion] = []
@@ -66,7 +66,7 @@ class Questions:
         Raises:
             BehaviourError: The program runs outside of Studio.
         """
-        if self._asked is None:
+        if self._on_question is None:
             raise BehaviourError(
                 _("Can't ask the question: the behaviour runs outside Studio. Run it in Studio.")
             )
@@ -80,7 +80,7 @@ class Questions:
         Raises:
             BehaviourError: The program runs outside of Studio, or the list is empty or too long.
         """
-        if self._asked is None:
+        if self._on_question is None:
             raise BehaviourError(
                 _("Can't ask the question: the behaviour runs outside Studio. Run it in Studio.")
             )
@@ -114,8 +114,8 @@ class Questions:
         with self._lock:
             before = self._waiting[:1]
             change(question)
-            if before != self._waiting[:1] and self._asked is not None:
-                self._asked(self._waiting[0] if self._waiting else None)
+            if before != self._waiting[:1] and self._on_question is not None:
+                self._on_question(self._waiting[0] if self._waiting else None)
 
 
 def choices_by_label(choices: object) -> dict[str, object]:

@@ -54,12 +54,12 @@ class StatusText:
 
     def __init__(self, block: Callable[[], str | None], readings: Mapping[str, str]) -> None:
         self._block, self._readings = block, readings
-        self._told: dict[str | None, str] = {}
+        self._status_by_block: dict[str | None, str] = {}
         self._warned: dict[str | None, str] = {}
 
     def set_text(self, status: str) -> None:
         """Set the activity of a robot at the current block of the calling script; "" removes it."""
-        _set_or_remove(self._told, self._block(), status)
+        _set_or_remove(self._status_by_block, self._block(), status)
 
     def set_warning(self, warning: str) -> None:
         """Set a warning at the current block of the calling script; "" removes it."""
@@ -67,7 +67,7 @@ class StatusText:
 
     def text(self, blocks: Sequence[str]) -> str:
         """Return the text for the run bar: the activity of a robot at these blocks, or the first block."""
-        return _first_text(self._told, blocks) or self.block_text(blocks[0] if blocks else None)
+        return _first_text(self._status_by_block, blocks) or self.block_text(blocks[0] if blocks else None)
 
     def warning(self, blocks: Sequence[str]) -> str:
         """Return the warning at one of these blocks; "" if there is none."""
@@ -123,7 +123,7 @@ class Replacements:
         self._commands: deque[_Command] = deque(maxlen=MAX_STORED_COMMANDS)
         self._lock = threading.Lock()
         self._counts: dict[tuple[str, str], int] = {}
-        self._news: dict[tuple[str, str], Replacement] = {}
+        self._new_replacements: dict[tuple[str, str], Replacement] = {}
 
     def record_command(self, call: RobotCall, action: Action, block: str | None) -> None:
         """Record a command of the calling script.
@@ -158,12 +158,12 @@ class Replacements:
         pair = (loser.block, winner.block or winner.action.name)
         with self._lock:
             count = self._counts[pair] = self._counts.get(pair, 0) + 1
-            self._news[pair] = Replacement(loser.block, message, count)
+            self._new_replacements[pair] = Replacement(loser.block, message, count)
 
     def take_new(self) -> tuple[Replacement, ...]:
         """Return the replacements since the last call; repeated ones are combined with their count."""
         with self._lock:
-            new_replacements, self._news = tuple(self._news.values()), {}
+            new_replacements, self._new_replacements = tuple(self._new_replacements.values()), {}
         return new_replacements
 
 

@@ -88,8 +88,8 @@ class VariableWatch:
     def __init__(self, names: dict[str, object], variables: Sequence[Variable]) -> None:
         self._names = names
         self._variables = {variable.python: variable for variable in variables if variable.python}
-        self._seen: dict[str, object] = {}
-        self._told: dict[str, VariableValue] = {}
+        self._last_values: dict[str, object] = {}
+        self._reported_values: dict[str, VariableValue] = {}
 
     def changes(self) -> list[VariableValue]:
         """Return the variables whose displayed value has changed since the last call.
@@ -101,15 +101,15 @@ class VariableWatch:
             if characters > MAX_TOTAL_CHARACTERS:
                 break
             value = self._names.get(python)
-            if python in self._told and self._is_unchanged(python, value):
+            if python in self._reported_values and self._is_unchanged(python, value):
                 continue
             try:
                 displayed = display_value(variable.id, value)
             except RuntimeError:
                 continue  # a script is changing the value; the next read gets it
-            self._seen[python] = _comparable(value)
-            if displayed != self._told.get(python):
-                self._told[python] = displayed
+            self._last_values[python] = _comparable(value)
+            if displayed != self._reported_values.get(python):
+                self._reported_values[python] = displayed
                 changed.append(displayed)
                 characters += len(displayed.text) + sum(map(len, displayed.items))
         return changed
@@ -125,7 +125,7 @@ class VariableWatch:
             self._names[python] = value
 
     def _is_unchanged(self, python: str, value: object) -> bool:
-        last_seen = self._seen.get(python)
+        last_seen = self._last_values.get(python)
         if isinstance(value, list):
             return (
                 isinstance(last_seen, tuple)

@@ -24,7 +24,7 @@ class BackgroundWorker(Generic[T]):
         self._changed = threading.Condition()
         self._pending: dict[str, Callable[[], T]] = {}
         self._current_owner: str | None = None
-        self._done: dict[str, T] = {}
+        self._results: dict[str, T] = {}
         self._failed: dict[str, Exception] = {}
         self._thread: threading.Thread | None = None
         self._closed = False
@@ -47,7 +47,7 @@ class BackgroundWorker(Generic[T]):
             failed = self._failed.pop(owner, None)
             if failed is not None:
                 raise failed
-            return self._done.pop(owner, None)
+            return self._results.pop(owner, None)
 
     def finish(self, owner: str) -> bool:
         """Wait at most 2 s until the owner has no pending or running job; return False on timeout."""
@@ -61,7 +61,7 @@ class BackgroundWorker(Generic[T]):
         """Discard the owner's pending job and result."""
         with self._changed:
             self._pending.pop(owner, None)
-            self._done.pop(owner, None)
+            self._results.pop(owner, None)
             self._failed.pop(owner, None)
 
     def close(self) -> None:
@@ -87,9 +87,9 @@ class BackgroundWorker(Generic[T]):
                 result = job()
             except Exception as error:  # noqa: BLE001  raised in the thread that takes the result
                 with self._changed:
-                    self._done.pop(owner, None)
+                    self._results.pop(owner, None)
                     self._failed[owner] = error
                 continue
             with self._changed:
                 self._failed.pop(owner, None)
-                self._done[owner] = result
+                self._results[owner] = result

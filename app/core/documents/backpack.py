@@ -79,7 +79,7 @@ class Backpack:
         self.revision = 0
         """Counter that increases when the content changes."""
         self._clock = clock
-        self._known = _Content()
+        self._content = _Content()
         self._stamp: Stamp | None = None
         self._problem = ""
         self._reported = ""
@@ -88,7 +88,7 @@ class Backpack:
     @property
     def items(self) -> tuple[BackpackStack, ...]:
         """Stacks that this version can read, newest first."""
-        return self._known.items
+        return self._content.items
 
     def take_problem(self) -> str:
         """Return and clear the error message about the file; "" if there is no error."""
@@ -152,9 +152,9 @@ class Backpack:
             self._apply(now)
 
     def _apply(self, content: _Content) -> None:
-        if _ids(content) != _ids(self._known):
+        if _ids(content) != _ids(self._content):
             self.revision += 1
-        self._known = content
+        self._content = content
         self._stamp = _stamp(self.path)
 
     def _write(self, content: _Content, *, grows: bool) -> None:

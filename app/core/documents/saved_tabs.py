@@ -22,7 +22,7 @@ class SavedTabs:
         self.active = False
         """True if the tabs of this window are saved; False in a second window."""
         self._last_session: dict[str, object] = {}
-        self._kept_revision = -1
+        self._saved_revision = -1
 
     def restore(self, unsaved_work: Sequence[UnsavedWork]) -> list[UnsavedWork]:
         """Restore the tabs of the last session, and start saving changes.
@@ -64,7 +64,7 @@ class SavedTabs:
 
         Called once a second, so that switching tabs does not wait for the disk.
         """
-        if self._documents.revision != self._kept_revision:
+        if self._documents.revision != self._saved_revision:
             self.save()
 
     def save(self, *, ended_well: bool = False) -> None:
@@ -75,7 +75,7 @@ class SavedTabs:
         """
         if not self.active:
             return
-        self._kept_revision = self._documents.revision
+        self._saved_revision = self._documents.revision
         try:
             self._settings.set(SETTING_KEY, {**self._documents.tabs_state(), "ended_well": ended_well})
         except SettingsError as error:

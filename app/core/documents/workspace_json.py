@@ -21,12 +21,12 @@ class WorkspaceJson:
     Immutable and thread-safe.
     """
 
-    __slots__ = ("_blocks", "_text", "_was_told")
+    __slots__ = ("_blocks", "_is_from_text", "_text")
 
     def __init__(self, text: str | None, blocks: Mapping[str, object] | None = None) -> None:
         # Raises ValueError or RecursionError if `text` can't be parsed. It is parsed immediately only where
         # the nesting could be too deep, which requires many brackets.
-        self._text, self._blocks, self._was_told = text, blocks, text is not None
+        self._text, self._blocks, self._is_from_text = text, blocks, text is not None
         if (
             text is not None
             and blocks is None
@@ -68,7 +68,7 @@ class WorkspaceJson:
         Two texts from the editor's page are compared as text. Workspaces that are nested too deeply to
         be compared count as different.
         """
-        if self._was_told and other._was_told:
+        if self._is_from_text and other._is_from_text:
             return self._text == other._text
         try:
             return deep_json.are_equal(self.blocks, other.blocks)

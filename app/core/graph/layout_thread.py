@@ -28,7 +28,7 @@ class LayoutThread:
         self._process: LayoutProcess | None = None
         self._changed = threading.Condition()
         self._waiting: tuple[NodeGraph, GraphLayout | None, LayoutSizes] | None = None
-        self._made: tuple[NodeGraph, GraphLayout] | None = None
+        self._result: tuple[NodeGraph, GraphLayout] | None = None
         self._is_busy = self._is_closing = False
         self._thread: threading.Thread | None = None
 
@@ -58,7 +58,7 @@ class LayoutThread:
     def pop_result(self) -> tuple[NodeGraph, GraphLayout] | None:
         """Return and clear the newest finished graph and its layout; None if there is none."""
         with self._changed:
-            layout, self._made = self._made, None
+            layout, self._result = self._result, None
             return layout
 
     def close(self) -> None:
@@ -85,7 +85,7 @@ class LayoutThread:
             with self._changed:
                 self._is_busy = False
                 if layout is not None:
-                    self._made = graph, layout
+                    self._result = graph, layout
 
     def _arrange_by_size(
         self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes

@@ -22,7 +22,7 @@ class MessageHistory:
 
     def __init__(self, most_bytes: int = MAX_BYTES, most_messages: int = MAX_MESSAGES) -> None:
         self._most_bytes, self._most_messages = most_bytes, max(1, most_messages)
-        self._kept: deque[Message] = deque()
+        self._messages: deque[Message] = deque()
         self.size_bytes = 0
         self.first = 0
         """Number of the oldest stored message; equals the number of evicted ones."""
@@ -30,22 +30,22 @@ class MessageHistory:
         """Number of messages dropped before they reached this history."""
 
     def __len__(self) -> int:
-        return len(self._kept)
+        return len(self._messages)
 
     def __iter__(self) -> Iterator[Message]:
         # Oldest first; not to be decoded.
-        return iter(self._kept)
+        return iter(self._messages)
 
     @property
     def end(self) -> int:
         """Number that the next message will have."""
-        return self.first + len(self._kept)
+        return self.first + len(self._messages)
 
     def at(self, number: int) -> Message | None:
         """Return a copy of the message with this number; None if the message is not stored."""
         if not self.first <= number < self.end:
             return None
-        return copy(self._kept[number - self.first])
+        return copy(self._messages[number - self.first])
 
     def nearest(self, number: int) -> int:
         """Return the number of the nearest stored message. Don't call it while the history is empty."""
@@ -58,12 +58,12 @@ class MessageHistory:
         stored.decoded = UNDECODED
         if not isinstance(stored.raw, bytes):
             stored.raw = bytes(stored.raw)
-        self._kept.append(stored)
+        self._messages.append(stored)
         self.size_bytes += stored.size_bytes
-        while len(self._kept) > 1 and (
-            len(self._kept) > self._most_messages or self.size_bytes > self._most_bytes
+        while len(self._messages) > 1 and (
+            len(self._messages) > self._most_messages or self.size_bytes > self._most_bytes
         ):
-            self.size_bytes -= self._kept.popleft().size_bytes
+            self.size_bytes -= self._messages.popleft().size_bytes
             self.first += 1
 
     def process(self, batch: Batch, _now_ns: int) -> None:
@@ -74,5 +74,5 @@ class MessageHistory:
 
     def reset(self) -> None:
         """Remove all messages. Called when the source seeks to another time."""
-        self._kept.clear()
+        self._messages.clear()
         self.size_bytes = self.first = self.missed = 0

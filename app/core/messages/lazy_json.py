@@ -58,7 +58,7 @@ class JsonIndex:
         import numpy as np  # noqa: PLC0415  slow import, needed only by large messages
 
         self.data = data
-        self._places, kinds = _find_separators(data)
+        self._separator_positions, kinds = _find_separators(data)
         opens, closes = np.isin(kinds, list(OPEN)), np.isin(kinds, list(CLOSE))
         after = np.cumsum(opens.astype(np.int32) - closes)
         if not len(after) or after[-1] != 0 or after.min() < 0:
@@ -69,11 +69,12 @@ class JsonIndex:
         order = np.argsort(level.astype(np.int16), kind="stable")
         bounds = np.searchsorted(np.take(level, order), np.arange(1, int(level.max()) + 2))
         self._levels = [  # `take` releases the GIL, unlike indexing with brackets
-            (np.take(self._places, order[a:b]), np.take(kinds, order[a:b])) for a, b in pairwise(bounds)
+            (np.take(self._separator_positions, order[a:b]), np.take(kinds, order[a:b]))
+            for a, b in pairwise(bounds)
         ]
-        self._kept: dict[int, _LazyContainer] = {}
-        self._many: dict[int, tuple[int, Positions, Positions]] = {}
-        self._ends = [positions[np.isin(kinds, list(CLOSE))] for positions, kinds in self._levels]
+        self._cached_containers: dict[int, _LazyContainer] = {}
+        self._cached_separators: dict[int, tuple[int, Positions, Positions]] = {}
+        self._end_positions = [positions[np.isin(kinds, list(CLOSE))] for positions, kinds in self._levels]
 
     @cached_property
     def root(self) -> object:
@@ -104,11 +105,11 @@ class JsonIndex:
 
     def _container(self, start: int, level: int, first: int) -> _LazyContainer:
         # Cached, so that it is the same object each time, up to `MAX_CACHED_CONTAINERS` containers.
-        container = self._kept.get(start)
+        container = self._cached_containers.get(start)
         if container is None:
             container = (LazyObject if first == OPEN[0] else LazyList)(self, start, level)
-            if len(self._kept) < MAX_CACHED_CONTAINERS:
-                self._kept[start] = container
+            if len(self._cached_containers) < MAX_CACHED_CONTAINERS:
+                self._cached_containers[start] = container
         return container
 
     def separators(self, start: int, level: int) -> tuple[int, Positions, Positions]:
@@ -120,16 +121,16 @@ class JsonIndex:
         """
         import numpy as np  # noqa: PLC0415
 
-        if start in self._many:
-            return self._many[start]
+        if start in self._cached_separators:
+            return self._cached_separators[start]
         positions, kinds = self._levels[level]
-        end_positions = self._ends[level]
+        end_positions = self._end_positions[level]
         end = int(end_positions[np.searchsorted(end_positions, start)])
         first, last = np.searchsorted(positions, start) + 1, np.searchsorted(positions, end)
         inner_positions, kind = positions[first:last], kinds[first:last]
         parts = end, inner_positions[kind == COMMA], inner_positions[kind == COLON]
         if len(inner_positions) > MIN_CACHED_SEPARATORS:  # requested repeatedly, and slow to find
-            self._many[start] = parts
+            self._cached_separators[start] = parts
         return parts
 
     def path_to(self, position: int) -> tuple[str | int, ...]:

@@ -18,11 +18,11 @@ class NewestJobWorker(Generic[Job, Result]):
 
     def __init__(self, process_job: Callable[[Job], Result], name: str) -> None:
         # `work` is called in the thread and must not raise.
-        self._work, self._name = process_job, name
+        self._process_job, self._name = process_job, name
         self._wake = threading.Condition()
         self._waiting: list[Job] = []  # at most one
         self._working: list[Job] = []
-        self._done: list[Result] = []
+        self._results: list[Result] = []
         self._closing = False
         self._thread: threading.Thread | None = None
 
@@ -44,19 +44,19 @@ class NewestJobWorker(Generic[Job, Result]):
     def pop_result(self) -> Result | None:
         """Return and clear the last result; None if there is none."""
         with self._wake:
-            results, self._done = self._done, []
+            results, self._results = self._results, []
         return results[0] if results else None
 
     def clear(self) -> None:
         """Discard the pending job, the finished result, and the result of a running job."""
         with self._wake:
-            self._waiting, self._working, self._done = [], [], []
+            self._waiting, self._working, self._results = [], [], []
 
     def close(self) -> None:
         """Stop the thread; waits at most one second for a running job."""
         with self._wake:
             self._closing = True
-            self._waiting, self._working, self._done = [], [], []
+            self._waiting, self._working, self._results = [], [], []
             self._wake.notify()
         if self._thread is not None:
             self._thread.join(1.0)
@@ -70,7 +70,7 @@ class NewestJobWorker(Generic[Job, Result]):
                     return
                 mine = self._working = self._waiting
                 self._waiting = []
-            result = self._work(mine[0])
+            result = self._process_job(mine[0])
             with self._wake:
                 if self._working is mine:  # otherwise it was discarded
-                    self._done, self._working = [result], []
+                    self._results, self._working = [result], []

@@ -134,11 +134,11 @@ class _StepCounter:
     """Counter of visited values."""
 
     def __init__(self, max_steps: int) -> None:
-        self._left = max_steps
+        self._remaining_steps = max_steps
 
     def add(self, steps: int = 1) -> None:
-        self._left -= steps
-        if self._left < 0:
+        self._remaining_steps -= steps
+        if self._remaining_steps < 0:
             raise _LimitReached
 
 

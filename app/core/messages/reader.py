@@ -53,7 +53,7 @@ class MessageReader(NewestJobWorker[Message, ReadResult]):
 
     def __init__(self) -> None:
         super().__init__(self._read, "studio-reader")
-        self._asked_at: float | None = None
+        self._requested_s: float | None = None
 
     @staticmethod
     def _read(message: Message) -> ReadResult:
@@ -71,13 +71,13 @@ class MessageReader(NewestJobWorker[Message, ReadResult]):
         Returns:
             True if the message will be read.
         """
-        if self.is_busy or (self._asked_at is not None and now - self._asked_at < READ_INTERVAL_S):
+        if self.is_busy or (self._requested_s is not None and now - self._requested_s < READ_INTERVAL_S):
             return False
-        self._asked_at = now
+        self._requested_s = now
         self.submit(message)
         return True
 
     def clear(self) -> None:
         """Discard pending and running reads, so that the next one may start immediately."""
-        self._asked_at = None
+        self._requested_s = None
         super().clear()

@@ -57,9 +57,9 @@ class DecodeChecker:
         cpu_clock: Callable[[], float] = time.thread_time,
     ) -> None:
         # `clock` is monotonic seconds; `work` is the CPU time of the calling thread in seconds.
-        self._clock, self._work = clock, cpu_clock
+        self._clock, self._cpu_clock = clock, cpu_clock
         self._lock = threading.Lock()
-        self._found: dict[str, CheckResult] = {}
+        self._results: dict[str, CheckResult] = {}
         self._suspects: dict[str, float] = {}
         self._advance_s = MAX_BUDGET_S
         self._refilled = clock()
@@ -72,18 +72,18 @@ class DecodeChecker:
         self._refill_budget()
         self._check(topic, messages, result)
         with self._lock:
-            old = self._found.get(topic)
+            old = self._results.get(topic)
             if old is not None:
                 result.checked += old.checked
                 result.bad_count += old.bad_count
                 result.unchecked_count += old.unchecked_count
                 result.error = result.error or old.error
-            self._found[topic] = result
+            self._results[topic] = result
 
     def pop_results(self) -> dict[str, CheckResult]:
         """Return the results by topic, and clear them."""
         with self._lock:
-            results, self._found = self._found, {}
+            results, self._results = self._results, {}
         return results
 
     def _refill_budget(self) -> None:
@@ -104,7 +104,7 @@ class DecodeChecker:
             self._check_older(topic, messages, result, now)
 
     def _check_older(self, topic: str, messages: Sequence[Message], result: CheckResult, now: float) -> None:
-        started_s = self._work()
+        started_s = self._cpu_clock()
         budget_s = self._advance_s - (0.0 if self._is_suspect(topic, now) else RESERVED_BUDGET_S)
         index, batch_size, worked, older = 0, 1, 0.0, len(messages) - 1
         while index < older and worked < budget_s:
@@ -114,7 +114,7 @@ class DecodeChecker:
             if was_well and result.bad_count:
                 self._suspects[topic] = now
                 budget_s = self._advance_s
-            worked = self._work() - started_s
+            worked = self._cpu_clock() - started_s
             batch_size = (
                 min(2 * batch_size, SOME)
                 if worked - before < CLOCK_READ_INTERVAL_S

@@ -29,10 +29,10 @@ class Doctor:
         clock: Callable[[], float] = time.time,
     ) -> None:
         # `look` gets the missed topic and a progress callback (findings so far, checks done, checks in all).
-        self._look, self._clock = diagnose, clock
+        self._diagnose, self._clock = diagnose, clock
         self._thread: threading.Thread | None = None
-        self._missed = self._told_of = ""
-        self._found: tuple[doctor.Finding, ...] = ()
+        self._missed = self._checked_topic = ""
+        self._findings: tuple[doctor.Finding, ...] = ()
         self._so_far: tuple[doctor.Finding, ...] | None = None
         self.looked_at = self.things = 0
         """Number of checks done in the current or last run; ``things`` is the total number of checks."""
@@ -47,7 +47,7 @@ class Doctor:
     @property
     def findings(self) -> Sequence[doctor.Finding]:
         """Findings of the last completed run, worst first."""
-        return self._found
+        return self._findings
 
     @property
     def partial_findings(self) -> Sequence[doctor.Finding] | None:
@@ -67,7 +67,7 @@ class Doctor:
     @property
     def checked_topic(self) -> str:
         """Topic on which the user missed messages in the run that produced `findings`; "" if none."""
-        return self._told_of
+        return self._checked_topic
 
     def expect_topic(self, topic: str) -> None:
         """Set the topic on which the user misses messages ("" for none), and run the checks."""
@@ -91,7 +91,7 @@ class Doctor:
         thread = self._thread
         if thread is not None:
             thread.join(within_s)
-        return doctor.report_text(self._found)
+        return doctor.report_text(self._findings)
 
     def close(self) -> None:
         """Wait for a run in progress."""
@@ -104,7 +104,7 @@ class Doctor:
             findings = self._find(missed)
             if missed == self._missed:
                 break
-        self._found, self._looked_s, self._told_of = findings, self._clock(), missed
+        self._findings, self._looked_s, self._checked_topic = findings, self._clock(), missed
         self._so_far = None
         self.revision += 1
 
@@ -114,7 +114,7 @@ class Doctor:
 
     def _find(self, missed: str) -> tuple[doctor.Finding, ...]:
         try:
-            return tuple(self._look(missed, self._report))
+            return tuple(self._diagnose(missed, self._report))
         except Exception as error:  # noqa: BLE001  reported as a finding
             message = _("The doctor couldn't finish: {kind}: {error}.").format(
                 kind=type(error).__name__, error=error

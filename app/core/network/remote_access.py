@@ -50,7 +50,11 @@ class RemoteAccess:
     ) -> None:
         # `ask` sends the request to the master at `address`; `here` returns this computer's addresses.
         self._address, self._settings, self._alerts = address, settings, alerts
-        self._post_event, self._ask, self._here = post_event, request_listen, local_addresses
+        self._post_event, self._request_listen, self._local_addresses = (
+            post_event,
+            request_listen,
+            local_addresses,
+        )
         self._epoch = 0
         self._asking: threading.Thread | None = None
         self.hosts: tuple[str, ...] = ()
@@ -68,7 +72,7 @@ class RemoteAccess:
 
     def addresses(self) -> tuple[OwnAddress, ...]:
         """Return the addresses of this computer that other computers can reach."""
-        return self._here()
+        return self._local_addresses()
 
     def environment_variable(self, host: str) -> str:
         """Return the environment variable to set on other computers: ``NEP_MASTER=HOST:PORT``.
@@ -142,7 +146,7 @@ class RemoteAccess:
             if before is not None:
                 before.join()
             try:
-                self._ask(hosts, self._address)
+                self._request_listen(hosts, self._address)
             except NepError as error:
                 self._post_event(RemoteAccessChanged(hosts, str(error)))
             else:

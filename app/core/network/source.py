@@ -152,7 +152,7 @@ class LiveSource:
         self._post_event = post_event
         self._jobs: queue.SimpleQueue[tuple[str, Job] | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
-        self._wanted: set[str] = set()
+        self._watched_topics: set[str] = set()
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name=thread, daemon=True)
         self._node: Node | None = None
@@ -168,7 +168,7 @@ class LiveSource:
     def watch(self, topic: str) -> None:
         """Subscribe to ``topic`` as soon as it exists."""
         with self._lock:
-            self._wanted.add(topic)
+            self._watched_topics.add(topic)
             existing = self._subscribers.get(topic)
             self._missed_before[topic] = -(existing[1].lost or 0) if existing is not None else 0
         self.submit("", _ignore_wake_job)
@@ -176,7 +176,7 @@ class LiveSource:
     def unwatch(self, topic: str) -> None:
         """Unsubscribe from ``topic``."""
         with self._lock:
-            self._wanted.discard(topic)
+            self._watched_topics.discard(topic)
         self.submit("", _ignore_wake_job)
 
     def submit(self, error_template: str, job: Job) -> None:
@@ -322,7 +322,7 @@ class LiveSource:
         if view is None:
             return
         with self._lock:
-            watched = {*self._wanted, *self._always}
+            watched = {*self._watched_topics, *self._always}
         for topic in [topic for topic in self._subscribers if topic not in watched]:
             self._unsubscribe(topic)
             self._missed_before.pop(topic, None)

@@ -124,10 +124,10 @@ class Topics:
         # `own` is (host, process id) of the watching process: a topic with no other subscriber counts as
         # vanished.
         self._network = network
-        self._own = own_process if own_process is not None else (platform.node(), os.getpid())
+        self._own_process = own_process if own_process is not None else (platform.node(), os.getpid())
         self._topics: dict[str, Topic] = {}
         self._first_graph = True
-        self._seen = (-1, -1)
+        self._view_version = (-1, -1)
         self._view: GraphView | None = None
         self._clocks: Mapping[str, int] = {}
         """Clock offset (ns) of each node on another computer, to be added to times of that node."""
@@ -176,15 +176,15 @@ class Topics:
         """
         version = (view.epoch, view.revision)
         self._clocks = self._clock_offsets(view)
-        if version != self._seen:
+        if version != self._view_version:
             self._apply_graph(view, now)
         elif len(self._topics) <= MAX_TOPICS_PER_UPDATE:
             _update_statistics(self._topics.values(), view, now, self._clocks)
-        self._seen, self._view, self._reported_at = version, view, now
+        self._view_version, self._view, self._reported_at = version, view, now
         self.values_revision += 1
 
     def _own_node_ids(self, view: GraphView) -> set[str]:
-        return {id for id, node in view.nodes.items() if (node.host, node.pid) == self._own}
+        return {id for id, node in view.nodes.items() if (node.host, node.pid) == self._own_process}
 
     def _clock_offsets(self, view: GraphView) -> Mapping[str, int]:
         offsets_ns = {

@@ -43,7 +43,7 @@ class PageList:
 
     def __init__(self) -> None:
         self._pages: dict[int, ConnectedPage] = {}
-        self._left_at: dict[int, float] = {}
+        self._disconnect_times_s: dict[int, float] = {}
         self._dropped: dict[tuple[int, str], int] = {}
         self._drops_at: dict[tuple[int, str], float] = {}
         self._now = 0.0
@@ -53,13 +53,15 @@ class PageList:
     @property
     def connected(self) -> tuple[ConnectedPage, ...]:
         """Connected pages of the latest snapshot."""
-        return tuple(page for id_, page in self._pages.items() if id_ not in self._left_at)
+        return tuple(page for id_, page in self._pages.items() if id_ not in self._disconnect_times_s)
 
     @property
     def listed_pages(self) -> tuple[ListedPage, ...]:
         """Pages in order of arrival, including pages that left in the last `GONE_DISPLAY_S` seconds."""
         return tuple(
-            ListedPage(page, self._now - self._left_at[id_] if id_ in self._left_at else None)
+            ListedPage(
+                page, self._now - self._disconnect_times_s[id_] if id_ in self._disconnect_times_s else None
+            )
             for id_, page in self._pages.items()
         )
 
@@ -72,17 +74,17 @@ class PageList:
         """Apply a snapshot of the connected pages at ``now`` (monotonic seconds)."""
         self._now = now
         connected_ids = {page.id for page in pages}
-        if connected_ids != self._pages.keys() - self._left_at.keys():
+        if connected_ids != self._pages.keys() - self._disconnect_times_s.keys():
             self.revision += 1
         for id_ in self._pages:
             if id_ not in connected_ids:
-                self._left_at.setdefault(id_, now)
+                self._disconnect_times_s.setdefault(id_, now)
         for page in pages:
             self._pages[page.id] = page
-            self._left_at.pop(page.id, None)
-        for id_, left_at in tuple(self._left_at.items()):
+            self._disconnect_times_s.pop(page.id, None)
+        for id_, left_at in tuple(self._disconnect_times_s.items()):
             if now - left_at > GONE_DISPLAY_S:
-                del self._left_at[id_], self._pages[id_]
+                del self._disconnect_times_s[id_], self._pages[id_]
         self._pages = dict(sorted(self._pages.items()))
         self._record_drops(pages, now)
 

@@ -42,11 +42,11 @@ class RecordedEvents:
 
     def __init__(self, send_event: SendEvent, *, clock_ns: Callable[[], int] = time.time_ns) -> None:
         # `clock_ns` is ns since 1970, as in the recorder.
-        self._say, self._clock_ns = send_event, clock_ns
+        self._send_event, self._clock_ns = send_event, clock_ns
         self._numbers = count(1)
         self._present: dict[str, tuple[str, Mapping[str, object]]] = {}
         self._run: RunState | None = None
-        self._run_told: dict[str, object] = {}
+        self._run_entry: dict[str, object] = {}
 
     def resend(self, to: str) -> None:
         """Send the active runs and alarms again.
@@ -55,7 +55,7 @@ class RecordedEvents:
             to: Destination: "recording" or "ring" (the flight recorder).
         """
         for role, content in self._present.values():
-            self._say(role, content, to)
+            self._send_event(role, content, to)
 
     # ---- behaviours
 
@@ -68,30 +68,30 @@ class RecordedEvents:
         is_same = was_on and before is not None and _is_unchanged(before, run)
         if was_on and not (is_on and is_same):
             self._end_run(run if is_same else None)
-        elif self._run_told and not is_on:
+        elif self._run_entry and not is_on:
             self._send_result(run)
         if is_on and not is_same:
-            self._run_told = self._new_entry(f"run-{next(self._numbers)}", run.tried_label or run.name)
-            self._add("runs", self._run_told)
+            self._run_entry = self._new_entry(f"run-{next(self._numbers)}", run.tried_label or run.name)
+            self._add("runs", self._run_entry)
 
     def _end_run(self, run: RunState | None) -> None:
         # `run` is None if the end was not observed.
-        self._run_told["until_ns"] = self._clock_ns()
-        self._present.pop(str(self._run_told.get("id")), None)
+        self._run_entry["until_ns"] = self._clock_ns()
+        self._present.pop(str(self._run_entry.get("id")), None)
         if run is None:
-            self._say("runs", dict(self._run_told))
-            self._run_told = {}
+            self._send_event("runs", dict(self._run_entry))
+            self._run_entry = {}
         else:
             self._send_result(run)
 
     def _send_result(self, run: RunState) -> None:
         # Sent again with the robots' time once they have replied.
-        content = {**self._run_told, **_result(run)}
-        if content != self._run_told:
-            self._run_told = content
-            self._say("runs", dict(content))
+        content = {**self._run_entry, **_result(run)}
+        if content != self._run_entry:
+            self._run_entry = content
+            self._send_event("runs", dict(content))
         if run.state in {"proven", "ready"}:
-            self._run_told = {}
+            self._run_entry = {}
 
     # ---- alarms
 
@@ -102,7 +102,7 @@ class RecordedEvents:
         if event.kind == "off":
             if active is not None:
                 del self._present[key]
-                self._say("alarms", {**active[1], "until_ns": self._clock_ns()})
+                self._send_event("alarms", {**active[1], "until_ns": self._clock_ns()})
             return
         if active is not None:
             return
@@ -124,7 +124,7 @@ class RecordedEvents:
         }
 
     def _add(self, role: str, content: Mapping[str, object], key: str = "") -> None:
-        self._say(role, dict(content))
+        self._send_event(role, dict(content))
         if len(self._present) < MAX_ACTIVE_ALARMS:
             self._present[key or str(content["id"])] = (role, content)
 

@@ -40,14 +40,14 @@ class RecordingExport:
         self._recording, self._kind = recording, kind
         self._progress = (0, 0)
         self._is_cancelled = threading.Event()
-        self._is_over = threading.Event()
+        self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="recording-export", daemon=True)
         self._thread.start()
 
     @property
     def is_finished(self) -> bool:
         """True if the export has finished, failed, or was cancelled."""
-        return self._is_over.is_set()
+        return self._ended.is_set()
 
     @property
     def was_cancelled(self) -> bool:
@@ -94,7 +94,7 @@ class RecordingExport:
             self.problem = str(error) or type(error).__name__
         finally:
             self._opener.close()
-            self._is_over.set()
+            self._ended.set()
 
     def _report_progress(self, done: int, total: int) -> None:
         self._progress = (done, total)

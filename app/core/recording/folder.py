@@ -112,7 +112,7 @@ class RecordingFolder:
         self.folder = folder
         self._opener: RecordingOpener = LocalOpener() if opener is None else opener
         self._worker: BackgroundWorker[FolderScan] = BackgroundWorker("recordings-folder")
-        self._known: dict[Path, tuple[tuple[int, int], RecordingInfo]] = {}
+        self._info_cache: dict[Path, tuple[tuple[int, int], RecordingInfo]] = {}
         """Facts already read, with the size and time of each file. Used by the worker thread only."""
 
     def start_scan(self, being_written: Path | None = None) -> None:
@@ -144,11 +144,13 @@ class RecordingFolder:
             return FolderScan(problem=(error.strerror or str(error)).lower())
         found_files.sort(key=lambda each: (-each[1].st_mtime_ns, each[0].name))
         listed_files, left_out = found_files[:MAX_FILES], max(0, len(found_files) - MAX_FILES)
-        self._known = {path: self._known[path] for path, _about in listed_files if path in self._known}
+        self._info_cache = {
+            path: self._info_cache[path] for path, _about in listed_files if path in self._info_cache
+        }
         files, opened, until = [], 0, time.monotonic() + MAX_SCAN_S
         for path, about in listed_files:
             mark = (about.st_mtime_ns, about.st_size)
-            cached = self._known.get(path)
+            cached = self._info_cache.get(path)
             if cached is not None and cached[0] == mark:
                 files.append(cached[1])
                 continue
@@ -160,7 +162,7 @@ class RecordingFolder:
             ):
                 opened += 1
                 info = read_info(info, self._opener)
-                self._known[path] = (mark, info)
+                self._info_cache[path] = (mark, info)
             files.append(info)
         is_whole = all(each.is_read or each.path == being_written for each in files)
         return FolderScan(tuple(files), "", left_out, is_whole)

@@ -339,13 +339,13 @@ class RizeNames:
     """Names of the connected robots of RIZE, taken from their ready messages or else from their nodes."""
 
     def __init__(self) -> None:
-        self._told: dict[str, None] = {}
+        self._announced_names: dict[str, None] = {}
 
     def add(self, name: str) -> None:
         """Add the name in a ready message received on ``rize_event``."""
-        self._told.setdefault(name)
-        if len(self._told) > MAX_ROBOTS:
-            del self._told[next(iter(self._told))]
+        self._announced_names.setdefault(name)
+        if len(self._announced_names) > MAX_ROBOTS:
+            del self._announced_names[next(iter(self._announced_names))]
 
     def names_in(self, view: GraphView, native: Collection[str] = ()) -> set[str]:
         """Return the names of the RIZE robots in a graph.
@@ -355,7 +355,7 @@ class RizeNames:
             native: Names of robots with a description, which also send ready messages on
                 ``rize_event``.
         """
-        candidates = [name for name in self._told if name not in native]
+        candidates = [name for name in self._announced_names if name not in native]
         info = view.topics.get(rize.COMMANDS)
         ids = {subscriber.node_id for subscriber in info.subscribers} if info is not None else set()
         nodes = [

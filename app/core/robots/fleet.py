@@ -68,7 +68,7 @@ class Fleet:
         self._links: dict[str, RobotLink] = {}
         self._processes = processes if processes is not None else AllVirtualProcesses()
         self._senders = Senders()
-        self._own = OwnMessageFilter(self._senders, self._links)
+        self._own_filter = OwnMessageFilter(self._senders, self._links)
         self._announcements = Announcements(watches, self._senders, clock, self._must_keep_topic)
         self._unlisted: tuple[StopTarget, ...] = ()
         self._settings = settings
@@ -83,11 +83,11 @@ class Fleet:
         self._movable = MovableRobots(self._links, self._names)
         self.gate = MotionGate(self.permission, self._movable)
         has_ended = self._processes.has_ended
-        self.moved = MovedRobots(self._identity_of, has_ended, clock, self._own.other_programs)
+        self.moved = MovedRobots(self._identity_of, has_ended, clock, self._own_filter.other_programs)
         """Robots that may move, and so must be named by a Stop."""
         self._tries = ManualInvocations(self._send, self._heartbeat.stop, clock)
-        self._messages = RobotMessages(self._own, self._tries, self.moved, clock)
-        self._chosen = ""
+        self._messages = RobotMessages(self._own_filter, self._tries, self.moved, clock)
+        self._selected_name = ""
         self._has_graph = False
         self.revision = 0
         self.stops = 0
@@ -130,7 +130,7 @@ class Fleet:
         This is the chosen robot if it is connected, else a connected virtual robot, else the first
         connected robot, else the chosen robot although it is disconnected.
         """
-        chosen = self._links.get(self._chosen)
+        chosen = self._links.get(self._selected_name)
         if chosen is not None and chosen.is_connected:
             return chosen
         connected = self.connected
@@ -138,8 +138,8 @@ class Fleet:
 
     def select(self, name: str) -> None:
         """Choose the robot that is shown by panels that show one robot."""
-        if name != self._chosen:
-            self._chosen = name
+        if name != self._selected_name:
+            self._selected_name = name
             self.revision += 1
 
     # -- commands of the user --------------------------------------------------------------------------------
@@ -306,11 +306,11 @@ class Fleet:
 
     def update(self, view: GraphView) -> None:
         """Apply a new graph, by which robots are connected, replaced or disconnected."""
-        self._has_graph, before = True, self._own.view
+        self._has_graph, before = True, self._own_filter.view
         self._movable.view = view
-        self._own.update(view)
+        self._own_filter.update(view)
         self._announcements.update(view)
-        topics = (self._own.topics(link.robot) for link in self._links.values())
+        topics = (self._own_filter.topics(link.robot) for link in self._links.values())
         self._senders.update(view, {rize.ANSWERS}.union(*topics))
         self._update_announced_robots()
         announcements = self._announcements
@@ -320,7 +320,7 @@ class Fleet:
         )
         self._update_rize(view)
         commanded = map(self._links.get, self.moved.recently_commanded)
-        newcomers = {link.name: self._own.new_programs(link, before) for link in commanded if link}
+        newcomers = {link.name: self._own_filter.new_programs(link, before) for link in commanded if link}
         self.moved.record_new_programs(newcomers)
         self._messages.apply_held_replies(self._links)
         for link in self._links.values():
@@ -438,7 +438,7 @@ class Fleet:
 
     def _is_listed(self, topic: str, link: RobotLink) -> bool:
         # The program is still listed, but its newest description can't be parsed.
-        nodes = publisher_nodes(self._own.view, topic)
+        nodes = publisher_nodes(self._own_filter.view, topic)
         return link.identity is not None and link.identity.node_id in nodes
 
     def _foreign_claim(self, robot: Robot) -> Claim | None:
@@ -480,7 +480,7 @@ class Fleet:
             self._close_topics(link)
         if link.watch is None:
             link.watch = self._watches.open([robot.topics.reply])
-        self._senders.update(self._own.view, self._own.topics(robot))
+        self._senders.update(self._own_filter.view, self._own_filter.topics(robot))
         self._publishers.open(link)
         self.known.record([robot])
         self.revision += 1
@@ -535,7 +535,7 @@ class Fleet:
 
     def _evict_disconnected(self) -> None:
         # Limits disconnected robots: any program can announce any number of names.
-        in_use = {self._chosen, *self.used(), *self.moved.names}
+        in_use = {self._selected_name, *self.used(), *self.moved.names}
         for link in excess_disconnected(self._links.values(), in_use):
             del self._links[link.name]
             for topic in [topic for topic, name in self._names.items() if name == link.name]:

@@ -55,7 +55,7 @@ class Health:
         self._from_graph: set[str] = set()
         self._claims: set[str] = set()
         self._unreachable: set[str] = set()
-        self._bad: dict[str, _BadTopic] = {}
+        self._bad_topics: dict[str, _BadTopic] = {}
         self._gone_since: dict[str, float] = {}
         self._robots: set[str] = set()
 
@@ -69,9 +69,9 @@ class Health:
             results: Results of the decode checks, by topic.
         """
         for topic, checked in results.items():
-            bad_topic = self._bad.get(topic)
+            bad_topic = self._bad_topics.get(topic)
             if bad_topic is None and checked.bad_count:
-                bad_topic = self._bad[topic] = _BadTopic()
+                bad_topic = self._bad_topics[topic] = _BadTopic()
             if bad_topic is None:
                 continue
             bad_topic.has_recovered = checked.is_newest_readable
@@ -83,7 +83,7 @@ class Health:
 
     def discard(self, topic: str) -> None:
         """Discard the problems of a topic that is no longer watched or has recovered."""
-        self._bad.pop(topic, None)
+        self._bad_topics.pop(topic, None)
         self._alerts.resolve(f"message:{topic}")
 
     def check(self, used_names: Container[str] = (), started: Container[str] = ()) -> None:
@@ -96,7 +96,7 @@ class Health:
         now = self._clock()
         for topic in [
             t
-            for t, bad_topic in self._bad.items()
+            for t, bad_topic in self._bad_topics.items()
             if bad_topic.has_recovered and now - bad_topic.last_error_s >= RECOVERY_S
         ]:
             self.discard(topic)

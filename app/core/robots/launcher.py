@@ -122,7 +122,7 @@ class Launcher:
     ) -> None:
         # `is_there` returns whether a robot is listed, from any instance, or None while unknown.
         self._address = address
-        self._is_there = is_listed
+        self._is_listed = is_listed
         self._clock = clock
         self._start = start
         self._requests: dict[str, _StartRequest] = {}
@@ -196,7 +196,7 @@ class Launcher:
             return
         now = self._clock()
         for name, request in list(self._requests.items()):
-            is_listed = self._is_there(name)
+            is_listed = self._is_listed(name)
             if is_listed is None and (self._master.first or now >= request.known_deadline_s):
                 is_listed = False
             if is_listed is False:
@@ -324,7 +324,7 @@ class VirtualProcesses:
     def __init__(self, modules: Collection[str], started: Callable[[], Collection[int]] = tuple) -> None:
         self._modules = frozenset(modules)
         self._started = started
-        self._known: dict[Identity, bool] = {}
+        self._result_cache: dict[Identity, bool] = {}
 
     def is_started_by_studio(self, identity: Identity) -> bool:
         """Return True if a program is a virtual robot started by a Studio of this user.
@@ -337,11 +337,11 @@ class VirtualProcesses:
             return False
         if identity.pid == os.getpid():
             return True
-        if identity not in self._known:
-            if len(self._known) >= MAX_CACHED_PROCESSES:
-                self._known.clear()
-            self._known[identity] = self._is_own_process(identity.pid)
-        return self._known[identity]
+        if identity not in self._result_cache:
+            if len(self._result_cache) >= MAX_CACHED_PROCESSES:
+                self._result_cache.clear()
+            self._result_cache[identity] = self._is_own_process(identity.pid)
+        return self._result_cache[identity]
 
     def has_ended(self, identity: Identity) -> bool:
         """Return True if a program has certainly exited. Always False for programs on other computers."""

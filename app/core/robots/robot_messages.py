@@ -33,8 +33,8 @@ class RobotMessages:
         moved: MovedRobots,
         clock: Callable[[], float],
     ) -> None:
-        self._own, self._tries, self._moved, self._clock = own_filter, tries, moved, clock
-        self._held: dict[str, PendingMessages] = {}
+        self._own_filter, self._tries, self._moved, self._clock = own_filter, tries, moved, clock
+        self._pending_messages: dict[str, PendingMessages] = {}
         self._settled: dict[str, None] = {}
 
     def read(self, link: RobotLink, batches: Mapping[str, Batch]) -> None:
@@ -46,34 +46,34 @@ class RobotMessages:
         """
         replies = batches.get(link.robot.topics.reply)
         for message in replies.messages if replies is not None else ():
-            is_own = self._own.is_from_robot(link, message)
+            is_own = self._own_filter.is_from_robot(link, message)
             if is_own:
                 self._apply_reply(link, message)
             elif is_own is None:
-                self._held.setdefault(link.name, PendingMessages(per_publisher=MAX_HELD_MESSAGES)).add(
-                    message
-                )
+                self._pending_messages.setdefault(
+                    link.name, PendingMessages(per_publisher=MAX_HELD_MESSAGES)
+                ).add(message)
         for sensor in link.robot.sensors:
             if sensor.is_image:
                 continue
-            value = self._own.newest_payload(link, batches.get(sensor.topic), sensor.topic)
+            value = self._own_filter.newest_payload(link, batches.get(sensor.topic), sensor.topic)
             if value is not None:
                 link.values[sensor.name] = value.get("value", value)
         topic = link.robot.topics.state or ""
-        link.drawing = self._own.newest_payload(link, batches.get(topic), topic) or link.drawing
+        link.drawing = self._own_filter.newest_payload(link, batches.get(topic), topic) or link.drawing
 
     def apply_held_replies(self, links: Mapping[str, RobotLink]) -> None:
         """Apply the stored replies whose publishers the new graph lists; discard all others."""
-        pending, self._held = self._held, {}
+        pending, self._pending_messages = self._pending_messages, {}
         for name, messages in pending.items():
             link = links.get(name)
             for message in messages.pop_all() if link is not None else ():
-                if link is not None and self._own.is_from_robot(link, message):
+                if link is not None and self._own_filter.is_from_robot(link, message):
                     self._apply_reply(link, message)
 
     def discard(self, name: str) -> None:
         """Discard the stored replies of a robot."""
-        self._held.pop(name, None)
+        self._pending_messages.pop(name, None)
 
     def take_settled(self) -> tuple[str, ...]:
         """Return and clear the robots that have reported the end of all actions after an unconfirmed Stop."""

@@ -137,7 +137,7 @@ class RobotVoices:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         # `tell` writes to the Console: level, origin, sentence.
-        self._settings, self._fleet, self._watch, self._tell = settings, fleet, watch, log
+        self._settings, self._fleet, self._watch, self._log = settings, fleet, watch, log
         self._clock = clock
         self.speaker: Speaker | None = None
         self._watches: dict[str, Watch] = {}
@@ -238,7 +238,7 @@ class RobotVoices:
             message = _("“{words}” was shown but not spoken: too many texts were waiting").format(
                 words=lost.text
             )
-            self._tell("info", lost.robot, message)
+            self._log("info", lost.robot, message)
         self._waiting.append(utterance)
 
     def _speak_next(self, speaker: Speaker) -> None:

@@ -24,14 +24,14 @@ class BlockErrors:
 
     def __init__(self) -> None:
         self.by_block: Mapping[str, str] = {}
-        self._wanted: RequestedRun | None = None
+        self._requested_run: RequestedRun | None = None
         self._not_started = False
         self._ran: Mapping[str, object] = {}
         self._checked: Program | int | None = None  # the newest program, or count of edits, that was checked
 
     def start_run(self, request: RequestedRun) -> None:
         """Clear the errors of the previous run, at the start of a new one."""
-        self.by_block, self._wanted, self._ran = {}, request, request.document.workspace
+        self.by_block, self._requested_run, self._ran = {}, request, request.document.workspace
 
     def set_errors(self, errors: Mapping[str, str], *, not_started: bool) -> None:
         """Set the errors of the run.
@@ -44,14 +44,14 @@ class BlockErrors:
 
     def discard_fixed(self) -> bool:
         """Remove the errors of fixed blocks; return True if any were removed."""
-        if not self.by_block or self._wanted is None:
+        if not self.by_block or self._requested_run is None:
             return False
         count = len(self.by_block)
         if self._not_started:
-            self.by_block = self._unsolved_errors(self._wanted)
-        elif self._checked != (edits := self._wanted.document.edits):
+            self.by_block = self._unsolved_errors(self._requested_run)
+        elif self._checked != (edits := self._requested_run.document.edits):
             self._checked = edits
-            self.by_block = self._unchanged_errors(self._wanted.document.workspace)
+            self.by_block = self._unchanged_errors(self._requested_run.document.workspace)
         return len(self.by_block) < count
 
     def _unsolved_errors(self, request: RequestedRun) -> Mapping[str, str]:

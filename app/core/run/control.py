@@ -92,13 +92,13 @@ class Runs:
             None  # begins once the current run is proven to be stopped
         )
         self._edits = EditsSinceRun()
-        self._used: tuple[str, ...] = ()
+        self._used_robots: tuple[str, ...] = ()
         self._breakpoints: tuple[str, ...] = ()  # of the running program
         self._program_key: str | None = None  # robots reject later commands of the last program by its key
         self._labels: Mapping[str, str] = {}
         self._robots = ProgramRobots(fleet)
         fleet.used = lambda: self.used_robots
-        self._news = StopReporter(fleet, alerts, console)
+        self._stop_reporter = StopReporter(fleet, alerts, console)
         self._run = RunState()
         self._view: tuple[RunState, Document, RunView] | None = None
         self._stop_number = self._stop_mark = 0
@@ -128,7 +128,7 @@ class Runs:
     @property
     def used_robots(self) -> tuple[str, ...]:
         """Names of the robots that the running or paused program uses."""
-        return self._used if self.active else ()
+        return self._used_robots if self.active else ()
 
     @property
     def tried_value(self) -> TriedValue | None:
@@ -228,7 +228,7 @@ class Runs:
             self._start(request)
             return
         if self.active:
-            self._stop(self._used)
+            self._stop(self._used_robots)
         if self._run.state == "stopping":
             self._pending_request = request
             self._run = replace(self._run, is_restarting=True)
@@ -392,8 +392,8 @@ class Runs:
         Replies to earlier Stops are ignored.
         """
         if isinstance(event, RobotStopped):
-            self._news.update_fleet(event.report, event.mark)
-            self._news.notify_user(event.report, "stop")
+            self._stop_reporter.update_fleet(event.report, event.mark)
+            self._stop_reporter.notify_user(event.report, "stop")
         elif isinstance(event, LateReply):
             self._on_late_reply(event)
         elif event.number == self._stop_number:
@@ -402,7 +402,7 @@ class Runs:
                 self._run = replace(self._run, replies=replies)
                 if event.robot.problem or not event.robot.is_waiting:
                     same = [robot for robot in replies if robot.name == event.robot.name]
-                    self._news.update_fleet(StopReport(tuple(same), 0.0), self._stop_mark)
+                    self._stop_reporter.update_fleet(StopReport(tuple(same), 0.0), self._stop_mark)
             else:
                 self._run = replace(self._run, has_stopped_blocks=bool(self.stopped_blocks))
                 self._apply_report(event.report)
@@ -411,14 +411,14 @@ class Runs:
         # State first, sentences later: an error in formatting must not leave it "stopping".
         state = "unanswered" if report.unconfirmed_robots else "proven" if report.is_confirmed else "ready"
         self._run = replace(self._run, state=state, report=report, last_stop_status=report.status)
-        self._news.update_fleet(report, self._stop_mark)
+        self._stop_reporter.update_fleet(report, self._stop_mark)
         self._run = replace(
             self._run,
             last_stop_text=result_text(report),
             is_restarting=False,
-            motion_warnings=self._news.motion_warnings(report),
+            motion_warnings=self._stop_reporter.motion_warnings(report),
         )
-        self._news.notify_user(report, self._run.name or "stop")
+        self._stop_reporter.notify_user(report, self._run.name or "stop")
         request, self._pending_request = self._pending_request, None
         if request is not None and not report.unconfirmed_robots:
             self._start(request)
@@ -459,7 +459,7 @@ class Runs:
             self._alerts.raise_alert("program", "error", _("The behaviour can't be started."), str(error))
             return
         self.asking.reset(runner)
-        self._runner, self._used, self._labels = runner, program.robots, program.labels
+        self._runner, self._used_robots, self._labels = runner, program.robots, program.labels
         self._robots.start(runner, requested_actions, owners)
         self._breakpoints, self._program_key = program.breakpoints, runner.program_key
         self._fleet.moved.record_command((robot.name for robot in robots), "behaviour")
@@ -541,7 +541,7 @@ class Runs:
         if finished:
             self._mark_blocks()
         # the end of a program is a Stop like any other: every robot that it used must reply
-        self._stop(tuple(dict.fromkeys((*self._used, *event.unresponsive_robots))))
+        self._stop(tuple(dict.fromkeys((*self._used_robots, *event.unresponsive_robots))))
         self._run = replace(self._run, finished=finished)
         if not event.is_ok and not self._run.errors:
             self._alerts.raise_alert("program", "error", _("The behaviour stopped unexpectedly."), event.text)

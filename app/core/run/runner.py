@@ -120,7 +120,7 @@ class Runner:
         self._errors: deque[str] = deque(maxlen=MAX_ERROR_LINES)
         self._commands: queue.SimpleQueue[Mapping[str, object] | None] = queue.SimpleQueue()
         self._began_s = 0.0
-        self._ended, self._output_over = threading.Event(), threading.Event()
+        self._ended, self._output_ended = threading.Event(), threading.Event()
         self._last: RunnerEvent | None = None
 
     @property
@@ -290,7 +290,7 @@ class Runner:
                 self._deliver(event, gate)
         self._report_dropped(gate.kept_back, output.strange_bytes)
         child.popen.stdout.close()
-        self._output_over.set()
+        self._output_ended.set()
 
     def _deliver(self, event: RunnerEvent, gate: RateLimiter) -> None:
         if event.kind in ("running", "paused") and self.state in ("running", "paused"):
@@ -315,7 +315,7 @@ class Runner:
             self._on_event(RunnerEvent("print", self.run, text=text))
 
     def _watch(self, child: ChildProcess, reader: threading.Thread, errors: threading.Thread) -> None:
-        while not child.has_ended and not self._output_over.wait(MEMORY_CHECK_INTERVAL_S):
+        while not child.has_ended and not self._output_ended.wait(MEMORY_CHECK_INTERVAL_S):
             child.check()
         self._commands.put(None)  # closes its input, which ends a child that still waits for commands
         hung = not child.wait(EXIT_TIMEOUT_S)

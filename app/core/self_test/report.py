@@ -76,7 +76,7 @@ class Report:
         self._offset_s = seconds_since_start() - time.monotonic()
         self._steps: list[StepReport] = []
         self._marks: dict[str, int] = {}
-        self._facts: dict[str, object] = {
+        self._system_info: dict[str, object] = {
             "version": __version__,
             "system": platform.platform(),
             "machine": platform.machine(),
@@ -86,8 +86,8 @@ class Report:
             "began": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
             **info,
         }
-        self._why = ""
-        self._over = False
+        self._failure = ""
+        self._is_complete = False
 
     def now_ms(self) -> int:
         """Return the time in milliseconds since the start of the process."""
@@ -96,7 +96,7 @@ class Report:
     @property
     def failure(self) -> str:
         """Reason why the test failed, or ""."""
-        return self._why
+        return self._failure
 
     @property
     def current_step(self) -> StepReport | None:
@@ -108,7 +108,7 @@ class Report:
     def add_computer_info(self, **info: object) -> None:
         """Add facts about this computer."""
         with self._lock:
-            self._facts.update(info)
+            self._system_info.update(info)
 
     def record_time(self, name: str) -> None:
         """Record the current time under the key ``NAME_ms``.
@@ -148,28 +148,28 @@ class Report:
             step = self.current_step
             if step is not None:
                 step.duration_ms, step.details = self.now_ms(), reason
-            self._why = self._why or reason
+            self._failure = self._failure or reason
             self._write()
 
     def finish(self) -> bool:
         """Complete the report; return True if the test has succeeded."""
         with self._lock:
-            self._over = True
+            self._is_complete = True
             self.record_time("total")
             self._write()
-            return not self._why
+            return not self._failure
 
     def _write(self) -> None:
-        step, failure = self.current_step, self._why
-        if not failure and not self._over:
+        step, failure = self.current_step, self._failure
+        if not failure and not self._is_complete:
             name = step.name if step is not None else (self._steps[-1].name if self._steps else "")
             failure = _("Studio exited during the self-test; its last step was “{step}”.").format(step=name)
         content = {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
-            "ok": self._over and not self._why,
+            "ok": self._is_complete and not self._failure,
             "why": failure,
-            **self._facts,
+            **self._system_info,
             **{name: self._marks.get(name) for name in ("first_paint_ms", "editor_ready_ms", "total_ms")},
             "steps": [each.to_json() for each in self._steps],
         }
@@ -178,4 +178,4 @@ class Report:
             write_atomically(self._path, text.encode("utf-8", "backslashreplace") + b"\n", durable=False)
         except OSError as error:  # disk full, or folder deleted: the exit code still reports the failure
             reason = (error.strerror or str(error)).lower()
-            self._why = self._why or _("The report can't be written ({reason})").format(reason=reason)
+            self._failure = self._failure or _("The report can't be written ({reason})").format(reason=reason)

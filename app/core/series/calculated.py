@@ -25,16 +25,17 @@ class CalculatedSamples:
         # Sampled at the times of the first input.
         self.samples = Samples()
         self._inputs = tuple(inputs)
-        self._seen = [each.rewritten for each in inputs]
+        self._input_revisions = [each.rewritten for each in inputs]
         self._next = self._inputs[0].begun  # absolute index in the first input
 
     def advance(self) -> None:
         """Calculate all samples for which the inputs are available."""
         base = self._inputs[0]
         changed = [
-            each.earliest_change_s(revision) for each, revision in zip(self._inputs, self._seen, strict=True)
+            each.earliest_change_s(revision)
+            for each, revision in zip(self._inputs, self._input_revisions, strict=True)
         ]
-        self._seen = [each.rewritten for each in self._inputs]
+        self._input_revisions = [each.rewritten for each in self._inputs]
         change_s = min((each for each in changed if each is not None), default=None)
         if change_s is not None:
             self.samples.truncate(change_s)

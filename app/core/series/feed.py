@@ -48,7 +48,7 @@ class SeriesFeed:
         # (`Mailbox.set_capacity`).
         self._watch, self._clock_ns, self._set_room = watch, clock_ns, set_room
         self._takers: dict[str, list[SeriesReceiver]] = {}
-        self._deep: dict[str, list[SeriesReceiver]] = {}
+        self._lossless_receivers: dict[str, list[SeriesReceiver]] = {}
         self._watching: dict[str, WatchHandle] = {}
         self.origin_ns = clock_ns()
 
@@ -72,7 +72,7 @@ class SeriesFeed:
         """
         self._takers.setdefault(topic, []).append(taker)
         if is_lossless:
-            deep_ones = self._deep.setdefault(topic, [])
+            deep_ones = self._lossless_receivers.setdefault(topic, [])
             deep_ones.append(taker)
             if len(deep_ones) == 1:
                 self._set_room(topic, DEEP_CAPACITY)
@@ -81,7 +81,7 @@ class SeriesFeed:
 
     def unregister(self, topic: str, taker: SeriesReceiver) -> None:
         """Remove a receiver. Idempotent."""
-        takers, lossless = self._takers.get(topic, []), self._deep.get(topic, [])
+        takers, lossless = self._takers.get(topic, []), self._lossless_receivers.get(topic, [])
         if taker in takers:
             takers.remove(taker)
         if not takers and topic in self._watching:
@@ -90,7 +90,7 @@ class SeriesFeed:
         if taker in lossless:
             lossless.remove(taker)
             if not lossless:
-                del self._deep[topic]
+                del self._lossless_receivers[topic]
                 self._set_room(topic, None)
 
     def reset(self, topics: Iterable[str] | None = None) -> None:

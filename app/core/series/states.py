@@ -32,7 +32,7 @@ class States:
     def __init__(self, limit: int = MAX_RUNS) -> None:
         self._limit = limit
         self._begins: list[float] = []
-        self._words: list[str | None] = []
+        self._values: list[str | None] = []
         self.last_s: float | None = None
         self.forgotten = self.undone = 0
 
@@ -55,31 +55,31 @@ class States:
             self._truncate(time_s)
             gap = True
         value = value if value is None else value[:MAX_STATE_LENGTH]
-        if gap and self._words and self._words[-1] is not None and self.last_s is not None:
+        if gap and self._values and self._values[-1] is not None and self.last_s is not None:
             self._start_run(self.last_s, None)
-        if not self._words or self._words[-1] != value:
+        if not self._values or self._values[-1] != value:
             self._start_run(time_s, value)
         self.last_s = time_s
 
     def _start_run(self, time_s: float, value: str | None) -> None:
         self._begins.append(time_s)
-        self._words.append(value)
+        self._values.append(value)
         if len(self._begins) > self._limit:
             drop = len(self._begins) - self._limit * 3 // 4
-            del self._begins[:drop], self._words[:drop]
+            del self._begins[:drop], self._values[:drop]
             self.forgotten += drop
 
     def clear(self) -> None:
         """Remove all runs."""
         self._begins.clear()
-        self._words.clear()
+        self._values.clear()
         self.last_s = None
         self.forgotten = self.undone = 0
 
     def _truncate(self, time_s: float) -> None:
         index = bisect_left(self._begins, time_s)
         self.undone += len(self._begins) - index
-        del self._begins[index:], self._words[index:]
+        del self._begins[index:], self._values[index:]
         self.last_s = time_s if self._begins else None
 
     def runs(
@@ -95,7 +95,7 @@ class States:
         """
         index, end = self._index_range(begin_s, end_s)
         while index < end:
-            at_s, value = self._begins[index], self._words[index]
+            at_s, value = self._begins[index], self._values[index]
             if without is not None and (value is None or value in without):
                 index += 1
                 continue
@@ -106,7 +106,7 @@ class States:
     def values_in(self, begin_s: float, end_s: float) -> set[str]:
         """Return the distinct values in a time range."""
         first, end = self._index_range(begin_s, end_s)
-        return {value for value in set(self._words[first:end]) if value is not None}
+        return {value for value in set(self._values[first:end]) if value is not None}
 
     def _index_range(self, begin_s: float, end_s: float) -> tuple[int, int]:
         # Index range of the runs in a time range: first, and one behind the last.
@@ -121,12 +121,12 @@ class States:
     def at(self, time_s: float) -> str | None:
         """Return the value at a time; None if the value is unknown."""
         index = bisect_right(self._begins, time_s) - 1
-        return self._words[index] if index >= 0 else None
+        return self._values[index] if index >= 0 else None
 
     def change_count(self, begin_s: float, end_s: float) -> int:
         """Return the number of changes of the value in a time range."""
         first, end = self._index_range(begin_s, end_s)
-        values = [value for value in self._words[first:end] if value is not None]
+        values = [value for value in self._values[first:end] if value is not None]
         return sum(previous != other for previous, other in pairwise(values))
 
     def duration_s(self, value: str, begin_s: float, end_s: float) -> float:
@@ -134,5 +134,5 @@ class States:
         return sum(
             max(0.0, min(self._end_of(index), end_s) - max(self._begins[index], begin_s))
             for index in range(*self._index_range(begin_s, end_s))
-            if self._words[index] == value
+            if self._values[index] == value
         )

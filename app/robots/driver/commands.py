@@ -53,7 +53,7 @@ class CommandHandler:
         resolve: Resolve,
     ) -> None:
         self._robot, self._body, self._specs = robot, body, specs
-        self._tasks, self._publish, self._done = tasks, publish, resolve
+        self._tasks, self._publish, self._resolve = tasks, publish, resolve
         self._open_ids: set[str] = set()
         self._ended_programs: deque[str] = deque(maxlen=_MAX_ENDED_PROGRAMS)
 
@@ -189,7 +189,7 @@ class CommandHandler:
         function: Callable[..., object] = getattr(self._body, action.name)
 
         def run(call: Call) -> Mapping[str, object]:
-            returned = self._done(function(call, **_typed_arguments(spec, function, complete)), call)
+            returned = self._resolve(function(call, **_typed_arguments(spec, function, complete)), call)
             try:
                 return spec.returns.to_output(returned)
             except RobotValueError as error:

@@ -394,7 +394,7 @@ class _PendingAwaitable:
         self.ended = threading.Event()
         self.result: object = None
         self.error: BaseException | None = Canceled()
-        self._work = awaitable
+        self._awaitable = awaitable
         self._task: asyncio.Task[None] | None = None
 
     def start(self, loop: asyncio.AbstractEventLoop, name: str) -> None:
@@ -408,7 +408,7 @@ class _PendingAwaitable:
     async def _run(self) -> None:
         # Exceptions are stored: a SystemExit that leaves a task would end the loop.
         try:
-            self.result = await self._work
+            self.result = await self._awaitable
             self.error = None
         except asyncio.CancelledError:
             return
@@ -416,8 +416,8 @@ class _PendingAwaitable:
             self.error = error
 
     def _finish(self, _task: object) -> None:
-        if asyncio.iscoroutine(self._work):
-            self._work.close()  # canceled before its first step: avoid a "never awaited" warning
+        if asyncio.iscoroutine(self._awaitable):
+            self._awaitable.close()  # canceled before its first step: avoid a "never awaited" warning
         self.ended.set()
 
 

@@ -53,7 +53,7 @@ class Watchdog:
 
     def __init__(self, patience_s: float | None) -> None:
         self.patience_s = patience_s
-        self._heard: dict[ProgramId, float] = {}
+        self._heartbeat_times_s: dict[ProgramId, float] = {}
         self._going_on: dict[str, ProgramId] = {}  # resource -> the program that left it in motion
 
     def record_heartbeat(self, program: ProgramId, now: float, *, watch: bool) -> None:
@@ -64,8 +64,8 @@ class Watchdog:
             now: Time on the clock.
             watch: True to monitor the program from now on, because it has requested an action.
         """
-        if self.patience_s is not None and (watch or program in self._heard):
-            self._heard[program] = now
+        if self.patience_s is not None and (watch or program in self._heartbeat_times_s):
+            self._heartbeat_times_s[program] = now
 
     def record_start(self, task: Task) -> None:
         """Record that a task has started, which ends earlier motions that use the same resources."""
@@ -82,7 +82,7 @@ class Watchdog:
 
     def reset(self) -> None:
         """Remove all programs after a stop of the robot."""
-        self._heard.clear()
+        self._heartbeat_times_s.clear()
         self._going_on.clear()
 
     def deadlines(self) -> list[float]:
@@ -90,7 +90,7 @@ class Watchdog:
         return (
             []
             if self.patience_s is None
-            else [heard_at + self.patience_s for heard_at in self._heard.values()]
+            else [heard_at + self.patience_s for heard_at in self._heartbeat_times_s.values()]
         )
 
     def check_expired(self, now: float, acting: Collection[ProgramId | None]) -> bool:
@@ -104,9 +104,11 @@ class Watchdog:
         """
         if self.patience_s is None:
             return False
-        silent = [name for name, heard_at in self._heard.items() if now - heard_at >= self.patience_s]
+        silent = [
+            name for name, heard_at in self._heartbeat_times_s.items() if now - heard_at >= self.patience_s
+        ]
         for name in silent:
-            del self._heard[name]
+            del self._heartbeat_times_s[name]
         return any(name in acting or name in self._going_on.values() for name in silent)
 
 

@@ -28,25 +28,29 @@ class Neighbours:
     def __init__(self, name: str, clock: Clock, began_ns: int | None = None) -> None:
         self._name, self._clock = name, clock
         self.began_ns = time.time_ns() if began_ns is None else began_ns
-        self._seen: dict[str, tuple[OtherRobot, float, int]] = {}
-        self._told: OtherRobot | None = None
-        self._told_s = -math.inf
+        self._other_robots: dict[str, tuple[OtherRobot, float, int]] = {}
+        self._published_state: OtherRobot | None = None
+        self._published_s = -math.inf
 
     def receive(self, message: Mapping[str, object]) -> None:
         """Process a position message; invalid messages and messages of this robot are ignored."""
         other = _parse_position(message)
         if other is None or other.name == self._name:
             return
-        if other.name not in self._seen and len(self._seen) >= MAX_NEIGHBOURS:
+        if other.name not in self._other_robots and len(self._other_robots) >= MAX_NEIGHBOURS:
             return
         began_ns = message.get("began_ns")
-        self._seen[other.name] = (other, self._clock.now(), began_ns if isinstance(began_ns, int) else 0)
+        self._other_robots[other.name] = (
+            other,
+            self._clock.now(),
+            began_ns if isinstance(began_ns, int) else 0,
+        )
 
     def present_robots(self) -> tuple[OtherRobot, ...]:
         """Return the other robots that are currently in the room."""
         since = self._clock.now() - PRESENCE_TIMEOUT_S
-        self._seen = {name: entry for name, entry in self._seen.items() if entry[1] >= since}
-        return tuple(other for other, _at, _began in self._seen.values())
+        self._other_robots = {name: entry for name, entry in self._other_robots.items() if entry[1] >= since}
+        return tuple(other for other, _at, _began in self._other_robots.values())
 
     def must_give_way(self, x: float, y: float, radius: float, ignored: Collection[str] = ()) -> bool:
         """Return True if this robot overlaps a robot that was started earlier, and therefore must move away.
@@ -61,7 +65,7 @@ class Neighbours:
             other.name not in ignored
             and math.hypot(other.x - x, other.y - y) < other.radius + radius
             and (began_ns, other.name) < (self.began_ns, self._name)
-            for other, _at, began_ns in self._seen.values()
+            for other, _at, began_ns in self._other_robots.values()
         )
 
     def publish_position(self, me: OtherRobot, publish: Callable[[Mapping[str, object]], None]) -> None:
@@ -74,8 +78,8 @@ class Neighbours:
             publish: Publishes a message.
         """
         now = self._clock.now()
-        if me != self._told or now - self._told_s >= IDLE_PUBLISH_INTERVAL_S:
-            self._told, self._told_s = me, now
+        if me != self._published_state or now - self._published_s >= IDLE_PUBLISH_INTERVAL_S:
+            self._published_state, self._published_s = me, now
             publish(
                 {
                     "robot": me.name,

@@ -77,7 +77,7 @@ class RoomMap:
         self.start = start if start is not None else Room()
         self._clock_ns = clock_ns
         first_ns = 0 if self.start == Room() else clock_ns()  # a custom start counts as a change
-        self._things = {
+        self._entries = {
             thing.name: MapEntry(thing.name, kind_of(thing), thing.x, thing.y, first_ns)
             for thing in self.start.things
         }
@@ -94,7 +94,7 @@ class RoomMap:
         """Update the positions of all objects from a room; return True if any position has changed."""
         changed = False
         for thing in room.things:
-            entry = self._things.get(thing.name)
+            entry = self._entries.get(thing.name)
             if entry is not None and not entry.gone and (entry.x, entry.y) != (thing.x, thing.y):
                 self._set_entry(replace(entry, x=thing.x, y=thing.y))
                 changed = True
@@ -102,7 +102,7 @@ class RoomMap:
 
     def add(self, kind: str, x: float, y: float) -> str | None:
         """Add an object and return its name; None if there are too many objects of this kind."""
-        existing = {each.name for each in self._things.values() if not each.gone}
+        existing = {each.name for each in self._entries.values() if not each.gone}
         free = [name for name in _names(kind) if name not in existing]
         if not free:
             return None
@@ -112,7 +112,7 @@ class RoomMap:
 
     def remove(self, name: str) -> bool:
         """Remove an object; return False if it doesn't exist."""
-        entry = self._things.get(name)
+        entry = self._entries.get(name)
         if entry is None or entry.gone:
             return False
         self._set_entry(replace(entry, gone=True))
@@ -121,7 +121,7 @@ class RoomMap:
     def reset(self) -> None:
         """Restore the room at the start; added objects are removed."""
         first = {thing.name: thing for thing in self.start.things}
-        for entry in list(self._things.values()):
+        for entry in list(self._entries.values()):
             thing = first.get(entry.name)
             if thing is None:
                 self._set_entry(replace(entry, gone=True))
@@ -129,9 +129,9 @@ class RoomMap:
                 self._set_entry(replace(entry, x=thing.x, y=thing.y, gone=False))
 
     def _set_entry(self, entry: MapEntry) -> None:
-        before = self._things.get(entry.name)
+        before = self._entries.get(entry.name)
         newest = before.changed_ns + 1 if before is not None else 1
-        self._things[entry.name] = replace(entry, changed_ns=max(self._clock_ns(), newest))
+        self._entries[entry.name] = replace(entry, changed_ns=max(self._clock_ns(), newest))
         self.revision += 1
 
     # -- replication ------------------------------------------------------------------------------
@@ -147,25 +147,25 @@ class RoomMap:
         for entry in _parse_entries(
             raw_entries if isinstance(raw_entries, Sequence) and not isinstance(raw_entries, str) else ()
         ):
-            existing = self._things.get(entry.name)
-            if existing is None and len(self._things) >= MAX_OBJECTS:
+            existing = self._entries.get(entry.name)
+            if existing is None and len(self._entries) >= MAX_OBJECTS:
                 continue
             if existing is None or (entry.kind == existing.kind and entry.merge_key > existing.merge_key):
-                self._things[entry.name] = entry
+                self._entries[entry.name] = entry
                 changed = True
         self.revision += changed
         return changed
 
     def message(self) -> dict[str, object]:
         """Return the whole map as a payload for publishing and saving."""
-        return {"things": [asdict(entry) for entry in self._things.values()]}
+        return {"things": [asdict(entry) for entry in self._entries.values()]}
 
     # -- conversion --------------------------------------------------------------------------------
 
     def room(self) -> Room:
         """Return the room with all objects at their current positions."""
         balls, people, markers, boxes = [], [], [], []
-        for created in filter(None, map(self._create_thing, self._things.values())):
+        for created in filter(None, map(self._create_thing, self._entries.values())):
             match created:
                 case Ball():
                     balls.append(created)
@@ -179,7 +179,7 @@ class RoomMap:
             self.start, balls=tuple(balls), people=tuple(people), markers=tuple(markers), boxes=tuple(boxes)
         )
         for name in [thing.name for thing in empty.things]:
-            entry = self._things[name]
+            entry = self._entries[name]
             empty = empty.with_moved(name, entry.x, entry.y)
         return empty
 

@@ -57,8 +57,8 @@ class SharedRoom:
         self._arrives_until_s = clock.now() + ARRIVAL_PERIOD_S
         self._start = body.x, body.y
         self._went_back_with: frozenset[str] = frozenset()
-        self._tell_room = link.open_shared_topic(TOPIC, self._receive_room, latched=True)
-        self._tell_robots = link.open_shared_topic(ROBOTS_TOPIC, self._receive_robot)
+        self._publish_room = link.open_shared_topic(TOPIC, self._receive_room, latched=True)
+        self._publish_position = link.open_shared_topic(ROBOTS_TOPIC, self._receive_robot)
 
     def _receive_room(self, message: Mapping[str, object]) -> None:
         with self._lock:
@@ -141,5 +141,5 @@ class SharedRoom:
             )
             map_message, self._is_new = self._map.message() if self._is_new else None, False
         if map_message is not None:
-            self._tell_room(map_message)
-        self._neighbours.publish_position(me, self._tell_robots)
+            self._publish_room(map_message)
+        self._neighbours.publish_position(me, self._publish_position)

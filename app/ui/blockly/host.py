@@ -124,7 +124,7 @@ class BlocklyHost(QWidget):
         self._bridge = BlocklyBridge(self._initial_settings, self)
         self._bridge.page_ready.connect(self._on_page_ready)
         self._keys = KeyBuffer(lambda: self._web.keyboard_target() if self._web is not None else None)
-        self._asked_for = ""  # requested field: "find" or "search"; "" when it has the focus
+        self._requested_field = ""  # requested field: "find" or "search"; "" when it has the focus
         self._bridge.field_opened.connect(self._on_field_opened)
         self._on_block = False
         self._bridge.block_focused.connect(self._on_block_focused)
@@ -181,7 +181,7 @@ class BlocklyHost(QWidget):
         # Holds keys that are pressed before the field has the focus.
         if self._web is None:
             return
-        self._asked_for = field
+        self._requested_field = field
         self._install_key_filter()
         self._keys.start()
         self._send_command(field, None)
@@ -274,7 +274,7 @@ class BlocklyHost(QWidget):
         return QColor(str(cast("Mapping[str, object]", mode)["workspace"]))
 
     def _on_field_opened(self) -> None:
-        self._asked_for = ""
+        self._requested_field = ""
         self._keys.release()
 
     def _on_block_focused(self, has: bool) -> None:
@@ -285,8 +285,8 @@ class BlocklyHost(QWidget):
         self._up_since = time.monotonic()
         self._install_key_filter()
         self._on_page_loaded()
-        if self._asked_for:
-            self._send_command(self._asked_for, None)
+        if self._requested_field:
+            self._send_command(self._requested_field, None)
         self.ready.emit()
         if self._had_died:
             self._had_died = False
@@ -304,7 +304,7 @@ class BlocklyHost(QWidget):
         )
         self._up = self._on_block = False
         self._had_died = True
-        self._asked_for = ""
+        self._requested_field = ""
         self._keys.discard_all()
         self._on_page_lost()
         if time.monotonic() - self._up_since > _STABLE_AFTER_S:

@@ -20,22 +20,22 @@ class KeyBuffer:
     def __init__(self, keyboard: Callable[[], QObject | None]) -> None:
         # `keyboard` returns the widget that currently receives the page's keys.
         self._keyboard = keyboard
-        self._kept: list[QEvent] | None = None
+        self._buffered_events: list[QEvent] | None = None
 
     def start(self) -> None:
         """Start buffering key presses."""
-        if self._kept is None:
-            self._kept = []
+        if self._buffered_events is None:
+            self._buffered_events = []
 
     def buffer_event(self, event: QEvent) -> bool:
         """Buffer a key press and return True; return False for other events and while buffering is off.
 
         A click or the loss of focus sends the buffered keys.
         """
-        if self._kept is None:
+        if self._buffered_events is None:
             return False
         if event.type() in _KEY_EVENTS:
-            self._kept.append(event.clone())
+            self._buffered_events.append(event.clone())
             return True
         if event.type() in _RELEASE_EVENTS:
             self.release()
@@ -43,7 +43,7 @@ class KeyBuffer:
 
     def release(self) -> None:
         """Stop buffering and send the buffered keys to the page, in the order in which they were pressed."""
-        buffered, self._kept = self._kept or [], None
+        buffered, self._buffered_events = self._buffered_events or [], None
         for event in buffered:
             keyboard = self._keyboard()
             if keyboard is not None:
@@ -51,4 +51,4 @@ class KeyBuffer:
 
     def discard_all(self) -> None:
         """Stop buffering and discard the buffered keys, after the page for which they were typed was lost."""
-        self._kept = None
+        self._buffered_events = None

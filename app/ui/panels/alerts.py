@@ -21,7 +21,7 @@ class AlertsPanel(PanelWidget):
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Alerts"))
-        self._seen = -1
+        self._last_revision = -1
         self.rows: list[AlertRow] = []
         self.shown: list[ActiveAlert] = []  # parallel to `rows`
         self.chip = Chip(self.theme)
@@ -37,9 +37,9 @@ class AlertsPanel(PanelWidget):
 
     def refresh(self) -> None:
         alerts = self.session.alerts
-        if alerts.revision == self._seen:
+        if alerts.revision == self._last_revision:
             return
-        self._seen = alerts.revision
+        self._last_revision = alerts.revision
         # Behaviour layout: hides alerts for developers, such as ports
         is_plain = self.density == "comfortable"
         active = [alert for alert in alerts.active if not (is_plain and alert.for_developers)]

@@ -37,17 +37,17 @@ class ArmedStrip(QWidget):
     def __init__(self, context: PanelContext) -> None:
         super().__init__()
         self._context, self._theme = context, context.theme
-        self._seen: tuple[object, ...] = ()
+        self._last_state: tuple[object, ...] = ()
         self._is_on = False
         self.switch = Switch(self._theme, _("Armed"))
         self.switch.clicked.connect(self._toggle_armed)
         self.words = label("", "small", role="textSecondary")
-        self._sends = label(_("sends to"), "small", role="textSecondary")
+        self._targets_label = label(_("sends to"), "small", role="textSecondary")
         self.tokens: list[LinkButton] = []
-        self._flow_place = QWidget()
-        self._flow = Flow(self._flow_place, gap=8, row_gap=4)
+        self._flow_widget = QWidget()
+        self._flow = Flow(self._flow_widget, gap=8, row_gap=4)
         self.counts = label("", "small", role="textSecondary")
-        for widget in (self.switch, self.words, self._sends, self.counts):
+        for widget in (self.switch, self.words, self._targets_label, self.counts):
             self._flow.addWidget(widget)
         self.question = label("", "small", role="warn", wrap=True)
         self.question.setMinimumWidth(0)
@@ -55,8 +55,8 @@ class ArmedStrip(QWidget):
         self.cancel = Button(self._theme, _("Cancel"), size="small")
         self.let.clicked.connect(lambda: self.acting.answer(let=True))
         self.cancel.clicked.connect(lambda: self.acting.answer(let=False))
-        self._asks = QWidget()
-        row = QHBoxLayout(self._asks)
+        self._question_row = QWidget()
+        row = QHBoxLayout(self._question_row)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(8)
         row.addWidget(self.question, 1)
@@ -65,14 +65,14 @@ class ArmedStrip(QWidget):
         content = QVBoxLayout()
         content.setContentsMargins(12, 7, 12, 7)
         content.setSpacing(6)
-        content.addWidget(self._flow_place)
-        content.addWidget(self._asks)
+        content.addWidget(self._flow_widget)
+        content.addWidget(self._question_row)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addLayout(content)
         column.addWidget(Separator(self._theme))
-        self._asks.hide()
+        self._question_row.hide()
         self.counts.hide()
         self.refresh()
 
@@ -89,9 +89,9 @@ class ArmedStrip(QWidget):
         targets = arming.targets if arming.is_on else ()
         more = self.summary_text()
         state = (arming.is_on, remaining, targets, question, replaying, more)
-        if state == self._seen:
+        if state == self._last_state:
             return
-        self._seen = state
+        self._last_state = state
         self._is_on = arming.is_on
         self.switch.setChecked(arming.is_on)
         can_arm = self.is_for_replay or not replaying
@@ -99,12 +99,12 @@ class ArmedStrip(QWidget):
         nothing = self.disarmed_text() if can_arm else _("Sending is off while a recording is open")
         self.words.setText(_("{time} left").format(time=remaining) if arming.is_on else nothing)
         set_role(self.words, "warn" if arming.is_on else "textSecondary")
-        self._sends.setVisible(bool(targets))
+        self._targets_label.setVisible(bool(targets))
         self.counts.setVisible(bool(more))
         self.counts.setText(more)
         self._show_tokens(targets)
         message = question.message if question is not None else ""
-        self._asks.setVisible(question is not None)
+        self._question_row.setVisible(question is not None)
         if message != self.question.text():
             self.question.setText(message)
             paint.announce(self, message)
@@ -152,7 +152,7 @@ class ArmedStrip(QWidget):
             error = self.arm()
             if error:
                 self._context.show_toast(error)
-        self._seen = ()
+        self._last_state = ()
         self.refresh()
 
     def paintEvent(self, _event: QPaintEvent) -> None:

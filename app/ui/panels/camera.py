@@ -41,7 +41,7 @@ class CameraPanel(OneRobotPanel):
         self.header = [self.rate]
         self._rates = RateText()
         self._detecting: tuple[str, ...] = ()
-        self._seen: tuple[object, ...] = ()
+        self._last_snapshot: tuple[object, ...] = ()
         self._size = QSize()
         self._looks_s = 0.0
         self.chip = Chip(self.theme)
@@ -68,8 +68,8 @@ class CameraPanel(OneRobotPanel):
         if (
             now < self._looks_s
             and size == self._size
-            and len(snapshot) == len(self._seen)
-            and all(map(is_, snapshot, self._seen))
+            and len(snapshot) == len(self._last_snapshot)
+            and all(map(is_, snapshot, self._last_snapshot))
         ):
             return  # called 60 times a second, mostly without a new image
         self.view.show_image(self._stream, boxes_in_camera(link, self._topic))
@@ -79,7 +79,7 @@ class CameraPanel(OneRobotPanel):
         self.chip.set(_("silent for {age}").format(age=age_text(silent_s)) if silent else "", "error")
         if self._stream.picture is not None:
             self.pages.setCurrentWidget(self.view)
-        self._seen, self._size, self._looks_s = snapshot, size, now + REFRESH_INTERVAL_S
+        self._last_snapshot, self._size, self._looks_s = snapshot, size, now + REFRESH_INTERVAL_S
 
     def _snapshot(self, link: RobotLink, silent_s: float | None) -> tuple[object, ...]:
         # Unchanged items must be the identical objects of the last call.
@@ -105,7 +105,7 @@ class CameraPanel(OneRobotPanel):
     def show_robot(self, link: RobotLink) -> None:
         self._topic = _topic_of(link)
         self._detecting = tuple(each.name for each in link.robot.sensors if each.kind == "detections")
-        self._seen = ()
+        self._last_snapshot = ()
         self._stream = self.session.live.images.stream(self._topic)
         self.view.clear()
         self._rates.clear()

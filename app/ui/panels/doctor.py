@@ -53,14 +53,14 @@ class DoctorPanel(PanelWidget):
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Connection doctor"))
-        self._seen: tuple[object, ...] = ()
+        self._last_state: tuple[object, ...] = ()
         self._offered: tuple[object, ...] = ()
         self._master = ""
         self._asker: PanelWidget | None = None
-        self._own: list[Blocker] = []
-        self._waits: dict[tuple[PanelWidget, str], float] = {}  # start of waiting, by panel and topic
-        self._near: dict[str, str | None] = {}
-        self._told: tuple[object, ...] = ()
+        self._shown_blockers: list[Blocker] = []
+        self._wait_starts_s: dict[tuple[PanelWidget, str], float] = {}  # start of waiting, by panel and topic
+        self._suggestions: dict[str, str | None] = {}
+        self._shown_texts: tuple[object, ...] = ()
         self.rows: list[AlertRow] = []
         self.shown: list[Finding] = []  # parallel to `rows`
         self.chip = Chip(self.theme)
@@ -135,20 +135,20 @@ class DoctorPanel(PanelWidget):
         blockers = list(self._blockers())
         texts = tuple((each.message, each.button) for each in blockers)
         now = (doctor.revision, doctor.is_running, texts)
-        if now == self._seen:
+        if now == self._last_state:
             return
-        self._seen = now
+        self._last_state = now
         self.again.setEnabled(not doctor.is_running)
         so_far = doctor.partial_findings
         is_new = doctor.finished_s is None or doctor.checked_topic != doctor.expected_topic
         if so_far is None and doctor.finished_s is None:
             return
-        self._own = blockers  # earlier findings stay visible until the next check is done
+        self._shown_blockers = blockers  # earlier findings stay visible until the next check is done
         findings = self._merge_findings(
             blockers, so_far if so_far is not None and is_new else doctor.findings
         )
-        if findings != self.shown or texts != self._told:
-            self._told = texts
+        if findings != self.shown or texts != self._shown_texts:
+            self._shown_texts = texts
             self._show(findings)
         if doctor.finished_s is not None:
             self.set_title(self.title(), time.strftime("%H:%M:%S", time.localtime(doctor.finished_s)))
@@ -182,9 +182,9 @@ class DoctorPanel(PanelWidget):
         missed, now = self.session.doctor.expected_topic, time.monotonic()
         panels = self.context.panels() if self.session.replay is None else ()
         waiting = {(panel, topic) for panel in panels if (topic := panel.awaited_topic()) and topic != missed}
-        self._waits = {each: self._waits.get(each, now) for each in waiting}
+        self._wait_starts_s = {each: self._wait_starts_s.get(each, now) for each in waiting}
         for panel, topic in sorted(waiting, key=lambda each: (each[0].title(), each[1])):
-            if now - self._waits[panel, topic] >= WAIT_REPORT_DELAY_S:
+            if now - self._wait_starts_s[panel, topic] >= WAIT_REPORT_DELAY_S:
                 yield self._waiting_blocker(panel, topic)
 
     def _waiting_blocker(self, panel: PanelWidget, topic: str) -> Blocker:
@@ -198,10 +198,10 @@ class DoctorPanel(PanelWidget):
                 *doctor_button,
             )
         message = _("{panel} is waiting for {topic}, which has no publisher.").format(**names)
-        if topic not in self._near:  # cached: comparing thousands of names takes long
+        if topic not in self._suggestions:  # cached: comparing thousands of names takes long
             sent = [each.key for each in live.topics if each.publisher_nodes]
-            self._near = {topic: nearest(topic, sent[:MAX_TOPICS])}
-        suggestion = self._near[topic]
+            self._suggestions = {topic: nearest(topic, sent[:MAX_TOPICS])}
+        suggestion = self._suggestions[topic]
         if suggestion is None:
             return Blocker(message, "", *doctor_button)
         fix, use = _("Did you mean {topic}?"), _("Use {topic}")
@@ -290,10 +290,10 @@ class DoctorPanel(PanelWidget):
 
     def _next_step(self, finding: Finding) -> NextStep | None:
         kind, _colon, rest = finding.id.partition(":")
-        if kind == "studio" and not self._own[int(rest)].button:
+        if kind == "studio" and not self._shown_blockers[int(rest)].button:
             return None
         if kind == "studio":
-            return NextStep(self._own[int(rest)].button, self._own[int(rest)].run)
+            return NextStep(self._shown_blockers[int(rest)].button, self._shown_blockers[int(rest)].run)
         if finding.id == "topic:near":
             text = _("Use {topic}").format(topic=finding.instead)
             return NextStep(text, lambda: self._use_topic(finding.instead))

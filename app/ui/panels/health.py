@@ -41,15 +41,15 @@ class HealthRow(QWidget):
         space = round(max(1.0, (theme.scaled(ROW_HEIGHTS[density]) - line) / 2))
         self._space = space
         self.icon = StatusIcon(theme, height=round(line) + 2 * space)
-        self._said = QBoxLayout(QBoxLayout.Direction.LeftToRight)
-        self._said.setSpacing(10)
-        self._said.addWidget(self.title, 0, Qt.AlignmentFlag.AlignTop)
-        self._said.addWidget(self.words, 1)
+        self._text_layout = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._text_layout.setSpacing(10)
+        self._text_layout.addWidget(self.title, 0, Qt.AlignmentFlag.AlignTop)
+        self._text_layout.addWidget(self.words, 1)
         row = QHBoxLayout(self)
         row.setContentsMargins(16, 0, 16, 0)
         row.setSpacing(10)
         row.addWidget(self.icon, 0, Qt.AlignmentFlag.AlignTop)
-        row.addLayout(self._said, 1)
+        row.addLayout(self._text_layout, 1)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -59,8 +59,8 @@ class HealthRow(QWidget):
         space = self._space
         self.title.setContentsMargins(0, space, 0, space if is_wide else 0)
         self.words.setContentsMargins(0, space if is_wide else 0, 0, space)
-        self._said.setDirection(direction)
-        self._said.setSpacing(10 if is_wide else 0)
+        self._text_layout.setDirection(direction)
+        self._text_layout.setSpacing(10 if is_wide else 0)
 
     def show_fact(self, item: HealthItem) -> None:
         """Show the icon, title and text of a fact."""
@@ -79,7 +79,7 @@ class HealthPanel(OneRobotPanel):
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Health"))
-        self._facts: tuple[HealthItem, ...] = ()
+        self._items: tuple[HealthItem, ...] = ()
         self.rows: list[HealthRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
@@ -125,8 +125,8 @@ class HealthPanel(OneRobotPanel):
             self._no_robot.set_starting(self.session.starting_robots)
             return
         items = health_items(link, self.session.live.topics, time.monotonic(), _age_text)
-        if items != self._facts:
-            self._facts = items
+        if items != self._items:
+            self._items = items
             self._show(items, link)
 
     def _show(self, items: tuple[HealthItem, ...], link: RobotLink) -> None:
@@ -159,12 +159,12 @@ class HealthPanel(OneRobotPanel):
     def set_density(self, density: Density) -> None:
         super().set_density(density)
         self._make_rows(0)  # rebuilt by the next refresh
-        self._facts = ()
+        self._items = ()
 
     def theme_changed(self) -> None:
         super().theme_changed()
         self._make_rows(0)
-        self._facts = ()
+        self._items = ()
 
 
 def _age_text(age_s: float) -> str:

@@ -29,7 +29,7 @@ class NetworkTable(TablePanel[Row]):
     def __init__(self, context: PanelContext, texts: TableTexts, icon: str) -> None:
         super().__init__(context, texts, icon)
         self.networks = NetworkLine(self.theme, context.run)
-        self._networks_seen = 0
+        self._network_count = 0
         self._others = QAction(self.theme.icon("waypoints"), _("Other networks"), self)
         self._others.triggered.connect(lambda _on=False: context.run(BROWSE_COMMAND))
 
@@ -40,8 +40,8 @@ class NetworkTable(TablePanel[Row]):
     def show_networks(self) -> None:
         """Update the line with unreachable networks and the visibility of the network column."""
         self.networks.set_messages([lost_message(each) for each in self.session.networks.selected_networks])
-        if self._networks_seen != len(self.session.networks.selected_networks):
-            self._networks_seen = len(self.session.networks.selected_networks)
+        if self._network_count != len(self.session.networks.selected_networks):
+            self._network_count = len(self.session.networks.selected_networks)
             self.table.fit_columns()
 
     def more_actions(self) -> list[QAction]:

@@ -130,7 +130,7 @@ class ProblemsPanel(PanelWidget):
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._program: Program | None = None
         self._of_editor: ActiveAlert | None = None
-        self._found: tuple[ProblemLine, ...] | None = None
+        self._problem_lines: tuple[ProblemLine, ...] | None = None
         self.rows: list[ProblemRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
@@ -168,8 +168,8 @@ class ProblemsPanel(PanelWidget):
         if of_editor is not None:
             message = f"{of_editor.title} {of_editor.detail}"
             lines = (ProblemLine(Problem("error", None, None, of_editor.title, message), ()), *lines)
-        if lines != self._found:
-            self._found = lines
+        if lines != self._problem_lines:
+            self._problem_lines = lines
             self._show(lines)
 
     def _missing_robots(self, document: Document) -> list[Robot]:
@@ -218,7 +218,7 @@ class ProblemsPanel(PanelWidget):
 
     def badge(self) -> tuple[str, str] | None:
         self.refresh()  # hidden panels are not refreshed otherwise
-        return (self.chip.text, self.chip.status) if self._found else None
+        return (self.chip.text, self.chip.status) if self._problem_lines else None
 
     def _show_counts(self, lines: tuple[ProblemLine, ...]) -> None:
         if not lines:
@@ -233,12 +233,12 @@ class ProblemsPanel(PanelWidget):
 
     def set_density(self, density: Density) -> None:
         super().set_density(density)
-        if self._found is not None:
+        if self._problem_lines is not None:
             for row in self.rows:
                 self._column.removeWidget(row)
                 row.deleteLater()
             self.rows = []
-            self._show(self._found)
+            self._show(self._problem_lines)
 
 
 def _count_text(severity: str, count: int) -> str:

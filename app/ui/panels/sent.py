@@ -50,7 +50,7 @@ class SentPanel(PanelWidget):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Sent"))
         self.acting = context.session.acting
-        self._seen: object = None
+        self._last_revision: object = None
         self._ticks = 0
         self.filter = FilterField(self.theme, _("Filter sent messages"))
         self.again = IconButton(self.theme, "repeat", _("Send or call the selected entry again"), size=26)
@@ -104,14 +104,14 @@ class SentPanel(PanelWidget):
 
     def refresh(self) -> None:
         self._ticks += 1
-        if self.acting.sent.revision != self._seen:
+        if self.acting.sent.revision != self._last_revision:
             self._rebuild()
         elif self._ticks % STATE_UPDATE_TICKS == 0:
             self._update_repeat_button()
 
     def _rebuild(self) -> None:
         log, keywords = self.acting.sent, self.filter.text().casefold().split()
-        self._seen = log.revision
+        self._last_revision = log.revision
         rows = [
             each for each in reversed(log.records) if all(keyword in _haystack(each) for keyword in keywords)
         ]

@@ -54,7 +54,7 @@ class TablePanel(PanelWidget, Generic[Row]):
     """
 
     def __init__(self, context: PanelContext, texts: TableTexts, icon: str) -> None:
-        self._words = texts
+        self._table_texts = texts
         super().__init__(context, _(texts.title))
         theme = self.theme
         self.model = self.make_model()
@@ -128,14 +128,14 @@ class TablePanel(PanelWidget, Generic[Row]):
         if any_rows:
             return
         if filtered:
-            texts = self._words
+            texts = self._table_texts
             self.empty.set_texts(_(texts.no_matches), _(texts.clear_filter_hint), "search")
             clear = EmptyAction(_("Clear the filter"), self.filter.clear, "x")
             topic = self.missing_topic()
             self.empty.set_actions([clear, self.doctor_action(topic)] if topic else [clear])
-        elif self.session.replay is not None and self._words.not_recorded:
+        elif self.session.replay is not None and self._table_texts.not_recorded:
             self.doctor.hide()
-            self.empty.set_texts(_(self._words.not_recorded), "", "film")
+            self.empty.set_texts(_(self._table_texts.not_recorded), "", "film")
             self.empty.set_actions([])
         elif self.session.master.kind == "none":
             text = _("A master lets programs find each other.")

@@ -162,9 +162,9 @@ class VariablesPanel(TablePanel[VariableRow]):
         self.foot.hide()
         self._opened: set[str] = set()
         self._variables: tuple[Variable, ...] = ()
-        self._seen: tuple[object, ...] = ()
+        self._last_state: tuple[object, ...] = ()
         self._values: Mapping[str, VariableValue] = {}
-        self._fresh: dict[str, float] = {}  # time of the last change, by variable
+        self._change_times_s: dict[str, float] = {}  # time of the last change, by variable
 
     def make_model(self) -> TableModel[VariableRow]:
         return TableModel(COLUMNS, lambda row: row.key)
@@ -187,14 +187,16 @@ class VariablesPanel(TablePanel[VariableRow]):
         now = self.clock()
         values = runs.values if mine else {}
         state = (document.key, program.variables, runs.values_revision if mine else -1, mine and runs.active)
-        faded = [id for id, since in self._fresh.items() if now - since >= CHANGE_HIGHLIGHT_S]
+        faded = [id for id, since in self._change_times_s.items() if now - since >= CHANGE_HIGHLIGHT_S]
         for id in faded:
-            del self._fresh[id]
-        if state == self._seen and not faded:
+            del self._change_times_s[id]
+        if state == self._last_state and not faded:
             return
-        if state[:1] == self._seen[:1] and mine and runs.active:
-            self._fresh.update({id: now for id, value in values.items() if self._values.get(id) != value})
-        self._seen, self._variables, self._values = state, program.variables, values
+        if state[:1] == self._last_state[:1] and mine and runs.active:
+            self._change_times_s.update(
+                {id: now for id, value in values.items() if self._values.get(id) != value}
+            )
+        self._last_state, self._variables, self._values = state, program.variables, values
         self.rebuild()
 
     def rebuild(self) -> None:
@@ -210,7 +212,7 @@ class VariablesPanel(TablePanel[VariableRow]):
                 self._values,
                 self._opened,
                 self.table.order,
-                changed_ids=self._fresh,
+                changed_ids=self._change_times_s,
                 has_ended=has_ended,
             )
         )

@@ -59,18 +59,18 @@ class RateText:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._words, self._since = "", 0.0
+        self._text, self._since = "", 0.0
 
     def for_stream(self, stream: ImageStream) -> str:
         """Return the current text for a stream."""
         text, now = rate_text(stream.displayed_hz, stream.arriving_hz), self._clock()
-        if text != self._words and (not self._words or not text or now - self._since >= STATS_INTERVAL_S):
-            self._words, self._since = text, now
-        return self._words
+        if text != self._text and (not self._text or not text or now - self._since >= STATS_INTERVAL_S):
+            self._text, self._since = text, now
+        return self._text
 
     def clear(self) -> None:
         """Clear the text before another stream is shown."""
-        self._words = ""
+        self._text = ""
 
 
 def pixel_text(x: int, y: int, pixel: Pixel | None) -> str:

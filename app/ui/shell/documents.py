@@ -81,7 +81,12 @@ class DocumentController:
         clock: Callable[[], float] = time.time,
     ) -> None:
         # `editor` returns the behaviour panel, or None before it exists.
-        self._session, self.asks, self._say, self._shown = session, dialogs, show_toast, show_editor
+        self._session, self.asks, self._show_toast, self._show_editor = (
+            session,
+            dialogs,
+            show_toast,
+            show_editor,
+        )
         self._documents = session.documents
         self._editor, self._clock = editor, clock
         self.open_recording: Callable[[Path], object] = lambda _path: None
@@ -141,7 +146,7 @@ class DocumentController:
 
         def open_copy() -> None:
             self._documents.copy(path, name)
-            self._say(_("Opened {name} as a copy").format(name=name))
+            self._show_toast(_("Opened {name} as a copy").format(name=name))
 
         self.run_after_flush(lambda: self._open_tab(open_copy))
 
@@ -177,7 +182,7 @@ class DocumentController:
 
         def reopen_document() -> None:
             if self._documents.reopen() is None:
-                self._say(_("No closed tabs"))
+                self._show_toast(_("No closed tabs"))
 
         self.run_after_flush(lambda: self._open_tab(reopen_document))
 
@@ -212,7 +217,7 @@ class DocumentController:
             except SettingsError as error:
                 self._session.console.add("warn", "studio", str(error))
         message = _("Renamed {name} to {other}").format(name=before, other=document.name)
-        self._say(message, _("Undo"), lambda: self.rename(document, before))
+        self._show_toast(message, _("Undo"), lambda: self.rename(document, before))
         return True
 
     def move(self, document: Document, position: int) -> None:
@@ -280,11 +285,11 @@ class DocumentController:
         if document.path is not None:
             self._add_recent(document.path)
         if earlier is None:
-            self._say(_("Saved {name}").format(name=document.name))
+            self._show_toast(_("Saved {name}").format(name=document.name))
             return
         copy_name = _("{name} (previous version)").format(name=document.name)
         message = template.format(name=document.name)
-        self._say(message, _("Open"), lambda: self.copy(earlier.copy, copy_name))
+        self._show_toast(message, _("Open"), lambda: self.copy(earlier.copy, copy_name))
 
     def _back_up(self, document: Document, path: Path | None) -> tuple[SavedVersion | None, str]:
         # Backs up a file before it is overwritten; returns the text for the toast with the placeholder
@@ -313,7 +318,7 @@ class DocumentController:
             return
         self._session.tabs.save()
         self._session.alerts.resolve("file")
-        self._shown()
+        self._show_editor()
 
     def _save_before_close(self, document: Document) -> ClosedTab | None:
         # Returns None and raises an alert if saving fails.
@@ -345,9 +350,9 @@ class DocumentController:
             message = message.format(count=len(closed))
         back = [each for each in closed if each.earlier is not None]
         if back:
-            self._say(message, _("Undo"), lambda: self._open_tab(lambda: self._undo_close(back)))
+            self._show_toast(message, _("Undo"), lambda: self._open_tab(lambda: self._undo_close(back)))
         else:
-            self._say(message)
+            self._show_toast(message)
 
     def _undo_close(self, closed: Sequence[ClosedTab]) -> None:
         # Restores the files, and reopens the tabs with unsaved work.
@@ -428,7 +433,7 @@ class FlushBeforeClose(QObject):
         # `close` is called once if `ready` had to wait.
         super().__init__(parent)
         self._editor, self._close = editor, close
-        self._asked = self._ready = self._waits = False
+        self._is_requested = self._ready = self._is_waiting = False
 
     def ready(self) -> bool:
         """Return True if the window can be closed now.
@@ -436,24 +441,24 @@ class FlushBeforeClose(QObject):
         The first call requests the pending edit. If it returns False, the window is closed when the
         edit has arrived.
         """
-        if not self._asked:
-            self._asked, self._ready = True, False
+        if not self._is_requested:
+            self._is_requested, self._ready = True, False
             editor = self._editor()
             if isinstance(editor, SupportsFlush):
                 editor.flush(self._on_flushed)
             else:
                 self._ready = True
-            self._waits = not self._ready
-            if self._waits:
+            self._is_waiting = not self._ready
+            if self._is_waiting:
                 QTimer.singleShot(MAX_FLUSH_MS, self, self._on_flushed)
         return self._ready
 
     def reset(self) -> None:
         """Reset the state after closing the window was cancelled."""
-        self._asked = self._ready = self._waits = False
+        self._is_requested = self._ready = self._is_waiting = False
 
     def _on_flushed(self) -> None:
         self._ready = True
-        if self._waits:
-            self._waits = False
+        if self._is_waiting:
+            self._is_waiting = False
             QTimer.singleShot(0, self, self._close)

@@ -118,7 +118,7 @@ class FocusRing(QWidget):
             step.installEventFilter(self)
             self._chain.append(step)
             step = step.parentWidget()
-        self._place()
+        self._reposition()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
@@ -138,14 +138,14 @@ class FocusRing(QWidget):
         elif kind == QEvent.Type.Show and watched is self._home:
             self._window_changed(self._home.windowHandle())
         elif kind in _GEOMETRY_EVENTS:
-            self._place()
+            self._reposition()
         return super().eventFilter(watched, event)
 
     def _show_at_focus(self) -> None:
         if self._target is None:
             self._focus_changed(None, QApplication.focusWidget())
 
-    def _place(self) -> None:
+    def _reposition(self) -> None:
         target = self._target
         if target is None or not isValid(target) or not target.isVisible():
             self.hide()

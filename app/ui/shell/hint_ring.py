@@ -27,9 +27,9 @@ class HintRing(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setAttribute(Qt.WidgetAttribute.WA_NoSystemBackground)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._look = QTimer(self)
-        self._look.setInterval(POLL_MS)
-        self._look.timeout.connect(self._place)
+        self._poll_timer = QTimer(self)
+        self._poll_timer.setInterval(POLL_MS)
+        self._poll_timer.timeout.connect(self._reposition)
         self._end = QTimer(self)
         self._end.setSingleShot(True)
         self._end.setInterval(TIMEOUT_MS)
@@ -48,8 +48,8 @@ class HintRing(QWidget):
         self._listens_to = self._window.windowHandle()
         if self._listens_to is not None:
             self._listens_to.installEventFilter(self)
-        self._place()
-        self._look.start()
+        self._reposition()
+        self._poll_timer.start()
         self._end.start()
         return True
 
@@ -61,7 +61,7 @@ class HintRing(QWidget):
             self._listens_to.removeEventFilter(self)
         self._listens_to = None
         self.target = None
-        self._look.stop()
+        self._poll_timer.stop()
         self._end.stop()
         self.hide()
 
@@ -74,7 +74,7 @@ class HintRing(QWidget):
             self.clear()
         return super().eventFilter(watched, event)
 
-    def _place(self) -> None:
+    def _reposition(self) -> None:
         target = self.target
         if target is None or not isValid(target) or not target.isVisible():
             self.clear()

@@ -95,12 +95,12 @@ class MainWindow(QMainWindow):
         self.saved_layouts = SavedLayouts(self.state, self.log_problem)
         self.on_shut: Callable[[], object] = lambda: None
         self.can_restart = self.wants_restart = False
-        self._showing = self._left = ""
+        self._showing = self._previous_layout = ""
         self.benches: dict[str, Workbench] = {}
-        self._ahead: dict[str, Workbench] = {}  # workbenches with panels created in advance
-        self._facts = StatusFormatter(session)
-        self._alerts_seen = (-1, False)
-        self._source_seen = session.source_revision
+        self._prepared_benches: dict[str, Workbench] = {}  # workbenches with panels created in advance
+        self._status_formatter = StatusFormatter(session)
+        self._last_alerts_state = (-1, False)
+        self._source_revision = session.source_revision
         self._ticks = self._halves = 0
         self._twice = False  # the timer runs at twice the tick rate
         self._shut = False
@@ -226,7 +226,7 @@ class MainWindow(QMainWindow):
     def show_start(self) -> None:
         """Show the start page."""
         if self.bench is not None:
-            self._left = self._showing
+            self._previous_layout = self._showing
         self._showing = START_PAGE
         self.pages.setCurrentWidget(self.start)
         self.show_recent()
@@ -236,8 +236,8 @@ class MainWindow(QMainWindow):
     @property
     def left(self) -> str:
         """Name of the layout to return to from the start page, or ""."""
-        if self._left:
-            return self._left
+        if self._previous_layout:
+            return self._previous_layout
         return "behaviour" if any(not each.is_blank for each in self.session.documents) else ""
 
     def _continue_work(self, key: str) -> None:
@@ -261,7 +261,7 @@ class MainWindow(QMainWindow):
         layout = layout_named(name)
         if layout.name not in self.benches:
             self.benches[layout.name] = bench = self._new_bench(layout)
-            self._ahead.pop(layout.name, None)
+            self._prepared_benches.pop(layout.name, None)
             self.pages.addWidget(bench)
             bench.resize(self.pages.size())
             self.saved_layouts.restore(bench, layout.name)
@@ -279,7 +279,7 @@ class MainWindow(QMainWindow):
 
     def _new_bench(self, layout: Layout) -> Workbench:
         # Uses the workbench created in advance, if any.
-        bench = self._ahead.get(layout.name)
+        bench = self._prepared_benches.get(layout.name)
         if bench is None:
             bench = Workbench(self.theme, layout, self.panels, self.context)
             bench.panel_failed.connect(self._panel_failed)
@@ -290,7 +290,7 @@ class MainWindow(QMainWindow):
 
         def make(layout: Layout, name: str) -> None:
             if not self._shut and layout.name not in self.benches:
-                self._ahead[layout.name] = bench = self._new_bench(layout)
+                self._prepared_benches[layout.name] = bench = self._new_bench(layout)
                 bench.preload(name)
 
         return [partial(make, layout, name) for layout in LAYOUTS for name in layout.default_panels]
@@ -399,9 +399,9 @@ class MainWindow(QMainWindow):
 
     def _update_source(self) -> None:
         # Resets all panels after a change of the source.
-        if self._source_seen != self.session.source_revision:
-            self._source_seen = self.session.source_revision
-            for bench in (*self.benches.values(), *self._ahead.values()):
+        if self._source_revision != self.session.source_revision:
+            self._source_revision = self.session.source_revision
+            for bench in (*self.benches.values(), *self._prepared_benches.values()):
                 bench.notify_source_changed()
 
     def _update_panels(self) -> None:
@@ -433,7 +433,7 @@ class MainWindow(QMainWindow):
             if self.bench is not None:
                 self.bench.refresh()
         spent = (time.perf_counter() - start_s) * 1000
-        self._facts.window_ms += 0.1 * (spent - self._facts.window_ms)
+        self._status_formatter.window_ms += 0.1 * (spent - self._status_formatter.window_ms)
 
     def _show_session(self) -> None:
         view = self.session.runs.view()
@@ -461,7 +461,7 @@ class MainWindow(QMainWindow):
 
     def _update_status_bar(self) -> None:
         # Called less often than the tick, because numbers can't be read at 30 Hz.
-        formatter, document = self._facts, self.session.document
+        formatter, document = self._status_formatter, self.session.document
         alerts = formatter.alerts(for_developers=self.current_layout == "developer")
         web = formatter.web_pages()
         self.status.commands = {
@@ -529,8 +529,8 @@ class MainWindow(QMainWindow):
     def _show_alerts(self) -> None:
         # Alerts for the current layout, shown in the free area of its bar.
         alerts, is_developer = self.session.alerts, self.current_layout == "developer"
-        if (alerts.revision, is_developer) != self._alerts_seen:
-            self._alerts_seen = (alerts.revision, is_developer)
+        if (alerts.revision, is_developer) != self._last_alerts_state:
+            self._last_alerts_state = (alerts.revision, is_developer)
             reported = alerts.errors_and_warnings(for_developers=is_developer)
             self.banner.show_alerts([alert for alert in reported if not alerts.is_dismissed(alert.id)])
         hosts: Mapping[str, StartPage | RunBar] = {START_PAGE: self.start, "behaviour": self.run_bar}
@@ -579,7 +579,7 @@ class MainWindow(QMainWindow):
             with log_errors("keep how the window looks"):
                 self._save_state()
             self.hide()
-            for bench in (*self.benches.values(), *self._ahead.values()):
+            for bench in (*self.benches.values(), *self._prepared_benches.values()):
                 bench.dispose()
             self.session.close()
             self.on_shut()

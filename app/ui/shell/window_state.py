@@ -38,7 +38,7 @@ class WindowState:
         # `complain` is called with a sentence if settings can't be saved.
         self._settings = settings
         self._complain = complain
-        self._said = ""
+        self._reported_error = ""
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the saved mode, text size, motion and contrast to the theme in one update."""
@@ -126,9 +126,11 @@ class WindowState:
         try:
             self._settings.set(key, value)
         except SettingsError as error:
-            if str(error) != self._said:  # report an error only once, because settings are saved often
-                self._said = str(error)
-                self._complain(self._said)
+            if (
+                str(error) != self._reported_error
+            ):  # report an error only once, because settings are saved often
+                self._reported_error = str(error)
+                self._complain(self._reported_error)
             return False
-        self._said = ""
+        self._reported_error = ""
         return True

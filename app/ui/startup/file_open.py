@@ -23,7 +23,7 @@ class FileDropFilter(QObject):
 
     def __init__(self, window: QWidget, handler: Callable[[Sequence[Path]], object]) -> None:
         super().__init__(window)
-        self._take = handler
+        self._handler = handler
         window.setAcceptDrops(True)
         window.installEventFilter(self)
 
@@ -36,7 +36,7 @@ class FileDropFilter(QObject):
                 return False
             dropped.acceptProposedAction()
             if kind == QEvent.Type.Drop:
-                self._take(paths)
+                self._handler(paths)
             return True
         return super().eventFilter(watched, event)
 
@@ -51,7 +51,7 @@ class Application(QApplication):
 
     def __init__(self, arguments: Sequence[str]) -> None:
         super().__init__(list(arguments))
-        self._take: Callable[[Sequence[Path]], object] | None = None
+        self._handler: Callable[[Sequence[Path]], object] | None = None
         self._waiting: list[Path] = []
 
     def set_file_opener(self, handler: Callable[[Sequence[Path]], object]) -> None:
@@ -60,17 +60,17 @@ class Application(QApplication):
         Args:
             handler: Called with the paths.
         """
-        self._take = handler
+        self._handler = handler
         waiting, self._waiting = self._waiting, []
         if waiting:
             handler(waiting)
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.FileOpen and (name := cast("QFileOpenEvent", event).file()):
-            if self._take is None:
+            if self._handler is None:
                 self._waiting.append(Path(name))
             else:
-                self._take([Path(name)])
+                self._handler([Path(name)])
             return True
         return super().event(event)
 

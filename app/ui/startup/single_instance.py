@@ -203,7 +203,7 @@ class SingleInstanceServer(QObject):
     ) -> None:
         # `do` is called with each request.
         super().__init__(parent)
-        self._do = on_request
+        self._on_request = on_request
         self._received: dict[QtNetwork.QLocalSocket, bytes] = {}
         self._server = QtNetwork.QLocalServer(self)
         self._server.setSocketOptions(QtNetwork.QLocalServer.SocketOption.UserAccessOption)
@@ -251,7 +251,7 @@ class SingleInstanceServer(QObject):
                 return
             socket.write(OK_REPLY)
             socket.flush()
-            self._do(request)
+            self._on_request(request)
 
     def _on_disconnected(self, socket: QtNetwork.QLocalSocket) -> None:
         self._received.pop(socket, None)

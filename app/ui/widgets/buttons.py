@@ -180,7 +180,7 @@ class Button(PaintedButton):
         self.fill_icon = False
         self.icon_role = ""
         """Colour role of the icon; "" for the colour of the text."""
-        self._least: int | None = None
+        self._min_width: int | None = None
         self.setCursor(Qt.CursorShape.ArrowCursor)
 
     def set_label(self, text: str, icon: str | None = None, *, name: str = "") -> None:
@@ -226,7 +226,7 @@ class Button(PaintedButton):
 
     def minimumSizeHint(self) -> QSize:
         hint = self.sizeHint()
-        return hint if self._least is None else QSize(min(self._least, hint.width()), hint.height())
+        return hint if self._min_width is None else QSize(min(self._min_width, hint.width()), hint.height())
 
     def allow_shrinking(self, min_width: int = 72) -> None:
         """Allow layouts to make the button narrower than its text, which is then elided.
@@ -234,7 +234,7 @@ class Button(PaintedButton):
         Args:
             min_width: Minimum width in px.
         """
-        self._least = min_width
+        self._min_width = min_width
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
 
     def icon_side(self) -> int:
@@ -429,7 +429,7 @@ class RunButton(Button):
         # `widest` is the longest text that the button will show, so that its width never changes.
         super().__init__(theme, text, icon, size="large", parent=parent)
         self._widest = widest or text
-        self._bare = False
+        self._is_icon_only = False
         self.fill_icon = False
 
     def set_filled(self, filled: bool) -> None:
@@ -439,8 +439,8 @@ class RunButton(Button):
 
     def set_icon_only(self, icon_only: bool) -> None:
         """Show only the icon if `icon_only`, else icon and text. The accessible name doesn't change."""
-        if icon_only != self._bare:
-            self._bare = icon_only
+        if icon_only != self._is_icon_only:
+            self._is_icon_only = icon_only
             self.updateGeometry()
             self.update()
 
@@ -448,11 +448,11 @@ class RunButton(Button):
         return self.measure.icon  # the text needs the space
 
     def displayed_text(self) -> str:
-        return "" if self._bare else self.text()
+        return "" if self._is_icon_only else self.text()
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("button")
-        if self._bare:
+        if self._is_icon_only:
             return QSize(
                 max(ICON_ONLY_WIDTH, self.icon_side() + 28),
                 max(self.measure.height, round(paint.height_of(font)) + 12),
@@ -476,7 +476,7 @@ class StopButton(PaintedButton):
     def __init__(self, theme: Theme, bar: BarName = "runBar", parent: QWidget | None = None) -> None:
         self._corners = "large" if bar == "runBar" else "control"
         super().__init__(theme, _("Stop"), radius=self._corners, parent=parent)
-        self._place: BarName = bar
+        self._bar: BarName = bar
         self._ring = False
         self.filled = True
         # A click doesn't take the focus, so sheets stay open and typing continues.
@@ -500,11 +500,11 @@ class StopButton(PaintedButton):
         self.update()
 
     def sizeHint(self) -> QSize:
-        size = self._theme.size_pair("stop", self._place)
+        size = self._theme.size_pair("stop", self._bar)
         font, key = self._fonts()
         captions = (_("Stop"), _("Stopping"), _("Stop again"))  # the same size in every state
         min_width = self._icon_side() + 26 + max(paint.width_of(font, each) for each in captions)
-        if self._place != "runBar":
+        if self._bar != "runBar":
             min_width += paint.width_of(key, "F12") + 8
         height = max(size.height(), round(paint.height_of(font)) + 10)
         return QSize(max(size.width(), round(min_width)) + 2 * STOP_RING_WIDTH, height + 2 * STOP_RING_WIDTH)
@@ -513,7 +513,7 @@ class StopButton(PaintedButton):
         return self.sizeHint()
 
     def _fonts(self) -> tuple[QFont, QFont]:
-        large = self._place == "runBar"
+        large = self._bar == "runBar"
         font = self._theme.font("heading" if large else "title")
         font.setWeight(font.Weight.Bold)
         if large:
@@ -521,7 +521,7 @@ class StopButton(PaintedButton):
         return font, self._theme.font("small" if large else "caption")
 
     def _icon_side(self) -> int:
-        return 16 if self._place == "runBar" else 12
+        return 16 if self._bar == "runBar" else 12
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme, radius = self._theme, self._theme.radius(self._corners)
@@ -539,10 +539,10 @@ class StopButton(PaintedButton):
 
     def _paint_text(self, painter: QPainter, frame: QRectF, colour: QColor) -> None:
         font, key_font = self._fonts()
-        key = "F12" if self.text() == _("Stop") or self._place != "runBar" else ""
+        key = "F12" if self.text() == _("Stop") or self._bar != "runBar" else ""
         side = self._icon_side()
-        gap = 10 if self._place == "runBar" else 8
-        key_gap = gap + 3 if self._place == "runBar" else gap - 1
+        gap = 10 if self._bar == "runBar" else 8
+        key_gap = gap + 3 if self._bar == "runBar" else gap - 1
         word_width = paint.width_of(font, self.text())
         key_width = paint.width_of(key_font, key) + key_gap if key else 0
         left = frame.center().x() - (side + gap + word_width + key_width) / 2

@@ -67,12 +67,12 @@ class AlertBox(QWidget):
         self._status = "info"
         self.text_column, self.button_row = QVBoxLayout(), QHBoxLayout()
         self.button_row.setSpacing(self.gap)
-        self._whole = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._main_layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         vertical_margin = self.high if framed else 4
-        self._whole.setContentsMargins(self.left, vertical_margin, 12, vertical_margin)
-        self._whole.setSpacing(self.gap)
-        self._whole.addLayout(self.text_column, 1)
-        self._whole.addLayout(self.button_row)
+        self._main_layout.setContentsMargins(self.left, vertical_margin, 12, vertical_margin)
+        self._main_layout.setSpacing(self.gap)
+        self._main_layout.addLayout(self.text_column, 1)
+        self._main_layout.addLayout(self.button_row)
 
     def set_status(self, status: str) -> None:
         """Set the status, which determines the colours and the icon."""
@@ -93,10 +93,10 @@ class AlertBox(QWidget):
         room = self.width() - self.button_row.sizeHint().width()
         fits_beside = self.button_row.isEmpty() or room >= self._theme.scaled(self.min_text_width)
         direction = QBoxLayout.Direction.LeftToRight if fits_beside else QBoxLayout.Direction.TopToBottom
-        if self._whole.direction() != direction:
-            self._whole.setDirection(direction)
+        if self._main_layout.direction() != direction:
+            self._main_layout.setDirection(direction)
             right = Qt.AlignmentFlag.AlignRight
-            self._whole.setAlignment(self.button_row, Qt.AlignmentFlag(0) if fits_beside else right)
+            self._main_layout.setAlignment(self.button_row, Qt.AlignmentFlag(0) if fits_beside else right)
 
     def icon_top(self) -> float:
         """Return the distance in px between the upper edges of the box and the icon."""

@@ -72,7 +72,7 @@ class Chip(QWidget):
         self._theme = theme
         self._large = large
         self._text, self._status, self._icon = "", "", icon
-        self._bare = False
+        self._is_icon_only = False
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self.updateGeometry)
         self.set(text, status, icon)
@@ -103,15 +103,15 @@ class Chip(QWidget):
         self._text, self._status, self._icon = text, status, icon
         self.setAccessibleName(text)
         paint.show_when(self, bool(text))
-        if self._bare:
+        if self._is_icon_only:
             self._update_tooltip()
         self.updateGeometry()
         self.update()
 
     def set_icon_only(self, icon_only: bool) -> None:
         """Show only the icon if `icon_only`, with the text as tooltip, else the icon and the text."""
-        if icon_only != self._bare:
-            self._bare = icon_only
+        if icon_only != self._is_icon_only:
+            self._is_icon_only = icon_only
             self.updateGeometry()
             self.update()
 
@@ -140,7 +140,9 @@ class Chip(QWidget):
         return max(min_height, round(paint.height_of(self._font())) + 6)
 
     def sizeHint(self) -> QSize:
-        return QSize(self.icon_only_width() if self._bare else self.full_width(), self._preferred_height())
+        return QSize(
+            self.icon_only_width() if self._is_icon_only else self.full_width(), self._preferred_height()
+        )
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
@@ -151,7 +153,7 @@ class Chip(QWidget):
 
     def _update_tooltip(self) -> None:
         paint.set_elision_tooltip(self, self._text)
-        if self._bare:
+        if self._is_icon_only:
             self.setProperty("shortened", True)
             self.setToolTip(plain.tip(self._text))
 
@@ -169,13 +171,13 @@ class Chip(QWidget):
         name = self._icon_name()
         if name:
             side = self._icon_side()
-            left = (rect.width() - side) / 2 if self._bare else left
+            left = (rect.width() - side) / 2 if self._is_icon_only else left
             icon_rect = QRectF(left, (rect.height() - side) / 2, side, side)
             paint_icon(
                 painter, icon_rect, name, theme.colour(status.colour) if name == "dot" else text_colour
             )
             left += side + CHIP_GAP
-        if not self._bare:
+        if not self._is_icon_only:
             paint.text_line(painter, rect.adjusted(left, 0, -3, 0), self._text, self._font(), text_colour)
         painter.end()
 
@@ -186,7 +188,7 @@ class StatusIcon(QWidget):
     def __init__(self, theme: Theme, status: str = "off", *, height: int = 0, colour: str = "") -> None:
         # `height` is that of the adjacent line of text (0: the icon's own); `ink` overrides the colour.
         super().__init__()
-        self._theme, self._status, self._height, self._ink = theme, "", height, colour
+        self._theme, self._status, self._height, self._colour = theme, "", height, colour
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.set(status)
 
@@ -204,7 +206,7 @@ class StatusIcon(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         status, painter = self._theme.status(self._status), QPainter(self)
         icon_rect = QRectF(0, (self.height() - self.width()) / 2, self.width(), self.width())
-        paint_icon(painter, icon_rect, status.icon, self._theme.colour(self._ink or status.colour))
+        paint_icon(painter, icon_rect, status.icon, self._theme.colour(self._colour or status.colour))
         painter.end()
 
 

@@ -44,13 +44,13 @@ class ElidedLabel(QLabel):
     def __init__(self, kind: str, role: str, min_width: int = 0) -> None:
         # `least` is the minimum width in px.
         super().__init__()
-        self._least = min_width
+        self._min_width = min_width
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setProperty("kind", kind)
         self.setProperty("role", role)
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(min(self._least, super().sizeHint().width()), super().minimumSizeHint().height())
+        return QSize(min(self._min_width, super().sizeHint().width()), super().minimumSizeHint().height())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         room = self.contentsRect()
@@ -71,16 +71,16 @@ class FixedWidthLabel(ElidedLabel):
     """
 
     def __init__(self, kind: str, role: str) -> None:
-        self._words = ""
+        self._text = ""
         super().__init__(kind, role)
         super().setText("0")  # space for one line
 
     def text(self) -> str:
-        return self._words
+        return self._text
 
     def setText(self, text: str) -> None:
-        if text != self._words:
-            self._words = text
+        if text != self._text:
+            self._text = text
             self.setAccessibleName(text)
             self.update()
 
@@ -89,16 +89,16 @@ class SteadyLabel(ElidedLabel):
     """Label for a text that changes about once a second, as wide as the widest text so far."""
 
     def __init__(self, kind: str, role: str, min_width: int = 0) -> None:
-        self._words = ""
+        self._text = ""
         super().__init__(kind, role, min_width)
 
     def text(self) -> str:
-        return self._words
+        return self._text
 
     def setText(self, text: str) -> None:
-        if text == self._words:
+        if text == self._text:
             return
-        self._words = text
+        self._text = text
         self.setAccessibleName(text)
         metrics = self.fontMetrics()
         if not text or metrics.horizontalAdvance(text) > metrics.horizontalAdvance(super().text()):

@@ -57,7 +57,7 @@ class NanomsgPublisher(HandshakePublisher):
         serve_soon: Callable[[Pollable], None],
     ) -> None:
         nng = load_pynng()
-        self._again = nng.TryAgain
+        self._try_again_error = nng.TryAgain
         self.spec = spec
         self.count = 0
         self.is_local = False
@@ -82,7 +82,7 @@ class NanomsgPublisher(HandshakePublisher):
         self._hellos: dict[str, int] = {}
         """Subscriber id by the address of its connection, which may not be established yet."""
         self._events: deque[tuple[int, str]] = deque()
-        self._refusals = RejectionLog()
+        self._rejections = RejectionLog()
         super().__init__(threading.Condition(threading.Lock()), {})
         self._message_socket.add_post_pipe_connect_cb(self._handle_pipe_added)
         self._message_socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
@@ -92,7 +92,7 @@ class NanomsgPublisher(HandshakePublisher):
     @property
     def subscribers(self) -> int:
         """Number of subscribers that have sent a hello and are still connected."""
-        return len(self._seen)
+        return len(self._counts_at_hello)
 
     @property
     def has_subscribers(self) -> bool:
@@ -169,7 +169,7 @@ class NanomsgPublisher(HandshakePublisher):
             while not self._is_released:
                 try:
                     received = self._hello_socket.recv(block=False)
-                except self._again:
+                except self._try_again_error:
                     break
                 self._process_hello_locked(received)
         return PollState()
@@ -190,7 +190,7 @@ class NanomsgPublisher(HandshakePublisher):
             return
         subscriber = self._hellos.pop(self._pipes.pop(pipe, ""), None)
         if subscriber is not None and subscriber not in self._hellos.values():  # otherwise it has reconnected
-            self._seen.pop(subscriber, None)
+            self._counts_at_hello.pop(subscriber, None)
             self._changed.notify_all()
 
     def _process_hello_locked(self, received: bytes) -> None:
@@ -199,8 +199,8 @@ class NanomsgPublisher(HandshakePublisher):
         if hello is not None and len(self._hellos) >= _MAX_HELLOS:
             self._discard_unconnected_hellos_locked()
         if hello is None or hello.topic != self.spec.topic or len(self._hellos) >= _MAX_HELLOS:
-            if self._refusals.add(f"an invalid hello of {len(received)} bytes"):
-                _logger.info("'%s' received %s", self.spec.topic, self._refusals.recent_message())
+            if self._rejections.add(f"an invalid hello of {len(received)} bytes"):
+                _logger.info("'%s' received %s", self.spec.topic, self._rejections.recent_message())
             return
         remote = address.decode("ascii", "replace")
         self._hellos[remote] = hello.subscriber
@@ -217,7 +217,7 @@ class NanomsgPublisher(HandshakePublisher):
         subscriber = self._hellos.get(address)
         if subscriber is None or self._is_released:
             return
-        self._seen[subscriber] = self.count
+        self._counts_at_hello[subscriber] = self.count
         for message in self._history:
             self._message_socket.send(
                 subscriber_topic_part(subscriber, self.spec.topic) + message, block=False
@@ -249,11 +249,14 @@ class NanomsgPublisher(HandshakePublisher):
         `deadline` is a time of `time.monotonic`.
         """
         with self._changed:
-            while self._seen and (remaining_s := deadline - time.monotonic()) > 0.0:
-                if not wait_until(self._changed, lambda: not self._seen, min(remaining_s, _BYE_RETRY_S)):
+            while self._counts_at_hello and (remaining_s := deadline - time.monotonic()) > 0.0:
+                if not wait_until(
+                    self._changed, lambda: not self._counts_at_hello, min(remaining_s, _BYE_RETRY_S)
+                ):
                     self._send_bye_locked()  # a full queue drops the bye like any other message
             undelivered = [
-                max(self.count - seen_count, len(self._history)) for seen_count in self._seen.values()
+                max(self.count - seen_count, len(self._history))
+                for seen_count in self._counts_at_hello.values()
             ]
             if any(undelivered):
                 _logger.warning(
@@ -263,7 +266,7 @@ class NanomsgPublisher(HandshakePublisher):
                     sum(map(bool, undelivered)),
                     max(undelivered),
                 )
-            self._seen.clear()
+            self._counts_at_hello.clear()
 
     def release(self) -> None:
         """Close the sockets. The I/O thread must have stopped serving them."""
@@ -275,5 +278,5 @@ class NanomsgPublisher(HandshakePublisher):
         self._message_socket.close()
 
     def _send_bye_locked(self) -> None:
-        for subscriber in () if self._is_released else self._seen:
+        for subscriber in () if self._is_released else self._counts_at_hello:
             self._send_notice_locked(subscriber, BYE)

@@ -90,7 +90,7 @@ class NanomsgServer:
         self._socket = socket
         self._framing = framing
         self._on_close = on_close
-        self._refusals = RejectionLog()
+        self._rejections = RejectionLog()
         self._lock = threading.Lock()
         self._answered_at = 0.0
         self._contexts: set[Any] = set()
@@ -123,7 +123,7 @@ class NanomsgServer:
             self._contexts.discard(context)
         close_context(context)
         self.stats.add_unreadable()
-        if self._refusals.add(error.reason):
+        if self._rejections.add(error.reason):
             _logger.warning("malformed call to '%s': %s", self.spec.service, error)
 
     def _new_context(self) -> Any:  # noqa: ANN401 - pynng is not typed

@@ -95,16 +95,16 @@ class NanomsgSubSocket(UnbatchedReader):
         self.fd = self._sub.fd
         self._name = spec.topic
         self._topic = topic_part(spec.topic)
-        self._own = subscriber_topic_part(spec.id, spec.topic)
+        self._own_topic = subscriber_topic_part(spec.id, spec.topic)
         self._hello = hello_part(spec.id, spec.topic)
         self._parser = MessageParser(
-            spec, self._own, self.sources, self.disconnect, lambda _publisher, _seq: None
+            spec, self._own_topic, self.sources, self.disconnect, lambda _publisher, _seq: None
         )
         self._links: dict[int, _Link] = {}
         self._greeters: dict[str, Any] = {}
         """Sockets for the hellos, by address of the publisher. Also read by pynng's threads."""
         self._sub.socket.subscribe(self._topic)
-        self._sub.socket.subscribe(self._own)
+        self._sub.socket.subscribe(self._own_topic)
         self._sub.socket.add_post_pipe_connect_cb(self._handle_pipe_added)
 
     @property
@@ -205,8 +205,8 @@ class NanomsgSubSocket(UnbatchedReader):
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
         """Return the next message, or None if there is none; with `may_wait`, wait up to `SHORT_WAIT_S`."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
-            is_alone = frame.startswith(self._own)
-            first = self._own if is_alone else self._topic
+            is_alone = frame.startswith(self._own_topic)
+            first = self._own_topic if is_alone else self._topic
             try:
                 message = self._parser.parse(first, split_message(frame, first, is_alone=is_alone))
             except WireError as error:

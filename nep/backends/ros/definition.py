@@ -174,7 +174,7 @@ class _Parser:
     def __init__(self, name: str, texts: Mapping[str, str]) -> None:
         self._name = name
         self._texts = texts
-        self._known: dict[str, FieldKind] = {}
+        self._kinds_by_name: dict[str, FieldKind] = {}
         self._count = 0
         self.has_header = False
 
@@ -203,11 +203,11 @@ class _Parser:
         if basic is not None:
             return basic
         name = self._resolve_name(parent_name, written)
-        kind = self._known.get(name)
+        kind = self._kinds_by_name.get(name)
         if kind is None:
             if depth >= _MAX_DEPTH:
                 raise self._definition_error(written)
-            kind = self._known[name] = _nested_kind(name, self.fields_of(name, depth + 1))
+            kind = self._kinds_by_name[name] = _nested_kind(name, self.fields_of(name, depth + 1))
         return kind
 
     def _resolve_name(self, parent_name: str, written: str) -> str:

@@ -42,7 +42,7 @@ class RosFinder(MetaPathFinder):
     """
 
     def __init__(self, folders: Sequence[str]) -> None:
-        self._places = list(folders)
+        self._folders = list(folders)
         self.extra: set[str] = set()
 
     def find_spec(
@@ -56,7 +56,7 @@ class RosFinder(MetaPathFinder):
             name in _MODULE_NAMES or name in self.extra or name.endswith(_PACKAGE_SUFFIXES)
         ):
             return None
-        return importlib.machinery.PathFinder.find_spec(name, self._places)
+        return importlib.machinery.PathFinder.find_spec(name, self._folders)
 
 
 _finder = RosFinder([place for place in SEARCH_FOLDERS if Path(place).is_dir()])

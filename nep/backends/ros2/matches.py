@@ -42,7 +42,7 @@ class Matches:
             library.core.DDSStatus.SubscriptionMatched,
         )
         self._followed: dict[bytes, Any] = {}
-        self._found: dict[bytes, frozenset[bytes]] = {}
+        self._remote_matches: dict[bytes, frozenset[bytes]] = {}
         self._published = b""
         self._has_changes = False
         self._confirmed: dict[bytes, frozenset[tuple[bytes, bytes]]] = {}
@@ -54,12 +54,12 @@ class Matches:
         """Add a writer or reader of this program."""
         entity.set_status_mask(self._mask[not hasattr(entity, "get_matched_subscriptions")])
         self._followed[entity.guid.bytes] = entity
-        self._found[entity.guid.bytes] = frozenset()
+        self._remote_matches[entity.guid.bytes] = frozenset()
 
     def remove(self, gid: bytes) -> None:
         """Remove a closed writer or reader."""
         self._followed.pop(gid, None)
-        self._found.pop(gid, None)
+        self._remote_matches.pop(gid, None)
         self._has_changes = True
 
     def publish_changes(self) -> None:
@@ -67,12 +67,14 @@ class Matches:
         for gid, entity in self._followed.items():
             if entity.take_status():
                 matched = matched_gids(entity)
-                self._found[gid] = frozenset(each for each in matched if not self._is_local(each))
+                self._remote_matches[gid] = frozenset(each for each in matched if not self._is_local(each))
                 self._has_changes = True
         if not self._has_changes:
             return
         self._has_changes = False
-        pairs = sorted(own_gid + other for own_gid, matched in self._found.items() for other in matched)
+        pairs = sorted(
+            own_gid + other for own_gid, matched in self._remote_matches.items() for other in matched
+        )
         data = b"".join((self._gid, *pairs[:_MAX_PAIRS]))
         if data != self._published:
             self._writer.write(create_sample(self._sample_class, self._types.encode(_TYPE, {"data": data})))

@@ -51,7 +51,7 @@ class MessageTypes:
         self._rosbags = rosbags
         self._store: Any = rosbags.get_typestore(store)
         self._fields: dict[str, tuple[RosField, ...]] = {}
-        self._left_out: dict[str, NepError] = {}
+        self._type_errors: dict[str, NepError] = {}
         self._lock = threading.RLock()
         self._read_definitions()
 
@@ -76,8 +76,8 @@ class MessageTypes:
     def checked(self, msg_type: str) -> str:
         """Validate a message type and return its full name. Raises `NepError` if the type is unknown."""
         name = type_name(msg_type)
-        if name in self._left_out and name not in self._fields:
-            raise self._left_out[name]
+        if name in self._type_errors and name not in self._fields:
+            raise self._type_errors[name]
         if name not in self._fields:
             raise NepError(
                 _(
@@ -181,7 +181,7 @@ class MessageTypes:
         errors = self._add(texts)
         if len(errors) == len(texts):
             raise next(iter(errors.values()))
-        self._left_out.update(errors)
+        self._type_errors.update(errors)
 
     def _add(self, texts: Mapping[str, str]) -> dict[str, NepError]:
         # Returns the errors of invalid types. Raises `NepError` if a known type has changed.

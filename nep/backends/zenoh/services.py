@@ -67,7 +67,7 @@ class ZenohServer:
         self.is_closed = False
         self._session = session
         self._on_close = on_close
-        self._refusals = RejectionLog()
+        self._rejections = RejectionLog()
         self._lock = threading.Lock()
         self._queries: set[Any] = set()
         self._key = service_key(spec.service, time.time_ns(), spec.id)
@@ -89,7 +89,7 @@ class ZenohServer:
         except WireError as error:
             query.drop()
             self.stats.add_unreadable()
-            if self._refusals.add(error.reason):
+            if self._rejections.add(error.reason):
                 _logger.warning("malformed call to '%s': %s", self.spec.service, error)
             return
         with self._lock:
@@ -188,7 +188,7 @@ class ZenohClient(ClientCalls[_Call]):
         self._session = session
         self._deadlines = deadlines
         self._on_close = on_close
-        self._refusals = RejectionLog()
+        self._rejections = RejectionLog()
         session.check(self.record)
 
     # ---- calling
@@ -282,7 +282,7 @@ class ZenohClient(ClientCalls[_Call]):
             if number != call.number:
                 raise WireError(_("not a service reply"))
         except WireError as error:
-            if self._refusals.add(error.reason):
+            if self._rejections.add(error.reason):
                 log_line = "malformed reply from the server of '%s': %s"
                 _logger.warning(log_line, self.spec.service, error)
             return

@@ -62,7 +62,7 @@ class ZenohSubscriber(WakingSubscriber):
         self._on_close = on_close
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
         self._sources = PublisherTracker()
-        self._refusals = RejectionLog()
+        self._rejections = RejectionLog()
         self._early = EarlyMessages[tuple[_TopicParser, list[bytes]]](self._sources, spec.max_messages)
         self._problem = ""
         self._own_parser = self._new_topic_parser(spec.topic)
@@ -135,7 +135,7 @@ class ZenohSubscriber(WakingSubscriber):
     @property
     def refused(self) -> int:
         """Number of received frames rejected because they are not valid messages."""
-        return self._refusals.count
+        return self._rejections.count
 
     def report(self, problem: str) -> None:
         """Set the reason why messages can't be decoded, shown in the graph."""
@@ -143,7 +143,7 @@ class ZenohSubscriber(WakingSubscriber):
 
     def counts(self) -> SubscriberCount:
         """Return the statistics shown in the graph."""
-        problem = self._problem or self._refusals.recent_message()
+        problem = self._problem or self._rejections.recent_message()
         return SubscriberCount(self.spec.id, clamp_count(self.received), clamp_count(self.lost), problem)
 
     # ---- callbacks in zenoh's threads
@@ -194,7 +194,7 @@ class ZenohSubscriber(WakingSubscriber):
             if first == topic_parser.subscriber_part and len(rest) == 1:  # end of the reply to a hello
                 self._deliver_early_messages(read_header(rest[0]).publisher)
         except WireError as error:
-            if self._refusals.add(error.reason):
+            if self._rejections.add(error.reason):
                 _logger.warning("malformed message on '%s': %s", self.spec.topic, error)
 
     def _queue_if_early(self, topic_parser: _TopicParser, rest: list[bytes]) -> bool:

@@ -54,7 +54,7 @@ class ZenohTransport:
         self._subscribers: dict[ZenohSubscriber, ZenohSession] = {}
         self._pending_flushes: dict[ZenohPublisher, _PendingFlush] = {}
         self._is_closed = False
-        self._is_over = False
+        self._is_shut_down = False
         self._services = ZenohServices(self._session, node.name)
         watch(self)
 
@@ -264,9 +264,9 @@ class ZenohTransport:
         deadline = time.monotonic() + timeout_s
         self.begin_close()
         with self._lock:
-            if self._is_over:
+            if self._is_shut_down:
                 return
-            self._is_over = True
+            self._is_shut_down = True
             publishers, subscribers = list(self._publishers), list(self._subscribers)
         for subscriber in subscribers:
             subscriber.close()

@@ -123,13 +123,13 @@ class Backlog:
     """
 
     def __init__(self) -> None:
-        self._held: deque[tuple[ReleaseTracker, int]] = deque()
+        self._in_flight: deque[tuple[ReleaseTracker, int]] = deque()
         self._bytes = 0
 
     def has_room(self, size_bytes: int) -> bool:
         """Return True if a message of this size can be sent."""
-        while self._held and self._held[0][0].done:
-            self._bytes -= self._held.popleft()[1]
+        while self._in_flight and self._in_flight[0][0].done:
+            self._bytes -= self._in_flight.popleft()[1]
         return self._bytes <= TRACKING_INTERVAL_BYTES or self._bytes + size_bytes <= WINDOW_BYTES
 
     def add_sent(self, tracker: ReleaseTracker, size_bytes: int) -> None:
@@ -139,5 +139,5 @@ class Backlog:
             tracker: Tracker of the newest message.
             size_bytes: Number of bytes sent since the previous call.
         """
-        self._held.append((tracker, size_bytes))
+        self._in_flight.append((tracker, size_bytes))
         self._bytes += size_bytes

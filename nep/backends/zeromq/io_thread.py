@@ -115,7 +115,7 @@ class IoThread:
         self._wake_times: dict[Pollable, float] = {}
         self._timers: list[tuple[float, int, Pollable]] = []
         self._numbers = itertools.count()
-        self._turns = 0
+        self._iteration = 0
         self._stuck_in: int | None = None
         self._is_closing = False
         self._pause = threading.Event()
@@ -147,8 +147,8 @@ class IoThread:
             return
         done = threading.Event()
         self._queue_command("remove", served, done)
-        if self._stuck_in != self._turns and not done.wait(timeout_s):
-            self._stuck_in = self._turns
+        if self._stuck_in != self._iteration and not done.wait(timeout_s):
+            self._stuck_in = self._iteration
 
     def close(self, timeout_s: float = 5.0) -> None:
         """Stop the thread and wait up to `timeout_s` seconds for it to end."""
@@ -176,7 +176,7 @@ class IoThread:
 
     def _run(self) -> None:
         while not self._is_closing:
-            self._turns += 1
+            self._iteration += 1
             try:
                 self._run_once()
             except Exception:

@@ -189,7 +189,7 @@ class MasterSession:
         self._was_connected = False
         self._is_closed = False
         self._leaving: PendingRequest | None = None
-        self._left_at = 0.0
+        self._leave_sent_s = 0.0
         self._is_near = is_loopback(address)
         self._reconnect_s = _RECONNECT_S if self._is_near else _RECONNECT_FAR_S
         self._reconnect_at = time.monotonic() + self._reconnect_s
@@ -346,13 +346,13 @@ class MasterSession:
             self._confirmed.clear()
         if self._epoch != 0 and self._calls.is_connected:
             self._leaving = self._calls.send_request(Leave(self._node.id))
-            self._left_at = time.monotonic()
+            self._leave_sent_s = time.monotonic()
 
     def leave(self, timeout_s: float) -> None:
         """Wait for the reply to the request of `start_leave`, until `timeout_s` seconds after it was sent."""
         if self._leaving is None:
             return
-        remaining_s = timeout_s + self._left_at - time.monotonic()
+        remaining_s = timeout_s + self._leave_sent_s - time.monotonic()
         try:
             self._calls.wait(self._leaving, max(0.0, remaining_s))
         except (MasterUnreachable, RequestRefusedError, ClosedError):

@@ -90,7 +90,7 @@ class HandshakePublisher:
             changed: Condition that guards the publisher's state.
             seen: Number of messages published before the hello of each connected subscriber, by its id.
         """
-        self._changed, self._seen = changed, seen
+        self._changed, self._counts_at_hello = changed, seen
         self._names: dict[int, str] = {}
         self._expected: set[int] = set()
 
@@ -98,13 +98,13 @@ class HandshakePublisher:
     def subscriber_ids(self) -> frozenset[int]:
         """Ids of the connected subscribers."""
         with self._changed:
-            return frozenset(self._seen)
+            return frozenset(self._counts_at_hello)
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Names of nodes whose subscribers are registered but not connected."""
         with self._changed:
-            return tuple(sorted({self._names[each] for each in self._expected - set(self._seen)}))
+            return tuple(sorted({self._names[each] for each in self._expected - set(self._counts_at_hello)}))
 
     def expect(self, expected: Iterable[ExpectedSubscriber]) -> None:
         """Add registered subscribers whose hellos are expected."""
@@ -117,8 +117,8 @@ class HandshakePublisher:
         """Wait up to `timeout_s` seconds for the hellos of these subscribers; return the missing ids."""
         expected_ids = {each.id for each in expected}
         with self._changed:
-            wait_until(self._changed, lambda: expected_ids <= self._seen.keys(), timeout_s)
-            return tuple(expected_ids - self._seen.keys())
+            wait_until(self._changed, lambda: expected_ids <= self._counts_at_hello.keys(), timeout_s)
+            return tuple(expected_ids - self._counts_at_hello.keys())
 
 
 class NativePublisher(HandshakePublisher):
@@ -189,7 +189,7 @@ class NativePublisher(HandshakePublisher):
     def wait_for_any(self, timeout_s: float) -> None:
         """Wait up to `timeout_s` seconds for the hello of any subscriber."""
         with self._changed:
-            wait_until(self._changed, lambda: bool(self._seen), timeout_s)
+            wait_until(self._changed, lambda: bool(self._counts_at_hello), timeout_s)
 
     def counts(self) -> PublisherCount:
         """Return the statistics that a renewal reports.
@@ -305,7 +305,9 @@ class NativePublisher(HandshakePublisher):
         # The payload is copied at most once.
         shared = self._subscriptions.shared
         # before taking the lock: loading the library is slow
-        opened = start_sharing() if shared is not None and self._seen and not shared.readers else None
+        opened = (
+            start_sharing() if shared is not None and self._counts_at_hello and not shared.readers else None
+        )
         if shared is not None and opened is None and not shared.readers:
             shared = None
         data = to_sendable(payload) if shared is None or not shared.readers else None
@@ -317,11 +319,13 @@ class NativePublisher(HandshakePublisher):
             if self._flags:
                 self._update_subscribers_before_locked(size)
             number = (
-                shared.write(payload, self._seen, time.monotonic())
+                shared.write(payload, self._counts_at_hello, time.monotonic())
                 if shared and not self._legacy_filters
                 else None
             )
-            is_for_all = number is not None and shared is not None and shared.readers >= self._seen.keys()
+            is_for_all = (
+                number is not None and shared is not None and shared.readers >= self._counts_at_hello.keys()
+            )
             if data is None and not is_for_all:
                 data = to_sendable(payload)
             self._count = seq = self._count + 1
@@ -435,7 +439,7 @@ class NativePublisher(HandshakePublisher):
             self._send_parts_locked(self._topic, tail)
             return
         readers = self._shared_readers()
-        if readers >= self._seen.keys():
+        if readers >= self._counts_at_hello.keys():
             if len(shared) == 2:  # subscribers with shared memory accept one part
                 self._send(b"".join((self._topic, *cast("tuple[bytes, bytes]", shared))))
             else:
@@ -506,7 +510,7 @@ class NativePublisher(HandshakePublisher):
     def serve(self, now: float) -> PollState:
         """Send pending messages when due, and read subscriptions."""
         with self._lock:
-            if not self.is_closed or self._seen:
+            if not self.is_closed or self._counts_at_hello:
                 self._read_subscriptions_locked()
             wait_s = self._batch.next_check_s(_time_ns())
             if not wait_s:
@@ -527,9 +531,9 @@ class NativePublisher(HandshakePublisher):
                 event.bytes, self._count, partial(RemoteConnection.from_frame, event)
             )
             # Before the echo: a subscriber that received it must already be counted.
-            self.subscribers = len(self._seen)
+            self.subscribers = len(self._counts_at_hello)
             # a connected subscriber may leave without being reported as missing
-            self._expected.difference_update(self._seen)
+            self._expected.difference_update(self._counts_at_hello)
             self.has_subscribers = self._subscriptions.has_subscribers
             self._batch.set_allowed(reads_batches=self._subscriptions.all_accept_batches)
             if hello_bytes is not None:
@@ -576,12 +580,15 @@ class NativePublisher(HandshakePublisher):
         `deadline` is a time of `time.monotonic`.
         """
         with self._changed:
-            while self._seen and (remaining_s := deadline - time.monotonic()) > 0.0:
-                if not wait_until(self._changed, lambda: not self._seen, min(remaining_s, _BYE_RETRY_S)):
+            while self._counts_at_hello and (remaining_s := deadline - time.monotonic()) > 0.0:
+                if not wait_until(
+                    self._changed, lambda: not self._counts_at_hello, min(remaining_s, _BYE_RETRY_S)
+                ):
                     self._send_bye_locked()  # a full queue drops the bye like any other message
-            if self._seen:
+            if self._counts_at_hello:
                 undelivered = [
-                    max(self._count - seen_count, len(self._history)) for seen_count in self._seen.values()
+                    max(self._count - seen_count, len(self._history))
+                    for seen_count in self._counts_at_hello.values()
                 ]
                 if any(undelivered):  # otherwise only the bye is missing
                     _logger.warning(

@@ -179,7 +179,7 @@ class SocketSubscriber(Generic[R]):
         self.payloads: deque[Any] = deque() if self._source is None else self._source.payloads
         """Decoded payloads. See `nep.backends.base.SupportsPayloads`."""
         self.wants_payloads = False
-        self._ahead = ReadAhead(spec.max_messages)
+        self._read_ahead = ReadAhead(spec.max_messages)
         self._may_exceed_bound = spec.max_messages >= 10 * MAX_READ_AHEAD
         """True if the queue is long enough to exceed its limit by a few messages."""
         self._read_at = 0.0
@@ -432,14 +432,14 @@ class SocketSubscriber(Generic[R]):
             self._io.serve_soon(self)
         if self._queues_all and not self.ready and not self._inbox.messages:
             span, self._read_at = now - self._read_at, now
-            if span > self._ahead.span_s:
-                if self._ahead.now > 1:
-                    self._ahead.reset()
+            if span > self._read_ahead.span_s:
+                if self._read_ahead.now > 1:
+                    self._read_ahead.reset()
                 message = self._read(self.ready, may_wait=may_wait)
                 return self._drop_excess_locked(message) if self.ready else message
-            max_messages = self._ahead.increase()
+            max_messages = self._read_ahead.increase()
             if self._read_into(self.ready, max_messages, _READ_AHEAD_BYTES, may_wait=may_wait) < max_messages:
-                self._ahead.reset()
+                self._read_ahead.reset()
         if self.ready:
             return self._drop_excess_locked(self.ready.popleft())
         if not self._queues_all:

@@ -36,7 +36,7 @@ class Subscriptions:
         self._without_batches: set[int] = set()
         self.windows: dict[int, SendWindow] = {}
         """Send windows of subscribers that acknowledge messages, by id."""
-        self._far: dict[int, RemoteConnection] = {}
+        self._remote_connections: dict[int, RemoteConnection] = {}
         """Connections of subscribers on other computers, by id."""
         self.shared: SharedPayloads | None = None
         self.rejections = RejectionLog()
@@ -64,7 +64,7 @@ class Subscriptions:
         self.seen.clear()
         self.hellos.clear()
         self.windows.clear()
-        self._far.clear()
+        self._remote_connections.clear()
         self._without_batches.clear()
 
     def handle_event(
@@ -131,15 +131,15 @@ class Subscriptions:
 
     def _update_connection(self, subscriber: int, connection: RemoteConnection | None) -> None:
         # A hello over a new connection means that the previous connection is abandoned.
-        before = self._far.pop(subscriber, None)
+        before = self._remote_connections.pop(subscriber, None)
         if connection is not None:
-            self._far[subscriber] = connection
+            self._remote_connections[subscriber] = connection
             if before is not None and before != connection:
                 before.close()
 
     def close_silent(self) -> None:
         """Close connections to computers that have vanished; libzmq then removes their subscribers."""
-        for connection in self._far.values():
+        for connection in self._remote_connections.values():
             if connection.is_silent():
                 connection.close()
 
@@ -147,7 +147,7 @@ class Subscriptions:
         self.seen.pop(subscriber, None)
         self.hellos.pop(subscriber, None)
         self.windows.pop(subscriber, None)
-        self._far.pop(subscriber, None)
+        self._remote_connections.pop(subscriber, None)
         self._without_batches.discard(subscriber)
         if self.shared is not None:
             self.shared.discard(subscriber)

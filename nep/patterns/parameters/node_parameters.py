@@ -59,7 +59,7 @@ class Parameters:
 
     def __init__(self, host: ParameterHost) -> None:
         self._host = host
-        self._known: Mapping[str, NodeParameter] = {}
+        self._parameters: Mapping[str, NodeParameter] = {}
         self._watchers: tuple[OnChange, ...] = ()
         self._lock = threading.RLock()
         self._topic: StateTopic | None = None
@@ -108,11 +108,11 @@ class Parameters:
             is_read_only=read_only,
         )
         with self._lock:
-            if name in self._known:
+            if name in self._parameters:
                 raise ParameterError(
                     name, short_repr(default), _("the parameter is already declared; use 'set'")
                 )
-            if len(self._known) >= _MAX_PARAMETERS:
+            if len(self._parameters) >= _MAX_PARAMETERS:
                 raise ParameterError(
                     name,
                     short_repr(default),
@@ -122,7 +122,7 @@ class Parameters:
                 self._topic = self._host.open_parameters(
                     parameters_topic(self._host.id), self._handle_request
                 )
-            self._known = {**self._known, name: parameter}
+            self._parameters = {**self._parameters, name: parameter}
             self._publish()
         return parameter.typed_value
 
@@ -136,13 +136,13 @@ class Parameters:
         Raises `ParameterError` for an unknown name.
         """
         try:
-            return self._known[name]
+            return self._parameters[name]
         except KeyError:
             raise self._unknown_error(name) from None
 
     def list(self) -> tuple[NodeParameter, ...]:
         """Return all parameters in the order of their declaration."""
-        return tuple(self._known.values())
+        return tuple(self._parameters.values())
 
     def __getitem__(self, name: str) -> object:
         return self.get(name)
@@ -151,7 +151,7 @@ class Parameters:
         self.set(name, value)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._known
+        return name in self._parameters
 
     # ---- changing
 
@@ -193,11 +193,11 @@ class Parameters:
                 reason = watcher({name: each.typed_value for name, each in changed.items()})
                 if isinstance(reason, str) and reason:
                     raise ParameterError(", ".join(changed), "", reason)
-            self._known = {**self._known, **changed}
+            self._parameters = {**self._parameters, **changed}
             self._publish()
 
     def _unknown_error(self, name: str) -> ParameterError:
-        known_names = tuple(self._known)
+        known_names = tuple(self._parameters)
         shown_name = escaped(bounded_str(name, 60))
         hint = did_you_mean(shown_name, known_names) if known_names else _("the node has no parameters")
         return ParameterError(shown_name, "", _("no such parameter; {said}").format(said=hint))
@@ -210,7 +210,7 @@ class Parameters:
                 self._topic.publish(self._state())
 
     def _state(self) -> dict[str, object]:
-        return {"node": self._host.name, "parameters": [each.as_map() for each in self._known.values()]}
+        return {"node": self._host.name, "parameters": [each.as_map() for each in self._parameters.values()]}
 
     def _handle_request(self, request: object) -> object:
         # Runs in a thread of the server.

@@ -35,7 +35,7 @@ class AlarmCommands:
     """
 
     def __init__(self, denial_reason: Callable[[Node, str, str], str] = _allow_all) -> None:
-        self._refusal = denial_reason
+        self._denial_reason = denial_reason
         self._lock = threading.Lock()
         self._clients: dict[str, Client] = {}
         self._publishers: dict[tuple[str, str], Publisher] = {}
@@ -54,7 +54,7 @@ class AlarmCommands:
                     self._call(node, action, on_done)
                     return
                 publisher = self._publisher(node, action)
-                reason = self._refusal(
+                reason = self._denial_reason(
                     node, action.name, action.msg_type
                 )  # checked last: creating the publisher takes time
                 if reason:

@@ -20,7 +20,7 @@ class TopicLosses:
     def __init__(self) -> None:
         self._before: dict[int, tuple[int, int]] = {}
         self._samples: deque[tuple[float, int, int]] = deque(maxlen=_MAX_SAMPLES)
-        self._known = False
+        self._has_counts = False
 
     def add(self, info: TopicInfo | None, now: float) -> None:
         """Add the counts of a graph snapshot.
@@ -41,7 +41,7 @@ class TopicLosses:
                 lost += max(0, lost_now - lost_then)
                 received += max(0, received_now - received_then)
         self._before = counts
-        self._known = self._known or bool(counts)
+        self._has_counts = self._has_counts or bool(counts)
         if self._samples and now - self._samples[-1][0] < _SAMPLE_PERIOD_S:
             sampled_at, lost_before, received_before = self._samples[-1]
             self._samples[-1] = (sampled_at, lost_before + lost, received_before + received)
@@ -50,7 +50,7 @@ class TopicLosses:
 
     def percent(self, window_s: float, now: float) -> float | None:
         """Return the percentage of messages lost in the last `window_s` seconds, or None if unknown."""
-        if not self._known:
+        if not self._has_counts:
             return None
         lost = received = 0
         for sampled_at, lost_then, received_then in reversed(self._samples):

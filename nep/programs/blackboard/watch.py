@@ -54,7 +54,7 @@ class MessageMapping:
     ) -> None:
         self._key = None if key is None else parse_key(key)
         self._has_holes = any(_PLACEHOLDER.search(name) for name in self._key or ())
-        self._each = parse_key(each) if each else ()
+        self._list_path = parse_key(each) if each else ()
         if isinstance(fields, str):
             raise WrongTypeError(_("'fields' must be a list of names, not a string"))
         pairs = fields.items() if isinstance(fields, Mapping) else [(name, name) for name in fields or ()]
@@ -67,11 +67,13 @@ class MessageMapping:
 
         Raises `NepError` if the payload has no list in the field `each`.
         """
-        if self._each:
-            entries = _field_value(payload, self._each)
+        if self._list_path:
+            entries = _field_value(payload, self._list_path)
             if not isinstance(entries, list | tuple):
                 raise NepError(
-                    _("the message has no list in the field '{field}'").format(field=key_text(self._each))
+                    _("the message has no list in the field '{field}'").format(
+                        field=key_text(self._list_path)
+                    )
                 )
             return entries
         return payload if self._has_holes and isinstance(payload, list | tuple) else (payload,)

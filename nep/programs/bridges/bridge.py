@@ -60,12 +60,12 @@ class Bridge:
     ) -> None:
         self.configuration = configuration
         self.id = secrets.token_hex(8)
-        self._own: set[int] = set()
+        self._own_publisher_ids: set[int] = set()
         self._echoes: dict[tuple[SideName, str], LoopGuard] = {}
         self._lock = threading.Lock()
         self._pacer = Pacer(f"bridge-{configuration.name}-pace")
         self._routes: tuple[Route, ...] = ()
-        self._known: set[tuple[SideName, str, str]] = set()
+        self._route_keys: set[tuple[SideName, str, str]] = set()
         self._is_full = False
         self._others = OtherBridges(self.id)
         self._warned: set[str] = set()
@@ -160,16 +160,16 @@ class Bridge:
     def _add_route(self, topic: BridgeTopic, origin: SideName, a: str, b: str) -> None:
         with self._lock:
             route_key = (origin, a, b)
-            if route_key in self._known:
+            if route_key in self._route_keys:
                 return
-            self._known.add(route_key)
+            self._route_keys.add(route_key)
             route_ends = {"a": self._route_end(topic, "a", a), "b": self._route_end(topic, "b", b)}
             end: SideName = "b" if origin == "a" else "a"
             route = Route(
                 route_ends[origin],
                 route_ends[end],
                 bridge=self.id,
-                own_publishers=self._own,
+                own_publishers=self._own_publisher_ids,
                 wake=self.sides[end].wake,
                 pacer=self._pacer,
                 max_rate_hz=topic.max_rate_hz,
@@ -210,7 +210,7 @@ class Bridge:
             for topic, a, b in self._matching_topics(side.name, name):
                 if len(self._routes) < MAX_ROUTES:
                     self._add_route(topic, side.name, a, b)
-                elif not self._is_full and (side.name, a, b) not in self._known:
+                elif not self._is_full and (side.name, a, b) not in self._route_keys:
                     self._is_full = True
                     _logger.warning(
                         "'%s' and others are not forwarded: the patterns match more than %d topics; "
@@ -233,7 +233,7 @@ class Bridge:
                     a, b = route.origin, route.end
                     if a.side == "b":
                         a, b = b, a
-                    self._known.discard((side.name, a.topic, b.topic))
+                    self._route_keys.discard((side.name, a.topic, b.topic))
                 route.close()
 
     def publishes_status_on(self, side: BridgeSide, view: GraphView) -> bool:

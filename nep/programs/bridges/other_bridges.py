@@ -64,7 +64,7 @@ class OtherBridges:
     """
 
     def __init__(self, own_id: str) -> None:
-        self._own = own_id
+        self._own_id = own_id
         self._lock = threading.Lock()
         self._statuses: dict[SideName, OrderedDict[str, _Status]] = {side: OrderedDict() for side in SIDES}
 
@@ -75,7 +75,7 @@ class OtherBridges:
         id_, name, on = (status.get(key) for key in ("id", "bridge", "side"))
         if not (isinstance(id_, str) and isinstance(name, str) and on in SIDES):
             return
-        if id_ == self._own or len(id_) > _MAX_ID_LENGTH:
+        if id_ == self._own_id or len(id_) > _MAX_ID_LENGTH:
             return
         with self._lock:
             statuses = self._statuses[side]

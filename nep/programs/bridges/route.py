@@ -166,7 +166,7 @@ class Route:
         self.rival = ""
         """Name of another bridge that forwards these messages; then this route is inactive."""
         self._bridge = bridge
-        self._own = own_publishers
+        self._own_publisher_ids = own_publishers
         self._wake = wake
         self._clock = clock
         self._pacer = pacer
@@ -319,7 +319,7 @@ class Route:
         for message in messages:
             now = self._clock()
             with self._lock:
-                if message.publisher in self._own:
+                if message.publisher in self._own_publisher_ids:
                     self.origin.loop_guard.disable()
                 elif self._has_looped(message, now):
                     self._returned += 1
@@ -410,7 +410,7 @@ class Route:
             form = self._format_for(message, view, own_nodes)
             publisher = node.new_pub(self.end.topic, form.msg_type, latched=key[0], qos=self.end.qos)
             with self._lock:
-                self._own.add(publisher.id)
+                self._own_publisher_ids.add(publisher.id)
                 is_late = self._is_closed
                 if not is_late:
                     self._publishers[key] = publisher

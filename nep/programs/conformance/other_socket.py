@@ -27,7 +27,7 @@ class OtherSocket:
         host, _colon, port = endpoint.removeprefix("tcp://").rpartition(":")
         properties = b"\x0bSocket-Type" + len(kind).to_bytes(4, "big") + kind.encode()
         body = b"\x05READY" + properties
-        self._said = _GREETING + bytes([4, len(body)]) + body
+        self._handshake = _GREETING + bytes([4, len(body)]) + body
         self._clients: list[sockets.socket] = []
         self._listener = sockets.socket()
         if sys.platform != "win32":  # there, the port's owner would stay the listener
@@ -46,7 +46,7 @@ class OtherSocket:
             while True:
                 client, _address = self._listener.accept()
                 client.setblocking(False)
-                client.send(self._said)
+                client.send(self._handshake)
                 self._clients.append(client)
         return any(_is_disconnected(each) for each in self._clients)
 

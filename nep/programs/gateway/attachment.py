@@ -115,7 +115,7 @@ class NativeNetwork:
         self._inbox: NativeInbox | None = None
         self._publishers: dict[Key, Publisher] = {}
         self._subscribers: dict[Key, Subscriber] = {}
-        self._own: frozenset[int] = frozenset()
+        self._own_publisher_ids: frozenset[int] = frozenset()
         self._alerts: dict[str, Alert] = {}
         self._retry_at: dict[str, float] = {}
         self._dropped = 0
@@ -141,7 +141,7 @@ class NativeNetwork:
             if publisher is None:
                 return
             self._publishers[topic, codec] = publisher
-            self._own |= {publisher.id}
+            self._own_publisher_ids |= {publisher.id}
         publisher.publish_bytes(data, image_codec.image_info(data) if codec == "image" else None)
 
     def stop_publishing(self, topic: str, codec: str) -> None:
@@ -198,7 +198,7 @@ class NativeNetwork:
         # Runs in the node's thread: posts messages of other publishers to the gateway's thread.
         if self._inbox is not None:
             for message in messages:
-                if message.publisher not in self._own:
+                if message.publisher not in self._own_publisher_ids:
                     self._inbox.post(message)
 
     def _open(self, topic: str, make: Callable[[Node], _SocketT]) -> _SocketT | None:

@@ -93,7 +93,7 @@ class Gateway:
         self._request_sockets: dict[zmq.Socket[bytes], int] = {}
         self._pairs: dict[zmq.Socket[bytes], ProxyPair] = {}
         self._maintain_at = 0.0
-        self._shown_unserved: dict[TopicLine, dict[Role, str]] = {}
+        self._published_unserved: dict[TopicLine, dict[Role, str]] = {}
         self._thread = threading.Thread(target=self._run, name="nep-gateway", daemon=True)
         watch(self)
 
@@ -185,7 +185,7 @@ class Gateway:
             self._publish_state()
         if self._request_server.open():
             self._poller = None
-        if self._unsupported_versions() != self._shown_unserved:
+        if self._unsupported_versions() != self._published_unserved:
             self._publish_state()
         self._outside.tick()
 
@@ -196,7 +196,7 @@ class Gateway:
         return {pair.line: dict(pair.unserved) for pair in self._relay.pairs if pair.unserved}
 
     def _publish_state(self) -> None:
-        self._shown_unserved = self._unsupported_versions()
+        self._published_unserved = self._unsupported_versions()
         self._relay.set_languages(self._programs.languages())
         self._outside.show(self._programs.programs())
         self._request_server.publish_members(self._programs.members())

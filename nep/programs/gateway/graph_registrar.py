@@ -74,7 +74,7 @@ class GraphRegistrar:
         self._epoch = epoch
         self._load_of = load_of
         self._loads: dict[str, CpuLoad] = {}
-        self._shown: dict[str, Join] = {}
+        self._joins: dict[str, Join] = {}
         self._since: dict[str, int] = {}
         self._counts: dict[Key, _TopicCount] = {}
         self._stat_keys: dict[int, Key] = {}
@@ -94,20 +94,20 @@ class GraphRegistrar:
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
         """Register these programs, and unregister all others."""
         joins = {program.node_id: self._record(program) for program in programs}
-        for node_id in [shown_id for shown_id in self._shown if shown_id not in joins]:
-            del self._shown[node_id]
+        for node_id in [shown_id for shown_id in self._joins if shown_id not in joins]:
+            del self._joins[node_id]
             self._since.pop(node_id, None)
             self._loads.pop(node_id, None)
             self._submit(Leave(node_id))
         for node_id, join in joins.items():
-            if self._shown.get(node_id) != join:
-                self._shown[node_id] = join
+            if self._joins.get(node_id) != join:
+                self._joins[node_id] = join
                 self._submit(join)
         self._assign_stats(programs)
 
     def renew(self) -> None:
         """Renew the leases of the programs and send their statistics to the master."""
-        for node_id, join in self._shown.items():
+        for node_id, join in self._joins.items():
             publishers = tuple(self._publisher_count(record) for record in join.publishers)
             subscribers = tuple(SubscriberCount(record.id, None, None) for record in join.subscribers)
             load = self._cpu_load(node_id, join.node.pid)

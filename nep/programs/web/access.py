@@ -138,7 +138,7 @@ class AuthVerifier:
     def __init__(self, token: str, clock: Callable[[], float] = time.time) -> None:
         self._token = token
         self._clock = clock
-        self._used: dict[str, None] = {}
+        self._used_macs: dict[str, None] = {}
 
     def verify(self, auth: Auth) -> bool:
         """Return True if the credentials match the token, are not expired, and were not used before."""
@@ -148,9 +148,9 @@ class AuthVerifier:
         is_right = hmac.compare_digest(mac.encode(), auth.mac.lower().encode("utf-8", "replace"))
         now = self._clock()
         is_now = abs(now - auth.time_s) <= _CLOCK_TOLERANCE_S and auth.end_s > now
-        if not (is_right and is_now) or mac in self._used:
+        if not (is_right and is_now) or mac in self._used_macs:
             return False
-        self._used[mac] = None
-        while len(self._used) > _MAX_USED_MACS:
-            del self._used[next(iter(self._used))]
+        self._used_macs[mac] = None
+        while len(self._used_macs) > _MAX_USED_MACS:
+            del self._used_macs[next(iter(self._used_macs))]
         return True

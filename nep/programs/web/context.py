@@ -170,10 +170,10 @@ class PageContext:
         self.counts = counts
         self.level: Level = "error"
         self._thread = thread
-        self._on_robot_refused = on_robot_refused
+        self._on_robot_rejected = on_robot_refused
         self._send_status = send_status
-        self._refused_at: dict[str, float] = {}
-        self._refused_lock = threading.Lock()
+        self._rejection_times_s: dict[str, float] = {}
+        self._rejection_lock = threading.Lock()
 
     async def run_in_thread(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Call a function in the page's thread, because the function waits for the network.
@@ -196,14 +196,14 @@ class PageContext:
 
     def _report_rejected(self, robot: str, reason: str) -> None:
         now = time.monotonic()
-        with self._refused_lock:
-            if now - self._refused_at.get(robot, float("-inf")) < _ROBOT_REJECTION_INTERVAL_S:
+        with self._rejection_lock:
+            if now - self._rejection_times_s.get(robot, float("-inf")) < _ROBOT_REJECTION_INTERVAL_S:
                 return
-            self._refused_at.pop(robot, None)
-            self._refused_at[robot] = now
-            while len(self._refused_at) > _MAX_REPORTED_ROBOTS:
-                del self._refused_at[next(iter(self._refused_at))]
-        self._on_robot_refused(robot, reason)
+            self._rejection_times_s.pop(robot, None)
+            self._rejection_times_s[robot] = now
+            while len(self._rejection_times_s) > _MAX_REPORTED_ROBOTS:
+                del self._rejection_times_s[next(iter(self._rejection_times_s))]
+        self._on_robot_rejected(robot, reason)
 
     def send_status(self, level: Level, message: str, id_: OperationId = None) -> None:
         """Send a status to the page unless its level is below the level that the page requested.

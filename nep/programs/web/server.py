@@ -126,9 +126,9 @@ class WebServer:
         self._connections: WeakSet[ServerConnection] = WeakSet()
         """All open connections, including those without a handshake."""
         self._locked = 0
-        self._kept_out = BlockedPages()
-        self._refusals_lock = threading.Lock()
-        self._refusals: tuple[Rejection, ...] = ()
+        self._blocked_pages = BlockedPages()
+        self._rejections_lock = threading.Lock()
+        self._rejections: tuple[Rejection, ...] = ()
         self._auth = AuthVerifier(settings.access.token)
         self._started = threading.Event()
         self._problem: Exception | None = None
@@ -164,7 +164,7 @@ class WebServer:
         A repeated rejection, such as of a page that reconnects, is listed once with the time of the last
         one.
         """
-        return self._refusals
+        return self._rejections
 
     def disconnect(self, page_id: int) -> None:
         """Close the connection of a page without waiting. The page may connect again. Thread-safe."""
@@ -178,12 +178,12 @@ class WebServer:
         """
         page = next((each for each in self._pages.copy() if each.id == page_id), None)
         if page is not None:
-            self._kept_out.add(page_id, page.connection)
+            self._blocked_pages.add(page_id, page.connection)
             self.disconnect(page_id)
 
     def unblock_page(self, page_id: int) -> None:
         """Unblock a page that `block_page` has blocked. Thread-safe."""
-        self._kept_out.remove(page_id)
+        self._blocked_pages.remove(page_id)
 
     def set_access(self, access: Access) -> int:
         """Replace the access rules; return the number of pages that are disconnected. Thread-safe.
@@ -408,7 +408,7 @@ class WebServer:
             )
         elif reason := access.origin_rejection_reason(origin, server_origin(connection)):
             rejection = _HandshakeRejection(HTTPStatus.FORBIDDEN, "origin", reason)
-        elif self._kept_out.is_blocked(connection, request):
+        elif self._blocked_pages.is_blocked(connection, request):
             rejection = _HandshakeRejection(
                 HTTPStatus.FORBIDDEN, "kept out", _("the user disconnected this page")
             )
@@ -493,9 +493,11 @@ class WebServer:
         self._add_rejection(Rejection(time.time(), source, message, kind="robot", robot=escaped(robot[:200])))
 
     def _add_rejection(self, rejection: Rejection) -> None:
-        with self._refusals_lock:
-            others = (each for each in self._refusals if replace(each, time_s=rejection.time_s) != rejection)
-            self._refusals = (*others, rejection)[-_MAX_REJECTIONS:]
+        with self._rejections_lock:
+            others = (
+                each for each in self._rejections if replace(each, time_s=rejection.time_s) != rejection
+            )
+            self._rejections = (*others, rejection)[-_MAX_REJECTIONS:]
 
     async def _serve_page(self, guard: MotionGuard, connection: ServerConnection) -> None:
         access: Access = connection.access  # type: ignore[attr-defined]

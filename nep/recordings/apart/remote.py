@@ -121,7 +121,7 @@ class _Pipe:
             raise RecordingError(str(path), reason.format(error=error)) from error
         self._lock = threading.Lock()
         self._was_ended = False
-        self._answers: queue.Queue[dict[str, object] | None] = queue.Queue(2)
+        self._replies: queue.Queue[dict[str, object] | None] = queue.Queue(2)
         self._thread = threading.Thread(target=self._read, name="recording-answers", daemon=True)
         self._thread.start()
 
@@ -137,7 +137,7 @@ class _Pipe:
             if out is not None:
                 with suppress(OSError, ValueError):  # the process has ended
                     frame = read_frame(out)
-            self._answers.put(frame)
+            self._replies.put(frame)
 
     def request(
         self,
@@ -155,12 +155,12 @@ class _Pipe:
                     write_frame(stdin, request)
             while True:
                 try:
-                    reply = self._answers.get(timeout=timeout_s)
+                    reply = self._replies.get(timeout=timeout_s)
                 except queue.Empty:
                     self._kill()
                     raise RecordingTooLargeError(str(path), _("reading the file takes too long")) from None
                 if reply is None:
-                    self._answers.put(None)
+                    self._replies.put(None)
                     self._check(path)
                     self._kill()
                     reason = _("the process that reads the file stopped; the file may be damaged")
@@ -195,14 +195,14 @@ class _Pipe:
             self._process.wait(_CLOSE_TIMEOUT_S)
         while self._thread.is_alive():  # the reader thread may wait for room in the queue
             with suppress(queue.Empty):
-                self._answers.get_nowait()
+                self._replies.get_nowait()
             self._thread.join(0.01)
         for stream in (self._process.stdin, self._process.stdout):
             with suppress(OSError, ValueError):
                 if stream is not None:
                     stream.close()
         with suppress(queue.Full):
-            self._answers.put_nowait(None)
+            self._replies.put_nowait(None)
 
 
 class _RemoteFile:

@@ -290,7 +290,7 @@ class _SummaryReader:
         self._others = RecordCounter(path)
         self._index = FileIndex(end=size)
         self._message_count = 0
-        self._seen: set[int] = set()
+        self._seen_offsets: set[int] = set()
         self._opcodes: set[int] = set()
         self._has_unlisted: Mapping[int, bool] = {}
 
@@ -351,9 +351,9 @@ class _SummaryReader:
 
     def _is_new(self, offset: int) -> bool:
         # False for a second entry with the same offset.
-        if offset in self._seen:
+        if offset in self._seen_offsets:
             return False
-        self._seen.add(offset)
+        self._seen_offsets.add(offset)
         return True
 
     def _add_chunk(self, info: ChunkInfo) -> None:

@@ -52,14 +52,14 @@ class ReadBudget:
         seconds: float | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._path, self._left = path, work_bytes
+        self._path, self._remaining_bytes = path, work_bytes
         self._clock = clock
         self._until = None if seconds is None else clock() + seconds
 
     def spend(self, work_bytes: int) -> None:
         """Subtract work from the budget. Raises `RecordingTooLargeError` if the budget is exceeded."""
-        self._left -= work_bytes
-        if self._left < 0:
+        self._remaining_bytes -= work_bytes
+        if self._remaining_bytes < 0:
             raise RecordingTooLargeError(str(self._path), _("the file is too large to read"))
         if self._until is not None and self._clock() > self._until:
             raise RecordingTooLargeError(str(self._path), _("reading the file takes too long"))

@@ -172,7 +172,7 @@ class FileWriter:
         self._file: BinaryIO = open(  # noqa: SIM115
             path, "xb" if is_new else "wb", buffering=0, opener=_open_private_file
         )
-        self._at = 0
+        self._position = 0
         self._chunk = _Chunk()
         self._written_channels: set[int] = set()
         self._written_schemas: set[int] = set()
@@ -192,7 +192,7 @@ class FileWriter:
     @property
     def size_bytes(self) -> int:
         """Size of the file on disk in bytes."""
-        return self._at
+        return self._position
 
     @property
     def pending_bytes(self) -> int:
@@ -257,7 +257,7 @@ class FileWriter:
         info = ChunkInfo(
             chunk.start_ns,
             chunk.end_ns,
-            self._at,
+            self._position,
             len(header) + len(payload),
             b"",
             0,
@@ -280,7 +280,7 @@ class FileWriter:
         self.flush()
         counts = {number: message_count(index) for number, index in indexes.items()}
         self.write_channels(counts)
-        copied = replace(info, offset=self._at, packed_offsets=b"", index_bytes=0)
+        copied = replace(info, offset=self._position, packed_offsets=b"", index_bytes=0)
         self._write_chunk(copied, [record], indexes, counts)
 
     def _write_chunk(
@@ -290,7 +290,7 @@ class FileWriter:
         indexes: Mapping[int, bytes],
         counts: Mapping[int, int],
     ) -> None:
-        offset = self._at + info.length
+        offset = self._position + info.length
         offsets = {}
         for number, index in indexes.items():
             offsets[number] = offset
@@ -331,7 +331,7 @@ class FileWriter:
         """Write the current chunk, followed by a metadata record."""
         self.flush()
         record = pack_record(mcap_records.Metadata(name=name, metadata=dict(values)))
-        index = mcap_records.MetadataIndex(offset=self._at, length=len(record), name=name)
+        index = mcap_records.MetadataIndex(offset=self._position, length=len(record), name=name)
         self._write(record)
         self._metadata.append(index)
 
@@ -348,13 +348,13 @@ class FileWriter:
         except OSError:
             self.truncate()
             raise
-        self._at += size
+        self._position += size
 
     def truncate(self) -> None:
         """Truncate the file after its last whole record; errors are ignored."""
         try:
-            self._file.truncate(self._at)
-            self._file.seek(self._at)
+            self._file.truncate(self._position)
+            self._file.seek(self._position)
         except OSError:
             return
 
@@ -375,7 +375,7 @@ class FileWriter:
 
     def _summary(self) -> bytes:
         data_end = pack_record(mcap_records.DataEnd(data_section_crc=0))
-        start = self._at + len(data_end)
+        start = self._position + len(data_end)
         groups = self._groups()
         summary, offsets = b"", b""
         for opcode, group in groups:

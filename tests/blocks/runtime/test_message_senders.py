@@ -64,7 +64,7 @@ class Program:
         return self.network._senders.node_of(message) is not None
 
     def hearing_commands(self) -> int:
-        self.network._look_up_senders()
+        self.network._resolve_senders()
         return len(subscriber_nodes(self.network._view, "/Pepper/command"))
 
     def watch(self, sensor: str) -> AbstractContextManager[object]:
@@ -171,7 +171,7 @@ def test_events_from_foreign_nodes_are_ignored_but_sensor_values_are_accepted(
     pepper._sensors["battery"].close()
     seen = evil.new_pub("/Pepper/battery", "json")
     network.sensor("Pepper", "battery")
-    network._look_up_senders()
+    network._resolve_senders()
 
     def told_by_another() -> bool:
         seen.publish({"value": 42})
@@ -188,7 +188,7 @@ def test_restarted_robot_is_trusted_after_confirmation_by_the_runner(
     try:
         call = network.invoke("Pepper", "say", {"text": "Hi"})
         until(lambda: bool(new.heard("invoke")))
-        network._look_up_senders()
+        network._resolve_senders()
         assert call.state == "sent"
         network.update_owners({"Pepper": new._node.id})
         second = network.invoke("Pepper", "say", {"text": "Hi"})

@@ -64,7 +64,7 @@ def test_malformed_count_is_exact_after_window_was_busy(session: Session, talker
         sent = 10 * MAX_MESSAGES_PER_TOPIC
         for _ in range(sent):
             publisher.publish_bytes(BAD)
-        tried = session._checks._found
+        tried = session._checks._results
         until(lambda: "/bad" in tried and tried["/bad"].checked == sent, "all arrive while nobody ticks")
         tick_until(session, lambda: session.topics["/bad"].received == sent)
         assert bad_count(session, "/bad") == sent
@@ -105,7 +105,7 @@ def test_100_000_malformed_messages_are_all_counted(session: Session, talker: ne
         tick_until(session, all_told, 30)
         tick_until(session, lambda: topic.received + topic.missed == publisher.count, 30)
         (alert,) = session.alerts.active
-        health = session._health._bad["/bad"]
+        health = session._health._bad_topics["/bad"]
         assert alert.count == health.count
         assert health.count + health.unchecked_count == topic.received
         assert bad_s < 3 * good_s  # a tick of the window takes hardly longer because of them

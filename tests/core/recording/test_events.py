@@ -141,7 +141,7 @@ def test_session_sends_events_to_its_recorder(tmp_path, monkeypatch):
     def say(role: str, told: Mapping[str, object], to: str = "") -> None:
         said.append((role, told.get("topic", told["name"])))
 
-    monkeypatch.setattr(session.recordings.events, "_say", say)
+    monkeypatch.setattr(session.recordings.events, "_send_event", say)
     session.alarms.on_event(event("on", "/camera"))
     monkeypatch.setattr(session.runs, "_run", RUNNING)
     session.tick()

@@ -194,7 +194,7 @@ def test_running_program_reports_its_robots_to_the_fleet(tmp_path: Path) -> None
     lab = SimulatedLab(tmp_path)
     try:
         runs, fleet = lab.studio.session.runs, lab.studio.session.fleet
-        runs._used = ("Pepper",)
+        runs._used_robots = ("Pepper",)
         assert fleet.used() == ()
         runs._run = replace(runs.state, state="running")
         assert fleet.used() == ("Pepper",)
@@ -207,4 +207,4 @@ def test_number_of_rize_robot_names_is_limited() -> None:
     names = RizeNames()
     for number in range(1000):
         names.add(f"Robot{number}")
-    assert len(names._told) <= MAX_DISCONNECTED
+    assert len(names._announced_names) <= MAX_DISCONNECTED

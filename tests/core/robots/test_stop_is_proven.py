@@ -256,7 +256,7 @@ def test_late_reply_callback_can_use_the_stopper(stopper, pepper) -> None:
 
     stopper.stop_all(timeout_s=0.1, on_late=late)
     (command,) = pepper.heard("stop")
-    (asked,) = stopper._asked.values()
+    (asked,) = stopper._requests.values()
     answer = {"id": command["id"], "op": "stop", "action": "stop", "state": "failed", "error": "stuck"}
     publisher = pepper._answer._spec.id
     topic, payload = pepper.described.topics.reply, json.dumps(answer).encode()

@@ -104,7 +104,7 @@ def test_memory_of_shown_errors_is_bounded():
     shown = NewErrorFilter()
     for number in range(5000):
         assert shown.is_new(LogRecord("error", "x", "n", "robot", number + 1))
-    assert len(shown._shown) <= 2000
+    assert len(shown._shown_errors) <= 2000
     assert (
         len(shown.new_records([{"level": "error", "stamp_ns": 10_000 + number} for number in range(999)]))
         == MAX_LAST_ERRORS

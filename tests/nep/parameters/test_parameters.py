@@ -213,7 +213,7 @@ def test_invalid_parameter_declaration_is_rejected(
 
 def test_number_of_parameters_is_limited(make: Make) -> None:
     parameters = make("robot").parameters
-    parameters._known = {str(n): None for n in range(1000)}  # type: ignore[misc]
+    parameters._parameters = {str(n): None for n in range(1000)}  # type: ignore[misc]
     with pytest.raises(nep.ParameterError, match="a node can have at most 1000 parameters"):
         parameters.declare("x", 1)
 

@@ -79,7 +79,7 @@ def test_out_of_range_number_is_returned_by_the_form_unclamped_and_reported(qtbo
     QTest.keyClick(slider.field, Qt.Key.Key_Return)
     assert slider.field.text() == "12"
     form.show_problems(form.action.problems(form.input()))
-    shown = [text for text in (slider._sentence.text(), form._sentences["d"].text()) if text]
+    shown = [text for text in (slider._sentence.text(), form._error_labels["d"].text()) if text]
     assert shown == ["The maximum is 1 m."]  # said once
     assert slider.field.property("wrong") == "true"
 
@@ -126,11 +126,11 @@ def test_text_that_is_too_long_is_kept_and_reported_when_editing_ends(qtbot, the
     assert second.placeholderText() == "Optional"
     QTest.keyClicks(first, "too long")
     QTest.keyClick(first, Qt.Key.Key_Return)
-    assert form._sentences["t"].isVisible()
-    assert form._sentences["t"].text() == "Text must be at most 5 characters long."
+    assert form._error_labels["t"].isVisible()
+    assert form._error_labels["t"].text() == "Text must be at most 5 characters long."
     assert first.text() == "too long"
     QTest.keyClick(first, Qt.Key.Key_Backspace)
-    assert not form._sentences["t"].isVisible()
+    assert not form._error_labels["t"].isVisible()
 
 
 def test_zero_is_a_valid_choice_and_an_invalid_advanced_value_shows_its_row(qtbot, theme) -> None:

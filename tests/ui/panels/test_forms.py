@@ -110,7 +110,7 @@ def test_problems_are_shown_below_their_rows_and_general_problems_at_the_end(qtb
     qtbot.addWidget(form)
     form.show()
     form.show_problems((InputProblem("t", "text must not be empty"), InputProblem("", "Pepper has gone")))
-    below = form._sentences
+    below = form._error_labels
     assert below["t"].text() == "Must not be empty." or below["t"].text() == "Text must not be empty."
     assert below["t"].isVisible()
     assert not below["s"].isVisible()
@@ -167,7 +167,7 @@ def test_problems_are_matched_to_rows_in_every_language(qtbot, theme, pseudo) ->
     form = ActionForm(theme, made)
     qtbot.addWidget(form)
     form.show_problems(made.problems({"q": "x"}))
-    below = {name: label.text() for name, label in form._sentences.items()}
+    below = {name: label.text() for name, label in form._error_labels.items()}
     assert all(below.values())
     assert form.problem.isHidden()
 

@@ -115,7 +115,7 @@ def settle(qtbot, panel: GraphPanel) -> None:
     def is_there() -> bool:
         panel.refresh()
         scene = panel.canvas.scene
-        is_shown = scene is not None and scene.graph == panel._asked
+        is_shown = scene is not None and scene.graph == panel._requested_graph
         return not panel._thread.is_busy and is_shown and not panel.canvas._waiting
 
     qtbot.waitUntil(is_there, timeout=20_000)
@@ -453,7 +453,7 @@ def test_large_scene_is_built_in_one_tick_and_painted_in_the_next(
     panel.refresh()
     assert (panel.canvas.scene, panel._coming) == (coming, None)
     assert coming is not None
-    assert coming.graph == panel._asked
+    assert coming.graph == panel._requested_graph
 
 
 def test_groups_are_toggled_by_click_and_keyboard_shortcuts(panel: GraphPanel, qtbot) -> None:

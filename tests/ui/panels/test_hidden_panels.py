@@ -263,7 +263,7 @@ def test_unwatched_robot_is_not_stale_when_its_panel_is_shown_again(qtbot, case:
     case.tick()
     dock.close()
     case.hide_for_long()
-    panel._told_s -= 60
+    panel._last_drawing_s -= 60
     settle(qtbot, case, case.dock("robot"))
     assert not panel.view.stale
 

@@ -124,11 +124,11 @@ def test_latency_of_a_shown_message_does_not_grow(panel, window) -> None:
     window.session.send("/blackboard", blackboard())
     panel.refresh()
     panel.freeze.setChecked(True)
-    said = panel._message_info(panel._shown)
-    panel._shown.stamp_ns -= 600 * 10**9  # as ten minutes later
+    said = panel._message_info(panel._shown_message)
+    panel._shown_message.stamp_ns -= 600 * 10**9  # as ten minutes later
     panel._set_mode("raw")
     assert panel.foot.facts.text() == said
-    assert panel._message_info(panel._shown) == said
+    assert panel._message_info(panel._shown_message) == said
 
 
 class Layouts(QObject):
@@ -177,7 +177,7 @@ def test_fast_messages_are_shown_at_ten_hertz_and_the_last_message_always(panel,
     now[0] += 0.1
     ticks(window, panel)
     assert panel.model.value()["n"] == 60
-    assert panel.foot.facts.text().split("   ")[:2] == message_info(panel._shown).split("   ")[:2]
+    assert panel.foot.facts.text().split("   ")[:2] == message_info(panel._shown_message).split("   ")[:2]
 
 
 def test_new_topic_and_resumed_panel_show_the_current_message_immediately(panel, window) -> None:

@@ -83,7 +83,7 @@ def choose(panel: RecordingsPanel, folder: Path, name: str) -> RecordingTable:
 def test_each_recording_is_listed_with_its_details_and_badges(qtbot, panel, window, folder):
     assert panel.empty.isVisible() or panel._has_looked, "until the folder was looked at, it says so"
     seen(qtbot, panel, "arm", "camera", "cut")
-    facts = {each.path.stem: each for each in panel._look.files}
+    facts = {each.path.stem: each for each in panel._scan.files}
     assert [badge_of(facts[name], False) for name in ("arm", "cut")] == ["", "cut"]
     assert badge_of(facts["arm"], True) == "recording"
     assert panel.count.text().startswith("3 recordings, ")
@@ -99,7 +99,7 @@ def test_each_recording_is_listed_with_its_details_and_badges(qtbot, panel, wind
 
 def test_thumbnails_are_decoded_in_another_thread(qtbot, panel, folder):
     seen(qtbot, panel, "arm", "camera", "cut")
-    (facts,) = (each for each in panel._look.files if each.path.stem == "camera")
+    (facts,) = (each for each in panel._scan.files if each.path.stem == "camera")
 
     def is_drawn() -> bool:
         panel._collect_thumbnails()

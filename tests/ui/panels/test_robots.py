@@ -54,7 +54,7 @@ def test_rejected_input_is_reported_below_its_row(panel, window) -> None:
     assert field is not None
     field.set_text("")
     press(card.try_button)
-    assert "not be empty" in card.form._sentences["text"].text()
+    assert "not be empty" in card.form._error_labels["text"].text()
     assert field.is_invalid
     assert window.session.fleet.links[0].invocations == {}
 

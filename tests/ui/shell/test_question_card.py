@@ -35,7 +35,7 @@ def card(qtbot, window: MainWindow) -> QuestionCard:
 @pytest.fixture
 def said(card: QuestionCard, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, str]]:
     got: list[tuple[int, str]] = []
-    monkeypatch.setattr(card, "_answer", lambda question, words: got.append((question.number, words)))
+    monkeypatch.setattr(card, "_on_answer", lambda question, words: got.append((question.number, words)))
     return got
 
 

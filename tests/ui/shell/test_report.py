@@ -122,7 +122,7 @@ def test_folder_path_is_shown_when_the_file_manager_cannot_be_opened(
     answers.path = tmp_path / "report.zip"
     written(qtbot, sheet)
     sheet.show_file.click()
-    assert window.toast._words.text() == f"The file is in {tmp_path}"
+    assert window.toast._label.text() == f"The file is in {tmp_path}"
 
 
 def test_behaviours_are_included_in_a_report_only_if_enabled_each_time(
@@ -169,7 +169,7 @@ def test_report_finished_after_the_sheet_is_closed_is_announced_by_a_toast(
     answers.path = tmp_path / "report.zip"
     sheet.write.click()
     sheet.dismiss()
-    qtbot.waitUntil(lambda: window.toast._words.text().startswith("The report is in"))
+    qtbot.waitUntil(lambda: window.toast._label.text().startswith("The report is in"))
 
 
 def test_banner_offers_a_crash_report_that_contains_the_crash(

@@ -69,7 +69,7 @@ class Densities:
         self.problem = ""
         self.losses: Mapping[str, tuple[LossMark, ...]] = {}
         self.spans = RecordedSpans()
-        self._wanted: tuple[int, int, int] | None = None
+        self._requested_range: tuple[int, int, int] | None = None
         self._worker.submit("losses", lambda: _Result(losses=losses_of(recording)))
         self._worker.submit("spans", lambda: _Result(spans=spans_of(recording)))
 
@@ -82,9 +82,9 @@ class Densities:
             buckets: Number of intervals.
         """
         requested = (start_ns, end_ns, buckets)
-        if requested == self._wanted or buckets < 1 or end_ns <= start_ns:
+        if requested == self._requested_range or buckets < 1 or end_ns <= start_ns:
             return
-        self._wanted = requested
+        self._requested_range = requested
         self._worker.submit("density", lambda: _Result(density=density_of(self._recording, *requested)))
 
     def collect_results(self) -> bool:

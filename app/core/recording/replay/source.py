@@ -129,8 +129,8 @@ class ReplaySource:
         self._changed = threading.Condition()
         self._changes: list[tuple[str, PlaybackChange]] = []
         self._watched: set[str] = set()
-        self._deep: dict[str, int] = {}
-        self._chosen: frozenset[str] = frozenset()
+        self._history_capacities: dict[str, int] = {}
+        self._panel_topics: frozenset[str] = frozenset()
         self._sent: frozenset[str] = frozenset()
         self._played: frozenset[str] = frozenset()
         self._forward: Forward | None = None
@@ -139,8 +139,8 @@ class ReplaySource:
         self._status = ReplayStatus("reading")
         self._closing = False
         self._playback: Playback | None = None
-        self._figures: list[tuple[int, list[str]]] = []
-        self._next_figures = self._figures_s = 0.0
+        self._pending_stats: list[tuple[int, list[str]]] = []
+        self._next_stats_s = self._stats_duration_s = 0.0
         self._thread = threading.Thread(target=self._run, name="studio-replay", daemon=True)
 
     # -- called by the window ----------------------------------------------------------------------
@@ -192,9 +192,9 @@ class ReplaySource:
         """
         with self._changed:
             if room is None:
-                self._deep.pop(topic, None)
+                self._history_capacities.pop(topic, None)
             else:
-                self._deep[topic] = room
+                self._history_capacities[topic] = room
             self._mailbox.set_capacity(topic, room)
             is_watched = topic in self._watched
         if room is not None and is_watched:  # otherwise its history is read when it is watched
@@ -298,18 +298,20 @@ class ReplaySource:
             self._apply_seek(due.messages)
             self._update_status(playback)
             with self._changed:
-                history_topics = frozenset(self._deep)
-            self._read_history(playback, history_topics & self._chosen)
+                history_topics = frozenset(self._history_capacities)
+            self._read_history(playback, history_topics & self._panel_topics)
         else:
             if self._sent:
                 self._forward_messages(due.messages, delays_of(due, playback.status()))
-            self._post_messages([each for each in due.messages if each.topic in self._chosen])
+            self._post_messages([each for each in due.messages if each.topic in self._panel_topics])
             self._update_status(playback)
-        is_due = playback.status().is_playing and not self._figures and self._clock() >= self._next_figures
+        is_due = (
+            playback.status().is_playing and not self._pending_stats and self._clock() >= self._next_stats_s
+        )
         if due.is_jump or is_due:
             self._schedule_stats(playback)
         self._read_next_stats()
-        return 0.0 if self._figures else due.wait_s
+        return 0.0 if self._pending_stats else due.wait_s
 
     def _update_status(self, playback: Playback) -> None:
         damage = self.opened.recording.corruption if self.opened is not None else ()
@@ -317,8 +319,12 @@ class ReplaySource:
 
     def _update_selection(self, playback: Playback) -> None:
         with self._changed:
-            watched, with_history, sent = frozenset(self._watched), frozenset(self._deep), self._sent
-        newly_watched = watched - self._chosen  # by a panel, from now on
+            watched, with_history, sent = (
+                frozenset(self._watched),
+                frozenset(self._history_capacities),
+                self._sent,
+            )
+        newly_watched = watched - self._panel_topics  # by a panel, from now on
         new = newly_watched & with_history
         newest = list(playback.select_topics(watched | sent))
         # topics played only for the network: no panel has their newest message
@@ -327,7 +333,7 @@ class ReplaySource:
             before = self.opened.recording.newest(playback.status().position_ns, played)
             newest += [each.message for each in before.values()]
         self._post_messages([each for each in newest if each.topic in newly_watched - new])
-        self._chosen, self._played = watched, watched | sent
+        self._panel_topics, self._played = watched, watched | sent
         self._read_history(playback, new)
 
     def _post_messages(self, messages: Sequence[Message]) -> None:
@@ -347,13 +353,13 @@ class ReplaySource:
             to([message for message, _late in forwarded], [late for _message, late in forwarded])
 
     def _apply_seek(self, messages: Sequence[Message]) -> None:
-        copies = [_own_copy(message) for message in messages if message.topic in self._chosen]
+        copies = [_own_copy(message) for message in messages if message.topic in self._panel_topics]
         pictures = [each for each in copies if each.codec == "image"]
         self._pictures.reset([each.topic for each in pictures])
         self._pictures.offer(pictures)
         with self._changed:
             self._mailbox = Mailbox()
-            for topic, room in self._deep.items():
+            for topic, room in self._history_capacities.items():
                 self._mailbox.set_capacity(topic, room)
             self._results = ReplayResults(seek_messages=copies)
 
@@ -410,17 +416,19 @@ class ReplaySource:
         if self.opened is None:
             return
         names, at_ns = list(self.opened.recording.topics), playback.status().position_ns
-        self._figures = [
+        self._pending_stats = [
             (at_ns, names[k : k + TOPICS_PER_STATS_READ]) for k in range(0, len(names), TOPICS_PER_STATS_READ)
         ]
-        self._next_figures = self._clock() + max(STATISTICS_INTERVAL_S, STATS_PAUSE_FACTOR * self._figures_s)
-        self._figures_s = 0.0
+        self._next_stats_s = self._clock() + max(
+            STATISTICS_INTERVAL_S, STATS_PAUSE_FACTOR * self._stats_duration_s
+        )
+        self._stats_duration_s = 0.0
 
     def _read_next_stats(self) -> None:
-        if not self._figures or self.opened is None:
+        if not self._pending_stats or self.opened is None:
             return
         start_time_s, recording = self._clock(), self.opened.recording
-        at_ns, topics = self._figures.pop(0)
+        at_ns, topics = self._pending_stats.pop(0)
         from_ns = max(recording.start_ns, at_ns - round(RATE_WINDOW_S * 1e9))
         passed_s = (at_ns - from_ns) / 1e9
         counts = recording.densities(from_ns, at_ns + 1, 1, topics) if passed_s > 0 else {}
@@ -433,7 +441,7 @@ class ReplaySource:
         }
         with self._changed:
             self._results.stats.update(stats)
-        self._figures_s += self._clock() - start_time_s
+        self._stats_duration_s += self._clock() - start_time_s
 
 
 class _ClosingError(Exception):

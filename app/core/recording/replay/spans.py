@@ -63,11 +63,11 @@ class _Lane:
     def __init__(self, first_ns: int, last_ns: int) -> None:
         self._first_ns, self._last_ns = first_ns, last_ns
         self._by_id: dict[str, RecordedSpan] = {}
-        self._left_out: set[str] = set()
+        self._omitted_ids: set[str] = set()
 
     @property
     def omitted_count(self) -> int:
-        return len(self._left_out)
+        return len(self._omitted_ids)
 
     def sorted(self) -> tuple[RecordedSpan, ...]:
         return tuple(sorted(self._by_id.values(), key=lambda span: (span.start_ns, span.end_ns)))
@@ -76,8 +76,8 @@ class _Lane:
         # The start is the earliest of all records.
         existing = self._by_id.get(id)
         if existing is None and len(self._by_id) >= MAX_SPANS:
-            if len(self._left_out) < MAX_SPANS:
-                self._left_out.add(id)
+            if len(self._omitted_ids) < MAX_SPANS:
+                self._omitted_ids.add(id)
             return
         start_ns = self._clamp(span.start_ns if existing is None else min(existing.start_ns, span.start_ns))
         end_ns = max(start_ns, self._clamp(span.end_ns))

@@ -94,7 +94,7 @@ class MotionPermission:
         self._allowed: set[str] = set()
         self.strangers: frozenset[str] = frozenset()
         """Allowed robots without a readable description, and topics of unknown robots that were allowed."""
-        self._asked: tuple[tuple[str, str], ...] = ()
+        self._question_keys: tuple[tuple[str, str], ...] = ()
         self.question: PermissionQuestion | None = None
         """Open question, or None."""
         self.revision = 0
@@ -132,7 +132,7 @@ class MotionPermission:
         unknown = tuple(name for name in strangers if name not in self.strangers)
         if not open_ and not unknown:
             return True
-        self._asked = tuple((self._program_key(robot), self._key(robot)) for robot, _key in open_)
+        self._question_keys = tuple((self._program_key(robot), self._key(robot)) for robot, _key in open_)
         self.question = PermissionQuestion(
             {robot.name: moves for robot, moves in open_}, go_on, unknown, reason
         )
@@ -153,13 +153,13 @@ class MotionPermission:
         self.revision += 1
         if question is None or not let:
             return
-        self._allowed.update(now for now, _key in self._asked)
+        self._allowed.update(now for now, _key in self._question_keys)
         self.strangers |= set(question.unknown_robots)
         try:
             if always and self._settings is not None:
                 self._settings.set(
                     SETTING_KEY,
-                    sorted({*self._always_allowed(), *(key for _program_key, key in self._asked)}),
+                    sorted({*self._always_allowed(), *(key for _program_key, key in self._question_keys)}),
                 )
         finally:
             question.on_allow()

@@ -87,7 +87,7 @@ class RobotStopper:
         self._opening_lock = threading.Lock()  # held while opening connections
         self._openers: list[threading.Thread] = []
         self._lines: dict[str, StopLine] = {}
-        self._asked: dict[str, StopRequest] = {}
+        self._requests: dict[str, StopRequest] = {}
         self._view: GraphView | None = None
         self._hearers: dict[str, frozenset[str]] = {}  # subscribed nodes by command topic, of this view
         self._graph_queried_s = 0.0
@@ -103,7 +103,7 @@ class RobotStopper:
             )
             late = [
                 reply
-                for request in self._asked.values()
+                for request in self._requests.values()
                 for reply in self._apply_held_replies_locked(request)
             ]
             self._changed.notify_all()
@@ -170,7 +170,7 @@ class RobotStopper:
             now = self._clock()
             waiting = [
                 request
-                for request in self._asked.values()
+                for request in self._requests.values()
                 if request.is_over and now - request.sent_s <= LATE_REPLY_TIMEOUT_S
             ]
         for request in waiting:
@@ -181,9 +181,9 @@ class RobotStopper:
         stopped_names = set(names)
         with self._changed:
             for id in [
-                id for id, each in self._asked.items() if each.is_over and each.line.name in stopped_names
+                id for id, each in self._requests.items() if each.is_over and each.line.name in stopped_names
             ]:
-                del self._asked[id]
+                del self._requests[id]
 
     @property
     def problems(self) -> Mapping[str, str]:
@@ -284,7 +284,7 @@ class RobotStopper:
         for maker in self._openers:
             maker.join(timeout=5)
         with self._changed:
-            self._asked.clear()
+            self._requests.clear()
 
     # ---- connections
 
@@ -360,7 +360,7 @@ class RobotStopper:
         request = StopRequest(line, _new_id(), self._clock(), late, ends)
         with self._changed:
             self._evict_expired()
-            self._asked[request.id] = request
+            self._requests[request.id] = request
             if self._view is not None and line.target.robot.dialect != RIZE:
                 request.replies |= self._serving_programs(request)
             for topics, channel in line.channels.items():
@@ -506,7 +506,7 @@ class RobotStopper:
         with self._changed:
             for message in messages:
                 node = self._senders.node_of(message)
-                for request in self._asked.values():
+                for request in self._requests.values():
                     if message.topic in request.line.reply_topics:
                         late += self._apply_reply_locked(request, node, message)
             self._changed.notify_all()
@@ -576,15 +576,15 @@ class RobotStopper:
     def _evict_expired(self) -> None:
         # Discards Stops whose late replies are no longer accepted.
         now = self._clock()
-        ended_ids = [id for id, each in self._asked.items() if each.is_over]
+        ended_ids = [id for id, each in self._requests.items() if each.is_over]
         for index, id in enumerate(ended_ids):
-            each = self._asked[id]
+            each = self._requests[id]
             if (
                 each.is_confirmed
                 or index < len(ended_ids) - MAX_LATE_REQUESTS
                 or now - each.sent_s > LATE_REPLY_TIMEOUT_S
             ):
-                del self._asked[id]
+                del self._requests[id]
 
 
 def _new_id() -> str:

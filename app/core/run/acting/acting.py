@@ -117,7 +117,7 @@ class SessionActing:
         self.sent_at_s: dict[str, float] = {}
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-shelf")
         self._is_newer = False
-        self._source_seen = session.source_revision
+        self._source_revision = session.source_revision
         self.path: Path | None = session.settings.path.with_name(FILE_NAME)
         self.shelf = self._read(self.path)
         self._written = self.shelf.revision
@@ -394,8 +394,8 @@ class SessionActing:
 
     def tick(self) -> None:
         """Process results. Switches sending off when the time has elapsed or another source is shown."""
-        if self._session.source_revision != self._source_seen:
-            self._source_seen = self._session.source_revision
+        if self._session.source_revision != self._source_revision:
+            self._source_revision = self._session.source_revision
             self.disarm()
         if self.arming.has_expired:
             self.disarm()

@@ -102,7 +102,7 @@ class ServiceCalls:
         self._lock = threading.Lock()
         self._ended: deque[_CallResult] = deque(maxlen=MAX_RECORDS)
         self._in_flight: _CallInFlight | None = None
-        self._done: list[CallRecord] = []
+        self._finished_calls: list[CallRecord] = []
         self._clients: dict[str, Client] = {}
         self.revision = 0
 
@@ -158,7 +158,7 @@ class ServiceCalls:
         if waiting is not None and not has_begun and self.elapsed_s > waiting.timeout_s:
             error = _("no master was found within {time} s").format(time=number(waiting.timeout_s))
             self._cancel("failed", error)
-        finished, self._done = self._done, []
+        finished, self._finished_calls = self._finished_calls, []
         return finished
 
     def clear(self) -> None:
@@ -195,7 +195,7 @@ class ServiceCalls:
             was_sent=self._in_flight is not None and self._in_flight.future is not None,
         )
         self._records[index] = updated
-        self._done.append(updated)
+        self._finished_calls.append(updated)
         self._in_flight = None
         self.revision += 1
 

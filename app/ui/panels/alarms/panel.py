@@ -70,13 +70,13 @@ class AlarmsPanel(PanelWidget):
         super().__init__(context, _("Alarms"))
         self.alarms = context.session.alarms
         self.now_s: Callable[[], float] = time.time
-        self._seen: tuple[object, ...] = ()
-        self._history_seen: object = None
+        self._last_revisions: tuple[object, ...] = ()
+        self._last_history_revision: object = None
         self._ticks = 0
         self.rows: list[AlarmRow] = []
         self.field: SlotField | None = None
         self._peek: Watch | None = None
-        self._fresh = ""
+        self._new_rule_id = ""
         self._make_header()
         self._make_rows()
         self._make_history()
@@ -164,13 +164,13 @@ class AlarmsPanel(PanelWidget):
     def refresh(self) -> None:
         self._ticks += 1
         revisions = (self.alarms.alarms.revision, self.session.live.topics.revision)
-        if revisions != self._seen:
-            self._seen = revisions
+        if revisions != self._last_revisions:
+            self._last_revisions = revisions
             self._show_rules()
             self._show_states()
         elif self._ticks % STATE_UPDATE_TICKS == 0:
             self._show_states()
-        if self._history_seen != self.alarms.history.revision:
+        if self._last_history_revision != self.alarms.history.revision:
             self._show_history()
         elif self._ticks % 30 == 0:
             self.table.refresh_visible()
@@ -226,7 +226,7 @@ class AlarmsPanel(PanelWidget):
 
     def _show_history(self) -> None:
         history = self.alarms.history
-        self._history_seen = history.revision
+        self._last_history_revision = history.revision
         keywords = self.filter.text().casefold().split()
         rows = [each for each in history if all(keyword in each.cause.casefold() for keyword in keywords)]
         self.model.set_rows(self.table.order.sort(rows))
@@ -265,8 +265,8 @@ class AlarmsPanel(PanelWidget):
             slot: Key of the slot, such as "limit"; "" only gives the alarm the focus.
         """
         self._show_rules()
-        self._seen = ()
-        self._fresh = rule_id if slot == "limit" else ""
+        self._last_revisions = ()
+        self._new_rule_id = rule_id if slot == "limit" else ""
         row = next((row for row in self.rows if row.rule_id == rule_id), None)
         if row is None:
             return
@@ -327,9 +327,9 @@ class AlarmsPanel(PanelWidget):
         changed_rule = with_slot_text(rule, part, text)
         if changed_rule is None:
             return False
-        if part.role == "limit" and self._fresh == rule.id:
+        if part.role == "limit" and self._new_rule_id == rule.id:
             # a new alarm stays disabled until its limit is entered
-            changed_rule, self._fresh = replace(changed_rule, is_enabled=True), ""
+            changed_rule, self._new_rule_id = replace(changed_rule, is_enabled=True), ""
         if changed_rule != rule:
             self._save_rule(changed_rule)
         return True

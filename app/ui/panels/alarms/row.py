@@ -35,9 +35,9 @@ class AlarmRow(QWidget):
     def __init__(self, theme: Theme, rule_id: str) -> None:
         super().__init__()
         self._theme, self.rule_id = theme, rule_id
-        self._shown: list[PhrasePart] = []
+        self._shown_parts: list[PhrasePart] = []
         self.slots: dict[str, AlarmSlot] = {}
-        self._words: list[QLabel] = []
+        self._labels: list[QLabel] = []
         self.switch = Switch(theme, "")
         self.switch.clicked.connect(lambda: self.switched.emit(self.switch.isChecked()))
         self.sentence = QWidget()
@@ -92,23 +92,23 @@ class AlarmRow(QWidget):
         self.snooze.set_icon("bell" if snoozed else "bell-off")
         self.snooze.set_name(_("Stop snoozing") if snoozed else _("Snooze for 10 min"))
         parts = parts_of(rule, icon)
-        if parts != self._shown:
-            self._shown = parts
+        if parts != self._shown_parts:
+            self._shown_parts = parts
             self._rebuild(parts)
 
     def _rebuild(self, parts: list[PhrasePart]) -> None:
         while self._flow.takeAt(0) is not None:
             continue
-        for word_label in self._words:
+        for word_label in self._labels:
             word_label.deleteLater()
-        self._words = []
+        self._labels = []
         stale_slots = {
             key: slot for key, slot in self.slots.items() if key not in {part.key for part in parts}
         }
         for part in parts:
             if part.kind == "word":
                 word_label = label(part.text, "body", role="textSecondary")
-                self._words.append(word_label)
+                self._labels.append(word_label)
                 self._flow.addWidget(word_label)
                 word_label.show()
                 continue

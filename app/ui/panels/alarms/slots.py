@@ -122,7 +122,7 @@ class SlotField(QLineEdit):
         rejection: str = "",
     ) -> None:
         super().__init__(text, row)
-        self.slot, self._take, self._is_over = slot, apply, False
+        self.slot, self._apply, self._is_closed = slot, apply, False
         self._rejection = rejection
         self.setAccessibleName(slot.accessibleName())
         self.setPlaceholderText(example)
@@ -173,7 +173,7 @@ class SlotField(QLineEdit):
         QTimer.singleShot(0, self, self._commit_and_dismiss)
 
     def _commit_and_dismiss(self) -> None:
-        if not self._is_over and self._commit():
+        if not self._is_closed and self._commit():
             self.dismiss()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -197,12 +197,12 @@ class SlotField(QLineEdit):
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        if event.reason() != Qt.FocusReason.PopupFocusReason and not self._is_over:
+        if event.reason() != Qt.FocusReason.PopupFocusReason and not self._is_closed:
             self._commit()
             self.dismiss(keeps_focus=False)
 
     def _commit(self) -> bool:
-        is_valid = self._take(self.text())
+        is_valid = self._apply(self.text())
         self._set_invalid(is_invalid=not is_valid)
         return is_valid
 
@@ -219,9 +219,9 @@ class SlotField(QLineEdit):
 
     def dismiss(self, *, keeps_focus: bool = True) -> None:
         """Close the field and, if `keeps_focus` is True, return the focus to its slot."""
-        if self._is_over:
+        if self._is_closed:
             return
-        self._is_over = True
+        self._is_closed = True
         if keeps_focus:
             self.slot.setFocus(Qt.FocusReason.OtherFocusReason)
         self.hide()

@@ -35,7 +35,7 @@ class BackpackController:
 
     def __init__(self, context: PanelContext, backpack: Backpack, editor: BackpackView) -> None:
         self._context, self._backpack, self._editor = context, backpack, editor
-        self._shown = -1
+        self._shown_revision = -1
         self._ticks = 0
         editor.backpack_requested.connect(self._handle_request)
         self.reload_if_changed()
@@ -55,8 +55,8 @@ class BackpackController:
         trouble = self._backpack.take_problem()
         if trouble:
             self._context.show_toast(_capitalize_first(trouble))
-        if self._shown != self._backpack.revision:
-            self._shown = self._backpack.revision
+        if self._shown_revision != self._backpack.revision:
+            self._shown_revision = self._backpack.revision
             self._editor.set_backpack([item.to_json() for item in self._backpack.items])
 
     def _handle_request(self, request_json: str) -> None:

@@ -45,7 +45,7 @@ class DragImage(QWidget):
     def __init__(self, window: QWidget) -> None:
         super().__init__(window)
         self._picture = QPixmap()
-        self._place: QPoint | None = None
+        self._position: QPoint | None = None
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.hide()
@@ -58,16 +58,16 @@ class DragImage(QWidget):
             ratio: Device pixels per pixel of the page.
         """
         picture = QPixmap()
-        if self._place is None or not picture.loadFromData(data):
+        if self._position is None or not picture.loadFromData(data):
             return
         picture.setDevicePixelRatio(ratio)
         self._picture = picture
         self.resize(picture.deviceIndependentSize().toSize())
-        self.move_to(self._place)
+        self.move_to(self._position)
 
     def move_to(self, position: QPoint | None) -> None:
         """Move the image to a position on the screen; None ends the drag."""
-        self._place = position
+        self._position = position
         if position is None:
             self._picture = QPixmap()
         window = self.parentWidget()
@@ -110,7 +110,7 @@ class BlockDrag:
         self._context, self._session, self._tabs, self._editor = context, session, tabs, editor
         self._flush, self._show = flush, show
         self._home = ""  # key of the tab that the drag started on
-        self._held_at: QPoint | None = None
+        self._drag_position: QPoint | None = None
         self._picture: DragImage | None = None
         self._aimed = ""
         self._opening = QTimer(tabs)
@@ -130,7 +130,7 @@ class BlockDrag:
         return target if target != self._home else ""
 
     def _drag_moved(self, position: QPoint | None, home: str) -> None:
-        self._held_at = position
+        self._drag_position = position
         if position is not None:  # None after the drop: the visible tab may already be another one
             self._home = home
         self._move_image(position)
@@ -141,7 +141,7 @@ class BlockDrag:
             self._scrolling.start()
 
     def _scroll(self) -> None:
-        position = self._held_at
+        position = self._drag_position
         if position is not None and self._tabs.scroll_at(position):
             self._update_target(position)
         else:
@@ -159,7 +159,7 @@ class BlockDrag:
             self._opening.start()
 
     def _open_target(self) -> None:
-        if self._held_at is not None and self._aimed not in {"", NEW_TAB}:
+        if self._drag_position is not None and self._aimed not in {"", NEW_TAB}:
             self._context.run(f"tab:{self._aimed}")
             self._show()
 
@@ -178,7 +178,7 @@ class BlockDrag:
 
     def _on_dropped(self, position: QPoint) -> None:
         target = self._target(position)
-        self._held_at = None
+        self._drag_position = None
         self._scrolling.stop()
         self._move_image(None)
         self._update_target(None)

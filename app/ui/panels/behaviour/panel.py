@@ -142,13 +142,13 @@ class BehaviourPanel(PanelWidget):
         self.program = ProgramView(self.theme)
         self._make_editor = make_editor
         self.editor: Editor | None = None
-        self._place = QWidget()
-        self._place_column = QVBoxLayout(self._place)
-        self._place_column.setContentsMargins(0, 0, 0, 0)
-        self.pages = self.make_page_stack(self._place, self.program)
-        self.waiting = LoadingMessage(self._place)
-        self._shown: dict[str, object] = {}
-        self._given: dict[str, tuple[int, int]] = {}
+        self._editor_container = QWidget()
+        self._editor_layout = QVBoxLayout(self._editor_container)
+        self._editor_layout.setContentsMargins(0, 0, 0, 0)
+        self.pages = self.make_page_stack(self._editor_container, self.program)
+        self.waiting = LoadingMessage(self._editor_container)
+        self._shown_values: dict[str, object] = {}
+        self._loaded_revisions: dict[str, tuple[int, int]] = {}
         self._watches: dict[str, Watch] = {}
         self._sensors: tuple[tuple[str, str], ...] = ()
         self._offered: tuple[tuple[str, str], ...] = ()  # sensors in the flyout while it is open
@@ -173,8 +173,8 @@ class BehaviourPanel(PanelWidget):
                 self.editor.set_definitions(documents.definitions())
             self._show_blocks(self.editor)
         program = document.newest_program()
-        if program is not None and program is not self._shown.get("facts"):
-            self._shown["facts"] = program
+        if program is not None and program is not self._shown_values.get("facts"):
+            self._shown_values["facts"] = program
             self._program_changed(program)
         if self.editor is not None:
             self._show_run(self.editor)
@@ -215,29 +215,29 @@ class BehaviourPanel(PanelWidget):
     def _show_blocks(self, editor: Editor) -> None:
         document = self.session.document
         now = (document.revision, document.fixes)
-        previous = self._given.get(document.key)
+        previous = self._loaded_revisions.get(document.key)
         if self._has_changed("tab", document.key):
             editor.show_tab(document.key, document.workspace)
             for name in ("facts", "blocks"):
-                self._shown.pop(name, None)
+                self._shown_values.pop(name, None)
         if previous is not None and previous[0] != now[0]:
             editor.load(document.workspace)
         elif previous is not None and previous[1] != now[1]:
             editor.apply_edit(document.workspace)
-        self._given[document.key] = now
-        for key in self._given.keys() - {each.key for each in self.session.documents}:
-            del self._given[key]
+        self._loaded_revisions[document.key] = now
+        for key in self._loaded_revisions.keys() - {each.key for each in self.session.documents}:
+            del self._loaded_revisions[key]
             editor.close_tab(key)
 
     def _has_changed(self, name: str, now: object) -> bool:
-        if self._shown.get(name) == now and name in self._shown:
+        if self._shown_values.get(name) == now and name in self._shown_values:
             return False
-        self._shown[name] = now
+        self._shown_values[name] = now
         return True
 
     def _open_editor(self) -> Editor | None:
         try:
-            editor = self._make_editor(self._place)
+            editor = self._make_editor(self._editor_container)
         except ImportError as error:
             missing = missing_libraries(error)
             if missing is None:
@@ -268,7 +268,7 @@ class BehaviourPanel(PanelWidget):
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
         if isinstance(editor, QWidget):
             had_focus = self.hasFocus()
-            self._place_column.addWidget(editor)
+            self._editor_layout.addWidget(editor)
             self.setFocusProxy(editor)
             if had_focus:
                 editor.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -280,7 +280,7 @@ class BehaviourPanel(PanelWidget):
         if missing.command:
             copy = partial(self._copy_command, missing.command)
             state.set_actions([EmptyAction(_("Copy the command"), copy, "copy")])
-        self._place_column.addWidget(state)
+        self._editor_layout.addWidget(state)
 
     def _copy_command(self, command: str) -> None:
         QGuiApplication.clipboard().setText(command)
@@ -503,7 +503,7 @@ class LoadingMessage:
     """
 
     def __init__(self, parent: QWidget, clock: Callable[[], float] = time.monotonic) -> None:
-        self._place, self._clock = parent, clock
+        self._container, self._clock = parent, clock
         self._since: float | None = None
         self.words = label(_(LOADING_TEXT), "bodyLarge", role="textSecondary", wrap=True)
         self.words.setAlignment(Qt.AlignmentFlag.AlignCenter)
@@ -524,9 +524,9 @@ class LoadingMessage:
             self._since = now
         late = self._since is not None and now - self._since >= LOADING_TEXT_DELAY_S
         if late:
-            self.words.setGeometry(self._place.rect())
+            self.words.setGeometry(self._container.rect())
             self.words.raise_()
-        if late != self.words.isVisibleTo(self._place):
+        if late != self.words.isVisibleTo(self._container):
             self.words.setVisible(late)
 
 

@@ -70,7 +70,7 @@ class BehaviourTab(PaintedButton):
         super().__init__(theme, checkable=True, parent=parent)
         self.facts = TabState("", "")
         self._from: QPointF | None = None
-        self._over_close = self._close_down = False
+        self._is_close_hovered = self._close_down = False
         self.setMouseTracking(True)
 
     def show_state(self, state: TabState, current: bool) -> bool:
@@ -153,7 +153,7 @@ class BehaviourTab(PaintedButton):
         theme, slot = self._theme, self.close_rect()
         colour = theme.colour("selectedText" if self.isChecked() else "textSecondary")
         if is_highlighted:
-            if self._over_close:
+            if self._is_close_hovered:
                 paint.box(painter, slot, theme.radius("key"), theme.colour("pressed"))
             paint_icon(painter, slot.adjusted(2, 2, -2, -2), "x", colour)
         elif self.facts.is_dirty:
@@ -182,8 +182,8 @@ class BehaviourTab(PaintedButton):
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         is_over_close = self.close_rect().contains(event.position())
-        if is_over_close != self._over_close:
-            self._over_close = is_over_close
+        if is_over_close != self._is_close_hovered:
+            self._is_close_hovered = is_over_close
             self.update()
         if self._from is not None:
             is_dragging = abs(event.position().x() - self._from.x()) >= QApplication.startDragDistance()
@@ -200,7 +200,7 @@ class BehaviourTab(PaintedButton):
         self.update()
 
     def leaveEvent(self, event: QEvent) -> None:
-        self._over_close = False
+        self._is_close_hovered = False
         super().leaveEvent(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -240,7 +240,7 @@ class NameField(QLineEdit):
 
     def __init__(self, theme: Theme, name: str, validate: Callable[[str], str], parent: QWidget) -> None:
         super().__init__(name, parent)
-        self._theme, self._why_not, self._ended = theme, validate, False
+        self._theme, self._validate, self._ended = theme, validate, False
         self.setAccessibleName(_("Behaviour name"))
         self.setProperty("focusRadius", theme.radius("small"))
         self.setMaxLength(MAX_NAME_LENGTH)
@@ -264,13 +264,13 @@ class NameField(QLineEdit):
         stays = {Qt.FocusReason.PopupFocusReason, Qt.FocusReason.ActiveWindowFocusReason}
         if event.reason() in stays:
             return
-        if self._why_not(self.text()):
+        if self._validate(self.text()):
             self._finish()
         else:
             self._commit()
 
     def _commit(self) -> None:
-        problem = self._why_not(self.text())
+        problem = self._validate(self.text())
         if problem:
             self._show_problem(problem)
         elif not self._ended:

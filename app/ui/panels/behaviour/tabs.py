@@ -38,9 +38,9 @@ class BehaviourTabs(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._facts: tuple[TabState, ...] = ()
+        self._states: tuple[TabState, ...] = ()
         self._current = ""
-        self._left = 0.0
+        self._scroll_offset = 0.0
         self.why_not: Callable[[str, str], str] = lambda _key, _name: ""
         """Returns the reason why the tab with this key can't have a name, or ""."""
         self.field: NameField | None = None
@@ -64,7 +64,7 @@ class BehaviourTabs(QWidget):
             current: Key of the active tab.
         """
         requested = tuple(states)
-        if (requested, current) == (self._facts, self._current):
+        if (requested, current) == (self._states, self._current):
             return
         had_focus = any(tab.hasFocus() for tab in self.tabs.values())
         for key in self.tabs.keys() - {each.key for each in requested}:
@@ -74,7 +74,7 @@ class BehaviourTabs(QWidget):
             removed_tab.hide()
             removed_tab.deleteLater()
         moved = current != self._current
-        self._facts, self._current = requested, current
+        self._states, self._current = requested, current
         changed = [self._make_tab(each).show_state(each, each.key == current) for each in requested]
         if had_focus and moved and current in self.tabs:
             self.tabs[current].setFocus(Qt.FocusReason.OtherFocusReason)
@@ -97,7 +97,7 @@ class BehaviourTabs(QWidget):
     def _show_tab_list(self) -> None:
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        for state in self._facts:
+        for state in self._states:
             entry = menu.addAction(plain.escape_menu_text(state.name))
             entry.setCheckable(True)
             entry.setChecked(state.key == self._current)
@@ -127,13 +127,13 @@ class BehaviourTabs(QWidget):
         if not self.isVisible() or not room.contains(local_position):
             return False
         margin = min(round(self._theme.scaled(SCROLL_MARGIN)), room.width() // 3)
-        before = self._left
+        before = self._scroll_offset
         if local_position.x() < room.left() + margin:
-            self._left -= SCROLL_STEP
+            self._scroll_offset -= SCROLL_STEP
         elif local_position.x() > room.right() - margin:
-            self._left += SCROLL_STEP
+            self._scroll_offset += SCROLL_STEP
         self._update_layout()
-        return self._left != before
+        return self._scroll_offset != before
 
     def highlight_target(self, key: str) -> None:
         """Highlight a drop target: the key of a tab, `NEW_TAB` for "+", or "" for none."""
@@ -181,11 +181,11 @@ class BehaviourTabs(QWidget):
         self.field.setGeometry(left, max(0, (self.height() - height) // 2), width, height)
 
     def _step(self, step: int) -> None:
-        keys = [each.key for each in self._facts]
+        keys = [each.key for each in self._states]
         self.selected.emit(keys[(keys.index(self._current) + step) % len(keys)])
 
     def _drag(self, key: str, x: int) -> None:
-        keys = [each.key for each in self._facts]
+        keys = [each.key for each in self._states]
         index = keys.index(key)
         for step in (-1, 1):
             other = index + step
@@ -203,10 +203,10 @@ class BehaviourTabs(QWidget):
 
     def _widths(self) -> list[int]:
         # The active tab keeps its full width up to the available room; the others shrink down to MIN_LENGTH.
-        full_widths = [self.tabs[each.key].sizeHint().width() for each in self._facts]
+        full_widths = [self.tabs[each.key].sizeHint().width() for each in self._states]
         room = self._available_width(scrolls=False) - GAP * len(full_widths)
         min_width = round(self._theme.scaled(MIN_TAB_WIDTH))
-        keys = [each.key for each in self._facts]
+        keys = [each.key for each in self._states]
         alone = max(min_width, self._available_width(scrolls=len(keys) > 1))
 
         def cut(limit: int) -> list[int]:
@@ -228,11 +228,11 @@ class BehaviourTabs(QWidget):
         scrolls = total > self._available_width(scrolls=False)
         room = self._available_width(scrolls=scrolls)
         if bring:
-            self._left = self._offset_for_current(widths, room)
-        self._left = max(0.0, min(self._left, float(total - room)))
+            self._scroll_offset = self._offset_for_current(widths, room)
+        self._scroll_offset = max(0.0, min(self._scroll_offset, float(total - room)))
         self._room.setGeometry(0, 0, max(0, room), self.height())
-        x = -self._left
-        for state, width in zip(self._facts, widths, strict=True):
+        x = -self._scroll_offset
+        for state, width in zip(self._states, widths, strict=True):
             tab = self.tabs[state.key]
             height = tab.sizeHint().height()
             tab.setGeometry(round(x), (self.height() - height) // 2, width, height)
@@ -247,20 +247,20 @@ class BehaviourTabs(QWidget):
 
     def _offset_for_current(self, widths: list[int], room: int) -> float:
         x = 0.0
-        for state, width in zip(self._facts, widths, strict=True):
+        for state, width in zip(self._states, widths, strict=True):
             if state.key == self._current:
-                return min(max(self._left, x + width - room), x)
+                return min(max(self._scroll_offset, x + width - room), x)
             x += width + GAP
-        return self._left
+        return self._scroll_offset
 
     def sizeHint(self) -> QSize:
-        tabs = [self.tabs[each.key].sizeHint() for each in self._facts]
+        tabs = [self.tabs[each.key].sizeHint() for each in self._states]
         height = max([28, *(size.height() for size in tabs)])
         return QSize(sum(size.width() + GAP for size in tabs) + self.add.sizeHint().width(), height)
 
     def minimumSizeHint(self) -> QSize:
         width = round(self._theme.scaled(MIN_TAB_WIDTH)) + GAP + self.add.sizeHint().width()
-        if len(self._facts) > 1:
+        if len(self._states) > 1:
             width += GAP + self.list.sizeHint().width()
         return QSize(width, self.sizeHint().height())
 
@@ -270,7 +270,7 @@ class BehaviourTabs(QWidget):
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         turned = event.angleDelta().y() or event.angleDelta().x()
-        self._left -= turned / 2
+        self._scroll_offset -= turned / 2
         self._update_layout()
         event.accept()
 

@@ -98,15 +98,15 @@ class RecordFilter:
     """
 
     def __init__(self, levels: frozenset[str], node: str, text: str) -> None:
-        self._levels, self._node, self._words = levels, node, text.casefold().split()
+        self._levels, self._node, self._keywords = levels, node, text.casefold().split()
 
     def __call__(self, record: ConsoleRecord) -> bool:
         if record.level not in self._levels or (self._node and record.origin != self._node):
             return False
-        if not self._words:
+        if not self._keywords:
             return True
         searchable = f"{record.origin} {record.logger} {record.text}".casefold()
-        return all(keyword in searchable for keyword in self._words)
+        return all(keyword in searchable for keyword in self._keywords)
 
 
 class ConsoleModel(QAbstractListModel):

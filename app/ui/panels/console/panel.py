@@ -50,7 +50,7 @@ class ConsolePanel(PanelWidget):
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Console"))
-        self._seen = -1
+        self._last_revision = -1
         self._choice: tuple[object, ...] = ()
         self._unseen = 0
         self.level = "all"
@@ -106,13 +106,13 @@ class ConsolePanel(PanelWidget):
     # display
 
     def source_changed(self) -> None:
-        self._seen = -1
+        self._last_revision = -1
         self.model.reset_records((), self._current_filter())
 
     def refresh(self) -> None:
         console = self.session.displayed_console
         choice = (self.level, self.node, self.words.text())
-        if (console.revision, choice) == (self._seen, self._choice):
+        if (console.revision, choice) == (self._last_revision, self._choice):
             return
         records, record_filter = console.records, self._current_filter()
         if choice != self._choice:
@@ -120,7 +120,7 @@ class ConsolePanel(PanelWidget):
             self.list.scrollToTop()
         else:
             self._update_records(records)
-        self._seen, self._choice = console.revision, choice
+        self._last_revision, self._choice = console.revision, choice
         self.pages.setCurrentIndex(1 if self.model.rowCount() else 0)
         self._update_empty_state()
 

@@ -169,12 +169,12 @@ class FirstStepsPanel(PanelWidget):
         self.pages: QStackedWidget = self.make_page_stack(steps, self.end)
         self.chip = Chip(self.theme, "", "off")
         self.chips = [self.chip]
-        self._again = QAction(_("Start over"), self)
-        self._again.triggered.connect(self.start_again)
+        self._restart_action = QAction(_("Start over"), self)
+        self._restart_action.triggered.connect(self.start_again)
         self._show()
 
     def more_actions(self) -> tuple[QAction, ...]:
-        return (self._again,)
+        return (self._restart_action,)
 
     def next_step(self) -> TutorialStep | None:
         """Return the next step, or None after the last one."""

@@ -131,11 +131,11 @@ class GraphCard(QWidget):
         self.kind = label("", "small", role="textTertiary")
         self.close_button = IconButton(theme, "x", _("Close"), size=24)
         self.close_button.clicked.connect(self.closed)
-        self._inside = QWidget()
-        self._column = QVBoxLayout(self._inside)
+        self._content = QWidget()
+        self._column = QVBoxLayout(self._content)
         self._column.setContentsMargins(14, 4, 14, 10)
         self._column.setSpacing(8)
-        scroll = ContentScrollArea(self._inside)
+        scroll = ContentScrollArea(self._content)
         scroll.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._make_buttons()
         self.foot = label("", "small", role="textTertiary", wrap=True)
@@ -149,7 +149,7 @@ class GraphCard(QWidget):
         self._line = Separator(theme)
         column.addWidget(self._line)
         column.addWidget(self.foot)
-        self._figures: list[_StatBox] = []
+        self._stat_boxes: list[_StatBox] = []
         self._tables: list[_Table] = []
         self.setAccessibleName(_("Selection"))
         self.hide()
@@ -224,7 +224,7 @@ class GraphCard(QWidget):
         self._line.setVisible(bool(content.footer))
         if before is None or _structure_key(before) != _structure_key(content):
             self._rebuild(content)
-        for box, stat in zip(self._figures, content.stats, strict=True):
+        for box, stat in zip(self._stat_boxes, content.stats, strict=True):
             box.set_stat(stat)
         for table_widget, table in zip(self._tables, content.tables, strict=True):
             table_widget.set_table(table)
@@ -235,14 +235,14 @@ class GraphCard(QWidget):
             if (old := item.widget()) is not None:
                 old.hide()
                 old.deleteLater()
-        self._figures = [_StatBox(self._theme) for _figure in content.stats]
-        if self._figures:
+        self._stat_boxes = [_StatBox(self._theme) for _figure in content.stats]
+        if self._stat_boxes:
             card = Card(self._theme)
             grid = QGridLayout(card)
             grid.setContentsMargins(12, 8, 12, 8)
             grid.setHorizontalSpacing(12)
             grid.setVerticalSpacing(8)
-            for index, box in enumerate(self._figures):
+            for index, box in enumerate(self._stat_boxes):
                 grid.addWidget(box, index // 2, index % 2, Qt.AlignmentFlag.AlignTop)
             grid.setColumnStretch(0, 1)
             grid.setColumnStretch(1, 1)

@@ -90,9 +90,9 @@ class GraphPanel(PanelWidget):
         self._quiet, self._calls = QuietNodes(), CallRates()
         self._layout: GraphLayout | None = None
         self._coming: GraphScene | None = None
-        self._asked: NodeGraph | None = None
-        self._sizes_asked = LayoutSizes()
-        self._seen: tuple[object, ...] = ()
+        self._requested_graph: NodeGraph | None = None
+        self._requested_sizes = LayoutSizes()
+        self._last_snapshot: tuple[object, ...] = ()
         self._values: tuple[object, ...] = ()
         self._ticks = 0
         self._hertz: Mapping[str, float] = {}
@@ -124,9 +124,9 @@ class GraphPanel(PanelWidget):
 
     def _make_actions(self) -> None:
         theme = self.theme
-        self._own = QAction(_("Show NEP's own topics"), self)
-        self._own.setCheckable(True)
-        self._own.toggled.connect(lambda on: self._update_choices(shows_internal=on))
+        self._internal_topics_action = QAction(_("Show NEP's own topics"), self)
+        self._internal_topics_action.setCheckable(True)
+        self._internal_topics_action.toggled.connect(lambda on: self._update_choices(shows_internal=on))
         self._rearrange = QAction(theme.icon("refresh-cw"), _("Rearrange"), self)
         self._rearrange.triggered.connect(lambda _on=False: self._reset_layout())
 
@@ -169,28 +169,28 @@ class GraphPanel(PanelWidget):
         for widget, stretch in ((self.tools, 0), (self.canvas, 1), (self.note, 0), (self.legend, 0)):
             column.addWidget(widget, stretch)
         page = QWidget()
-        self._beside = QBoxLayout(QBoxLayout.Direction.LeftToRight, page)
-        self._beside.setContentsMargins(0, 0, 0, 0)
-        self._beside.setSpacing(0)
-        self._beside.addWidget(main_area, 1)
+        self._page_layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, page)
+        self._page_layout.setContentsMargins(0, 0, 0, 0)
+        self._page_layout.setSpacing(0)
+        self._page_layout.addWidget(main_area, 1)
         self._line = Separator(self.theme, upright=True)
         self._line.hide()
-        self._beside.addWidget(self._line)
-        self._beside.addWidget(self.card)
+        self._page_layout.addWidget(self._line)
+        self._page_layout.addWidget(self.card)
         return page
 
     # -- display ------------------------------------------------------------------------------------------
 
     def source_changed(self) -> None:
-        self._seen = ()
+        self._last_snapshot = ()
 
     def refresh(self) -> None:
         self._ticks += 1
         if self._ticks % QUIET_UPDATE_TICKS == 1:
             self._update_quiet_nodes()
         snapshot = self._snapshot()
-        if snapshot != self._seen:
-            self._seen = snapshot
+        if snapshot != self._last_snapshot:
+            self._last_snapshot = snapshot
             self._rebuild()
         self._apply_layout()
         values = (self.session.topics.values_revision, self.session.networks.values_revision)
@@ -208,7 +208,7 @@ class GraphPanel(PanelWidget):
         pages = session.web_pages.revision
         return (graph, counts, pages, session.fleet.revision, session.master.kind, self._choices)
 
-    def _graph_facts(self) -> GraphInput:
+    def _graph_input(self) -> GraphInput:
         session = self.session
         return GraphInput(
             [*session.nodes, *session.networks.nodes],
@@ -220,14 +220,14 @@ class GraphPanel(PanelWidget):
         )
 
     def _update_quiet_nodes(self) -> None:
-        graph_state, now = self._graph_facts(), time.monotonic()
+        graph_state, now = self._graph_input(), time.monotonic()
         self._quiet.update(graph_state, now)
         self._calls.update(graph_state, now)
         self._hertz = self._calls.rates_hz()
         self._update_choices(quiet_nodes=self._quiet.quiet_keys(now))
 
     def _rebuild(self) -> None:
-        graph_state = self._graph_facts()
+        graph_state = self._graph_input()
         choices = self._choices
         if len(graph_state.nodes) > MAX_EXPANDED_NODES and not (choices.starts_collapsed or choices.toggled):
             self._layout = None
@@ -239,9 +239,9 @@ class GraphPanel(PanelWidget):
             self._update_choices(starts_collapsed=False)
             self._update_empty_state()
         self._update_counts(graph)
-        if graph != self._asked:
-            self._asked, self._sizes_asked = graph, self._sizes()
-            self._thread.submit(graph, self._layout, self._sizes_asked)
+        if graph != self._requested_graph:
+            self._requested_graph, self._requested_sizes = graph, self._sizes()
+            self._thread.submit(graph, self._layout, self._requested_sizes)
 
     def _apply_layout(self) -> None:
         # A large scene is shown one tick after it was built, to keep ticks short.
@@ -249,7 +249,7 @@ class GraphPanel(PanelWidget):
         result = self._thread.pop_result()
         if result is not None:
             graph, self._layout = result
-            scene = GraphScene(self.theme, graph, self._layout, self._sizes_asked, self._host)
+            scene = GraphScene(self.theme, graph, self._layout, self._requested_sizes, self._host)
             if len(scene.lines) > MAX_LINES_PER_TICK:
                 self._coming = scene
                 return
@@ -268,7 +268,7 @@ class GraphPanel(PanelWidget):
         return line_stats(line, self.session.topic, self._hertz, self._box_of)
 
     def _has_gone_nodes(self) -> bool:
-        graph = self._asked
+        graph = self._requested_graph
         return graph is not None and any(node.is_gone for node in graph.nodes)
 
     def _sizes(self) -> LayoutSizes:
@@ -335,8 +335,8 @@ class GraphPanel(PanelWidget):
         )
 
     def _reset_layout(self) -> None:
-        self._layout = self._asked = self._coming = None
-        self._seen = ()
+        self._layout = self._requested_graph = self._coming = None
+        self._last_snapshot = ()
         self.canvas.show_all()
 
     def _apply_filter(self) -> None:
@@ -406,7 +406,7 @@ class GraphPanel(PanelWidget):
     def _select_item(self, kind: str, key: str) -> None:
         if kind == "node":
             self.canvas.select(GraphSelection("node", key), by_key=True)
-        elif self._asked is not None and self._asked.line_of(key) is not None:
+        elif self._requested_graph is not None and self._requested_graph.line_of(key) is not None:
             self.canvas.select(GraphSelection("topic", key), by_key=True)
         else:
             self._open(key)  # a topic without subscribers has no line
@@ -547,11 +547,11 @@ class GraphPanel(PanelWidget):
         return True
 
     def show_topic(self, name: str) -> None:
-        if self._asked is not None and self._asked.line_of(name) is not None:
+        if self._requested_graph is not None and self._requested_graph.line_of(name) is not None:
             self.canvas.select(GraphSelection("topic", name), by_key=True)
 
     def more_actions(self) -> list[QAction]:
-        return [self._rearrange, self._own]
+        return [self._rearrange, self._internal_topics_action]
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -560,7 +560,7 @@ class GraphPanel(PanelWidget):
     def _fit_card(self) -> None:
         is_wide = self.width() >= self.theme.scaled(MIN_SIDE_CARD_WIDTH)
         direction = QBoxLayout.Direction
-        self._beside.setDirection(direction.LeftToRight if is_wide else direction.TopToBottom)
+        self._page_layout.setDirection(direction.LeftToRight if is_wide else direction.TopToBottom)
         width = round(self.theme.scaled(WIDTH))
         self.card.setMinimumWidth(width if is_wide else 0)
         self.card.setMaximumWidth(width if is_wide else 16_777_215)
@@ -571,7 +571,7 @@ class GraphPanel(PanelWidget):
     def theme_changed(self) -> None:
         super().theme_changed()
         self._fit_card()
-        if self._asked is not None and self._sizes() != self._sizes_asked:
+        if self._requested_graph is not None and self._sizes() != self._requested_sizes:
             self._reset_layout()
 
     def save_state(self) -> dict[str, object]:
@@ -592,7 +592,7 @@ class GraphPanel(PanelWidget):
         if isinstance(hides := state.get("hides_quiet"), bool):
             self._update_choices(hides_quiet=hides)
         if isinstance(shows_own := state.get("own"), bool):
-            self._own.setChecked(shows_own)
+            self._internal_topics_action.setChecked(shows_own)
 
     def dispose(self) -> None:
         self._thread.close()

@@ -177,7 +177,7 @@ class GraphScene:
         )
         led = self.lines if len(layout.routes) <= MAX_AVOIDING_ROUTES else []
         self._crossed = _OccupiedAreas(_segment_rect(*part) for item in led for part in _segments(item))
-        self._taken = _OccupiedAreas([*(item.rect for item in self.nodes.values()), *header_rects])
+        self._occupied_areas = _OccupiedAreas([*(item.rect for item in self.nodes.values()), *header_rects])
 
     def _update_fonts(self) -> None:
         theme = self.theme
@@ -256,12 +256,14 @@ class GraphScene:
         # Tries the longest horizontal segment first, and prefers places that no other line crosses.
         letters = len(line_name(item.line.topics)) + LABEL_RATE_CHARS
         width, height = letters * self.letter + 4, QFontMetricsF(self.label_font).height()
-        rooms = [rect for rect in _label_candidates(item, width, height) if self._taken.is_free(rect)]
+        rooms = [
+            rect for rect in _label_candidates(item, width, height) if self._occupied_areas.is_free(rect)
+        ]
         label_rect = next(
             (rect for rect in rooms if self._crossed.is_free(rect)), rooms[0] if rooms else None
         )
         if label_rect is not None:
-            self._taken.add(label_rect)
+            self._occupied_areas.add(label_rect)
         return label_rect
 
     def dim_unmatched(self, keywords: Sequence[str]) -> None:

@@ -103,14 +103,14 @@ class _LegendEntry(QWidget):
 
     def __init__(self, theme: Theme, kind: str, text: str) -> None:
         super().__init__()
-        self._theme, self._kind, self._words = theme, kind, text
+        self._theme, self._kind, self._text = theme, kind, text
         self.setAccessibleName(text)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self.updateGeometry)
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("small")
-        width = self.SAMPLE_WIDTH + 8 + paint.width_of(font, self._words)
+        width = self.SAMPLE_WIDTH + 8 + paint.width_of(font, self._text)
         return QSize(round(width) + 1, round(max(18.0, paint.height_of(font))))
 
     def minimumSizeHint(self) -> QSize:
@@ -136,5 +136,5 @@ class _LegendEntry(QWidget):
                 [QPointF(tip, middle), QPointF(tip - 9, middle - 4), QPointF(tip - 9, middle + 4)]
             )
         area = QRectF(self.SAMPLE_WIDTH + 8, 0, self.width(), self.height())
-        paint.text_line(painter, area, self._words, theme.font("small"), theme.colour("textSecondary"))
+        paint.text_line(painter, area, self._text, theme.font("small"), theme.colour("textSecondary"))
         painter.end()

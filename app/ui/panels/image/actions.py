@@ -85,7 +85,7 @@ class PictureActions(QObject):
         }
         self._by_name: dict[str, QAction] = {}
         self._by_key: dict[str, QAction] = {}
-        self._listed: list[QAction] = []  # with separators
+        self._menu_actions: list[QAction] = []  # with separators
         for row in ACTION_SPECS:
             action = QAction(f"{_(row.text)}\t{row.keys[0]}", view)
             if row.icon is not None:
@@ -96,8 +96,8 @@ class PictureActions(QObject):
             if row.has_separator:
                 line = QAction(self)
                 line.setSeparator(True)
-                self._listed.append(line)
-            self._listed.append(action)
+                self._menu_actions.append(line)
+            self._menu_actions.append(action)
             self._by_key.update(dict.fromkeys(row.keys, action))
         view.keys = frozenset(self._by_key)
         view.key_pressed.connect(self._trigger)
@@ -108,7 +108,7 @@ class PictureActions(QObject):
 
     def menu_actions(self) -> list[QAction]:
         """Return all actions with separators, for a menu."""
-        return list(self._listed)
+        return list(self._menu_actions)
 
     def set_enabled(self, has_image: bool) -> None:
         """Enable or disable all actions.

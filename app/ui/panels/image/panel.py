@@ -49,11 +49,11 @@ class ImagePanel(PanelWidget):
         self._stream: ImageStream | None = None
         self._watch: Watch | None = None
         self._watched_robot = ""
-        self._places: dict[str, PicturePlacement] = {}
+        self._placements: dict[str, PicturePlacement] = {}
         self._looks: dict[str, PictureLook] = {}
         self.overlays = Overlays(self.session)
         self._revision = (-1, -1)
-        self._there: bool | None = None
+        self._has_image: bool | None = None
         self.choose = IconButton(self.theme, "chevron-down", _("Choose an image topic"), size=26)
         self.choose.setProperty("place", "start")
         self.choose.clicked.connect(self._show_menu)
@@ -99,8 +99,8 @@ class ImagePanel(PanelWidget):
             "point": lambda: self._publish_points(on=not self.points.is_on),
         }
         self.actions_of = PictureActions(self.theme, self.view, own_callbacks)
-        self._look_inside = QAction(self.theme.icon("list-tree"), _("Open in the Inspector"), self)
-        self._look_inside.triggered.connect(self._inspect)
+        self._inspect_action = QAction(self.theme.icon("list-tree"), _("Open in the Inspector"), self)
+        self._inspect_action.triggered.connect(self._inspect)
         self._sequence = QAction(self.theme.icon("film"), _("Record a sequence"), self)
         self._sequence.triggered.connect(self.save_sequence)
         self._line = QAction(self)
@@ -159,10 +159,10 @@ class ImagePanel(PanelWidget):
 
     def _restore_view_of(self, topic: str) -> None:
         # Zoom, rotation and image settings are remembered per topic.
-        if len(self._places) >= MAX_SAVED_VIEWS:
-            self._places.clear()
+        if len(self._placements) >= MAX_SAVED_VIEWS:
+            self._placements.clear()
             self._looks.clear()
-        self.view.place = self._places.setdefault(topic, PicturePlacement())
+        self.view.place = self._placements.setdefault(topic, PicturePlacement())
         self.actions_of.update_checks()
 
     def refresh(self) -> None:
@@ -190,7 +190,7 @@ class ImagePanel(PanelWidget):
             open_message = EmptyAction(_("Open the message"), self._inspect, "list-tree")
             self.empty.set_actions([open_message, self.doctor_action(self._topic)])
         # the playhead is before the topic's first image
-        elif self.session.replay is not None and self._there:
+        elif self.session.replay is not None and self._has_image:
             self.view.clear()
             self._update_empty_state()
 
@@ -217,9 +217,9 @@ class ImagePanel(PanelWidget):
         self._show_page(has_image=False)
 
     def _show_page(self, *, has_image: bool) -> None:
-        if self._there is has_image:
+        if self._has_image is has_image:
             return
-        self._there = has_image
+        self._has_image = has_image
         self.pages.setCurrentWidget(self.shown if has_image else self.empty)
         self.actions_of.set_enabled(has_image)
         self._fit_title()
@@ -227,9 +227,11 @@ class ImagePanel(PanelWidget):
     def _fit_title(self) -> None:
         # Buttons that don't fit are available in the "more" menu.
         for button in (self.freeze, self.tune, self.layers):
-            button.setVisible(self._there is True)
+            button.setVisible(self._has_image is True)
         for button in (self.fit, self.keep):
-            button.setVisible(self._there is True and self.width() >= self.theme.scaled(ALL_BUTTONS_WIDTH))
+            button.setVisible(
+                self._has_image is True and self.width() >= self.theme.scaled(ALL_BUTTONS_WIDTH)
+            )
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -331,11 +333,11 @@ class ImagePanel(PanelWidget):
         open_below(menu, self.choose)
 
     def more_actions(self) -> list[QAction]:
-        for action in (self._look_inside, self._sequence):
+        for action in (self._inspect_action, self._sequence):
             action.setEnabled(bool(self._topic))
         plays = self.session.replay is not None
         self._sequence.setText(_("Save the sequence as files") if plays else _("Record a sequence"))
-        return [*self.actions_of.menu_actions(), self._line, self._sequence, self._look_inside]
+        return [*self.actions_of.menu_actions(), self._line, self._sequence, self._inspect_action]
 
     def save_state(self) -> dict[str, object]:
         return {

@@ -36,7 +36,7 @@ class PointStrip(ArmedStrip):
     """
 
     def __init__(self, context: PanelContext, arm: Callable[[], str], count_text: Callable[[], str]) -> None:
-        self._arm, self._said = arm, count_text
+        self._arm, self._count_text = arm, count_text
         super().__init__(context)
 
     def disarmed_text(self) -> str:
@@ -46,7 +46,7 @@ class PointStrip(ArmedStrip):
         return self._arm()
 
     def summary_text(self) -> str:
-        return self._said()
+        return self._count_text()
 
 
 class PointBar(QWidget):

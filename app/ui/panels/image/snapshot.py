@@ -46,7 +46,7 @@ class SnapshotJob(QObject):
         super().__init__(parent)
         self._folder = folder
         self._thread: threading.Thread | None = None
-        self._made: queue.SimpleQueue[JobResult] = queue.SimpleQueue()
+        self._results: queue.SimpleQueue[JobResult] = queue.SimpleQueue()
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._report)
@@ -90,11 +90,11 @@ class SnapshotJob(QObject):
             result = f"{file_name}: {(error.strerror or str(error)).lower()}"
         except Exception as error:  # noqa: BLE001  otherwise the job would stay busy forever
             result = f"{type(error).__name__}: {error}"
-        self._made.put(result)
+        self._results.put(result)
 
     def _report(self) -> None:
         try:
-            result = self._made.get_nowait()
+            result = self._results.get_nowait()
         except queue.Empty:
             return
         self._timer.stop()

@@ -51,7 +51,7 @@ class InspectorActions(QObject):
         plot: Callable[[str], None],
     ) -> None:
         super().__init__(panel)
-        self._body, self._shown, self._value, self._toast, self._plot = (
+        self._body, self._current_message, self._value, self._toast, self._plot = (
             body,
             current_message,
             value,
@@ -135,7 +135,7 @@ class InspectorActions(QObject):
 
         JSON payloads are copied unchanged, others are converted to JSON.
         """
-        message = self._shown()
+        message = self._current_message()
         if message is None:
             return
         if message.codec == "json":

@@ -29,10 +29,10 @@ class _Sentinel:
     """Type of the sentinels `NO_BASE` and `MISSING`, which are distinct from null."""
 
     def __init__(self, text: str) -> None:
-        self._words = text
+        self._text = text
 
     def __repr__(self) -> str:
-        return self._words
+        return self._text
 
 
 NO_BASE: Final = _Sentinel("nothing to compare with")

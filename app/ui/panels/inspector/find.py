@@ -111,7 +111,7 @@ class FindBar(QWidget):
         self._matches: list[Path] | list[int] | None = None
         self._index: JsonIndex | None = None
         self._more = False
-        self._place = -1
+        self._match_index = -1
         self.field = FindField(theme)
         self.field.textChanged.connect(self.search)
         self.field.step_requested.connect(self.step)
@@ -135,7 +135,7 @@ class FindBar(QWidget):
 
     def search(self, text: str) -> None:
         """Search for a text and select the first match. A text that begins with ``$`` is a query."""
-        self._place = -1
+        self._match_index = -1
         self._matches = []
         is_query = self.is_query
         for button in (self.before, self.after):
@@ -166,12 +166,12 @@ class FindBar(QWidget):
         if not text or self.is_query:
             return
         if self._matches is None:
-            last = self._place
+            last = self._match_index
             self._search(text)
-            self._place = min(last, len(self.matches) - 1)
+            self._match_index = min(last, len(self.matches) - 1)
         if self.matches:
-            self._place = (self._place + by) % len(self.matches)
-            match = self.matches[self._place]
+            self._match_index = (self._match_index + by) % len(self.matches)
+            match = self.matches[self._match_index]
             is_offset = isinstance(match, int) and self._index is not None
             self.match_selected.emit(self._index.path_to(match) if is_offset else match)  # type: ignore[union-attr, arg-type]
         self._update_count(is_invalid=not self.matches)
@@ -192,7 +192,7 @@ class FindBar(QWidget):
     def _update_count(self, *, is_invalid: bool) -> None:
         total = f"{len(self.matches)}{'+' if self._more else ''}"
         text = _("{place} of {total}") if self.matches else pgettext("found", "none")
-        text = text.format(place=self._place + 1, total=total)
+        text = text.format(place=self._match_index + 1, total=total)
         self.field.show_count(text if self.field.text() else "")
         self.set_invalid(is_invalid=is_invalid)
 

@@ -88,20 +88,20 @@ class Legend(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._words = _(self.TEXT)
+        self._text = _(self.TEXT)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(_("A bar on the left marks changed values"))
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("small")
-        return QSize(round(paint.width_of(font, self._words)) + 10, max(18, round(paint.height_of(font)) + 2))
+        return QSize(round(paint.width_of(font, self._text)) + 10, max(18, round(paint.height_of(font)) + 2))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         colour = self._theme.colour("changed")
         painter.fillRect(QRectF(0, self.height() / 2 - 7, 3, 14), colour)
         text_rect = QRectF(self.rect()).adjusted(7, 0, 3, 0)
-        paint.text_line(painter, text_rect, self._words, self._theme.font("small"), colour)
+        paint.text_line(painter, text_rect, self._text, self._theme.font("small"), colour)
         painter.end()
 
 

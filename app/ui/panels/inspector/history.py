@@ -38,7 +38,7 @@ class HistoryStrip(QWidget):
         self.at: int | None = None
         self._feed: SeriesFeed | None = None
         self._topic = ""
-        self._said: tuple[int, int, int | None] = (0, 0, None)
+        self._last_state: tuple[int, int, int | None] = (0, 0, None)
         self._ticks = 0
         self.back = IconButton(theme, "step-back", _("Previous message"), size=24)
         self.track = SliderTrack(theme, 0)
@@ -140,9 +140,9 @@ class HistoryStrip(QWidget):
         is_needed = len(messages) > 1 or self.at is not None
         interval_ticks = UPDATE_TICKS if is_busy else 2 * UPDATE_TICKS
         due = at_once or is_needed is self.isHidden() or self._ticks >= interval_ticks
-        if state == self._said or not due:
+        if state == self._last_state or not due:
             return
-        self._said, self._ticks = state, 0
+        self._last_state, self._ticks = state, 0
         show_when(self, is_needed)
         self.track.blockSignals(True)
         self.track.setRange(0, max(0, len(messages) - 1))

@@ -58,7 +58,7 @@ class ObjectsView(QWidget):
         super().__init__()
         self._theme, self._toast = theme, toast
         self._value: object = None
-        self._wanted: Steps = ()
+        self._requested_steps: Steps = ()
         self._steps: Steps | None = None
         self._columns: tuple[Steps, ...] = ()
         self._sorted_at = 0.0
@@ -100,7 +100,7 @@ class ObjectsView(QWidget):
 
     def reset(self) -> None:
         """Reset the table for another topic."""
-        self._wanted, self._steps, self._value = (), None, None
+        self._requested_steps, self._steps, self._value = (), None, None
         self._remove_table()
 
     def select_list(self, steps: Steps) -> None:
@@ -109,7 +109,7 @@ class ObjectsView(QWidget):
         Args:
             steps: Path of the list. If there is no list at this path, the nearest list above it is shown.
         """
-        self._wanted = steps
+        self._requested_steps = steps
 
     def show_message(self, value: object, now: float) -> None:
         """Show the selected list of a message, or its first list.
@@ -140,9 +140,9 @@ class ObjectsView(QWidget):
         self.choose.setVisible(False)
 
     def _find_list(self, value: object) -> Steps | None:
-        for length in range(len(self._wanted), -1, -1):
-            if is_list_of_objects(value_at(value, self._wanted[:length])):
-                return self._wanted[:length]
+        for length in range(len(self._requested_steps), -1, -1):
+            if is_list_of_objects(value_at(value, self._requested_steps[:length])):
+                return self._requested_steps[:length]
         paths = lists_of_objects(value, 1)
         return paths[0] if paths else None
 

@@ -20,12 +20,12 @@ class UpdateLimiter:
     """
 
     def __init__(self, burst: int = MAX_BURST, hz: float = MAX_UPDATE_HZ) -> None:
-        self._most, self._hz = float(burst), hz
+        self._capacity, self._hz = float(burst), hz
         self.reset()
 
     def reset(self) -> None:
         """Refill the bucket, so that the next update is allowed immediately."""
-        self._left, self._asked_s = self._most, 0.0
+        self._tokens, self._refilled_s = self._capacity, 0.0
 
     def try_acquire(self, now_s: float) -> bool:
         """Take a token if an update is allowed, and return True if it is.
@@ -33,11 +33,11 @@ class UpdateLimiter:
         Args:
             now_s: Monotonic time in s.
         """
-        grown = max(0.0, now_s - self._asked_s) * self._hz
-        self._left, self._asked_s = min(self._most, self._left + grown), now_s
-        if self._left < 1:
+        grown = max(0.0, now_s - self._refilled_s) * self._hz
+        self._tokens, self._refilled_s = min(self._capacity, self._tokens + grown), now_s
+        if self._tokens < 1:
             return False
-        self._left -= 1
+        self._tokens -= 1
         return True
 
     def drain(self, now_s: float) -> None:
@@ -46,4 +46,4 @@ class UpdateLimiter:
         Args:
             now_s: Monotonic time in s.
         """
-        self._left, self._asked_s = 0.0, now_s
+        self._tokens, self._refilled_s = 0.0, now_s

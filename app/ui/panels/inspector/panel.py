@@ -49,17 +49,17 @@ class InspectorPanel(PanelWidget):
         self.clock = time.monotonic
         self._topic = ""
         self._watch: Watch | None = None
-        self._shown: Message | None = None
+        self._shown_message: Message | None = None
         self._allowed: Message | None = None  # large message that the user asked to decode
         self._reading: ReadResult | None = None  # decoded message in the tree
-        self._raw_wanted = self._table_wanted = False
+        self._is_raw_mode = self._is_table_mode = False
         self._since_ns = 0  # start of the subscription
         self._pace, self._fades = UpdateLimiter(), UpdateLimiter(burst=1, hz=FADE_REPAINT_HZ)
-        self._facts_of: tuple[Message | None, str] = (None, "")
+        self._info_cache: tuple[Message | None, str] = (None, "")
         self._value: object = None
         self._before: object = NO_BASE  # previous value of the topic, for comparison
         self._pinned: object = NO_BASE
-        self._pinned_words = ""
+        self._pinned_text = ""
         self.reader = MessageReader()
         self.body = InspectorBody(self.theme, self._search_source, context.show_toast)
         self._make_header()
@@ -86,7 +86,7 @@ class InspectorPanel(PanelWidget):
         self.history.selection_changed.connect(self._history_selected)
         self.finder.query_changed.connect(self._query_changed)
         self.own = InspectorActions(
-            self.theme, self, body, lambda: self._shown, self._full_value,
+            self.theme, self, body, lambda: self._shown_message, self._full_value,
             find=self.focus_filter, toast=self.context.show_toast,
             plot=lambda path: self.context.plot(self._topic, path),
         )  # fmt: skip
@@ -114,9 +114,9 @@ class InspectorPanel(PanelWidget):
         self._close_watch()
         self.history.reset()
         self._topic = name
-        self._shown = self._allowed = self._reading = None
+        self._shown_message = self._allowed = self._reading = None
         self._value, self._before, self._pinned = None, NO_BASE, NO_BASE
-        self._raw_wanted = False
+        self._is_raw_mode = False
         self.model.clear()
         self.query.discard_pending()
         self.body.objects.reset()
@@ -148,18 +148,18 @@ class InspectorPanel(PanelWidget):
         if (
             topic is not None
             and newest is not None
-            and newest is not self._shown
+            and newest is not self._shown_message
             and not self.is_display_fixed
         ):
             is_shown = self._pace.try_acquire(self.clock())
             if is_shown:
                 self._show_message(newest)
-        elif recorded and newest is None and self._shown is not None and not self.is_display_fixed:
+        elif recorded and newest is None and self._shown_message is not None and not self.is_display_fixed:
             self._show_no_message()
         if self.body.page == NOTHING:
             self._show_waiting(topic)
         reading = self.reader.pop_result()
-        if reading is not None and not self._raw_wanted:
+        if reading is not None and not self._is_raw_mode:
             self._show_decoded(reading)
         query_result = self.query.pop_result(self.clock())
         if query_result is not None and self._value is not None:
@@ -181,7 +181,7 @@ class InspectorPanel(PanelWidget):
     def _show_no_message(self) -> None:
         # The playhead is before the topic's first message.
         self.reader.clear()
-        self._shown = self._allowed = self._reading = None
+        self._shown_message = self._allowed = self._reading = None
         self._value, self._before = None, NO_BASE
         self.model.clear()
         self.query.discard_pending()
@@ -198,7 +198,7 @@ class InspectorPanel(PanelWidget):
 
     def _show_message(self, message: Message) -> None:
         large = message.size_bytes > LARGE_BYTES and message.codec != "image"
-        if self._raw_wanted:
+        if self._is_raw_mode:
             self._show_raw(message, "")
         elif large and message.codec != "json" and message is not self._allowed:
             self._offer_large(message)
@@ -213,7 +213,7 @@ class InspectorPanel(PanelWidget):
             self.reader.submit(message)
         elif not self.reader.submit_throttled(message, self.clock()):
             return
-        if self._shown is None or self.body.page == LARGE:
+        if self._shown_message is None or self.body.page == LARGE:
             self.body.show_large(message.size_bytes, _("Reading the message…"))
             self._show_page(LARGE)
 
@@ -222,8 +222,8 @@ class InspectorPanel(PanelWidget):
         if reading.error is not None:
             self._show_raw(message, reading.error)
             return
-        is_new = message is not self._shown
-        self._shown, self._reading = message, reading
+        is_new = message is not self._shown_message
+        self._shown_message, self._reading = message, reading
         if is_new:
             self._before = self._value if self._value is not None else NO_BASE
             topic = self.session.topic(self._topic)
@@ -236,24 +236,24 @@ class InspectorPanel(PanelWidget):
         self._value = reading.value
         self._show_value()
         self.foot.show_info(self._message_info(message))
-        self._show_page(TABLE if self._table_wanted else TREE)
+        self._show_page(TABLE if self._is_table_mode else TREE)
 
     def _message_info(self, message: Message) -> str:
         # Cached per message, because latency and age are those at its arrival.
-        if message is not self._facts_of[0]:
+        if message is not self._info_cache[0]:
             kind = find_kind(split_key(self._topic)[0])
             recorded = self.session.replay is not None
-            self._facts_of = (message, message_info(message, self._since_ns, kind, recorded=recorded))
-        return self._facts_of[1]
+            self._info_cache = (message, message_info(message, self._since_ns, kind, recorded=recorded))
+        return self._info_cache[1]
 
     def _show_value(self) -> None:
-        if self._shown is None or self._value is None:
+        if self._shown_message is None or self._value is None:
             return
         if self.query.has_query:
             self.strip.hide()
             self.query.request_evaluation(self._value)
             return
-        if self._table_wanted:
+        if self._is_table_mode:
             self.strip.hide()
             self.body.objects.show_message(self._value, self.clock())
             return
@@ -261,7 +261,7 @@ class InspectorPanel(PanelWidget):
         base: object = NO_BASE
         if self.is_comparing:
             base = self._pinned if self.pin.isChecked() else self._before
-            compared_with = self._pinned_words if self.pin.isChecked() else _(BEFORE)
+            compared_with = self._pinned_text if self.pin.isChecked() else _(BEFORE)
             self.strip.set_summary(compared_with, *count_changes(self._value, base))
         self.strip.setVisible(self.is_comparing and self.body.page == TREE)
         only = self.is_comparing and base is not NO_BASE and self.strip.only.isChecked()
@@ -270,7 +270,7 @@ class InspectorPanel(PanelWidget):
             self.tree.expand_small(MAX_EXPANDED_ROWS)
 
     def _show_query_result(self, result: QueryResult) -> None:
-        if self._table_wanted:
+        if self._is_table_mode:
             self.body.objects.show_query_objects(result.values.items(), self.clock())
             return
         first = not self.model.rowCount()
@@ -279,7 +279,7 @@ class InspectorPanel(PanelWidget):
             self.tree.expand_small(MAX_EXPANDED_ROWS)
 
     def _show_raw(self, message: Message, reason: str) -> None:
-        self._shown = message
+        self._shown_message = message
         self.foot.show_info(self._message_info(message))
         self.bytes.show_bytes(message.data)
         text = _("Can't decode the message as {codec}: {reason}.").format(codec=message.codec, reason=reason)
@@ -287,7 +287,7 @@ class InspectorPanel(PanelWidget):
         self._show_page(RAW)
 
     def _offer_large(self, message: Message) -> None:
-        self._shown = message
+        self._shown_message = message
         explanation = _("{codec} messages larger than 1 MB are decoded only on request.").format(
             codec=message.codec
         )
@@ -296,11 +296,11 @@ class InspectorPanel(PanelWidget):
 
     def _decode_large(self) -> None:
         # Also freezes the panel, because the next message would replace this one.
-        if self._shown is not None:
-            self._allowed = self._shown
+        if self._shown_message is not None:
+            self._allowed = self._shown_message
             self.freeze.setChecked(True)
-            self.reader.submit(self._shown)
-            self.body.show_large(self._shown.size_bytes, _("Reading the message…"))
+            self.reader.submit(self._shown_message)
+            self.body.show_large(self._shown_message.size_bytes, _("Reading the message…"))
 
     def _show_page(self, page: int) -> None:
         self.body.show_page(page, comparing=self.is_comparing)
@@ -333,7 +333,7 @@ class InspectorPanel(PanelWidget):
         return (self.compare.isChecked() or self.pin.isChecked()) and not self.query.has_query
 
     def awaited_topic(self) -> str:
-        return self._topic if self._shown is None else ""
+        return self._topic if self._shown_message is None else ""
 
     def blockers(self) -> list[Blocker]:
         return [paused_blocker(self.title(), self._resume_updates)] if self.is_display_fixed else []
@@ -344,11 +344,11 @@ class InspectorPanel(PanelWidget):
 
     def _pin(self, pinned: bool) -> None:
         self._pinned = self._value if pinned and self._value is not None else NO_BASE
-        stamp_ns = self._shown.stamp_ns if self._shown is not None else None
-        self._pinned_words = _(PINNED)
+        stamp_ns = self._shown_message.stamp_ns if self._shown_message is not None else None
+        self._pinned_text = _(PINNED)
         if self.history.at is not None and stamp_ns is not None and 0 <= stamp_ns < 2**62:
             time_text = clock_text(stamp_ns)
-            self._pinned_words = _("{message} of {clock}").format(message=_(PINNED), clock=time_text)
+            self._pinned_text = _("{message} of {clock}").format(message=_(PINNED), clock=time_text)
         self._show_value()
 
     def _history_selected(self) -> None:
@@ -370,14 +370,14 @@ class InspectorPanel(PanelWidget):
         self._show_value()
 
     def _set_mode(self, mode: str) -> None:
-        self._raw_wanted, self._table_wanted = mode == "raw", mode == "table"
-        if self._table_wanted and self.body.page == TREE and not self.query.has_query:
+        self._is_raw_mode, self._is_table_mode = mode == "raw", mode == "table"
+        if self._is_table_mode and self.body.page == TREE and not self.query.has_query:
             index = self.tree.currentIndex()
             self.body.objects.select_list(steps_of(self.model.node(index)) if index.isValid() else ())
-        displayed = self._shown
+        displayed = self._shown_message
         if displayed is None:
             return
-        if self._reading is not None and self._reading.message is displayed and not self._raw_wanted:
+        if self._reading is not None and self._reading.message is displayed and not self._is_raw_mode:
             self._show_decoded(self._reading)
         elif self.session.topic(self._topic) is not None:
             self._show_message(displayed)
@@ -398,7 +398,7 @@ class InspectorPanel(PanelWidget):
 
     def _full_value(self) -> object:
         # A query or the table may show only parts of the message.
-        shows_parts = self.query.has_query or self._table_wanted
+        shows_parts = self.query.has_query or self._is_table_mode
         return self._value if shows_parts else self.model.value()
 
     def _search_source(self) -> tuple[object, JsonIndex | None]:
@@ -438,7 +438,7 @@ class InspectorPanel(PanelWidget):
             "topic": self._topic,
             "compare": self.compare.isChecked(),
             "changes_only": self.strip.only.isChecked(),
-            "table": self._table_wanted,
+            "table": self._is_table_mode,
             "query": self.finder.field.text() if self.finder.is_query else "",
         }
 
@@ -448,7 +448,7 @@ class InspectorPanel(PanelWidget):
             self.show_topic(topic)
         self.compare.setChecked(state.get("compare") is True)
         self.strip.only.setChecked(state.get("changes_only") is True)
-        self._table_wanted = state.get("table") is True
+        self._is_table_mode = state.get("table") is True
         query = state.get("query")
         if isinstance(query, str) and query.startswith("$"):
             self.finder.field.setText(query)

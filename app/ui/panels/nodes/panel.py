@@ -75,10 +75,10 @@ class NodesPanel(NetworkTable[NodeRow]):
         for widget, stretch in parts:
             column.addWidget(widget, stretch)
         self._opened: set[str] = set()
-        self._seen: tuple[object, ...] = ()
+        self._last_snapshot: tuple[object, ...] = ()
         self._values = -1
         self._ticks = 0
-        self._gone = False
+        self._has_gone_nodes = False
 
     def make_model(self) -> TableModel[NodeRow]:
         return TableModel(columns(self._is_own), lambda row: row.key)
@@ -97,10 +97,10 @@ class NodesPanel(NetworkTable[NodeRow]):
         self._ticks += 1
         order = self.table.order.column
         due = order is not None and order.name in CHANGING_COLUMNS and self._ticks % SORT_TICKS == 0
-        if due or self._snapshot() != self._seen:
+        if due or self._snapshot() != self._last_snapshot:
             self.rebuild()
         values = self.session.nodes.values_revision + self.session.networks.values_revision
-        if values != self._values or (self._gone and self._ticks % SORT_TICKS == 0):
+        if values != self._values or (self._has_gone_nodes and self._ticks % SORT_TICKS == 0):
             self._values = values
             self.table.refresh_visible()
         self.parameters.refresh()
@@ -110,12 +110,12 @@ class NodesPanel(NetworkTable[NodeRow]):
         return session.nodes.revision, session.networks.revision, session.master.kind
 
     def source_changed(self) -> None:
-        self._seen, self._values = (), -1
+        self._last_snapshot, self._values = (), -1
 
     def rebuild(self) -> None:
         nodes = [*self.session.nodes, *self.session.networks.nodes]
-        self._seen = self._snapshot()
-        self._gone = any(node.gone_s is not None for node in nodes)
+        self._last_snapshot = self._snapshot()
+        self._has_gone_nodes = any(node.gone_s is not None for node in nodes)
         keywords = self.filter_words()
         matches = [node for node in nodes if all(keyword in _haystack(node) for keyword in keywords)]
         self.model.set_rows(rows_of(matches, self._opened, self.table.order, self._rate_text))

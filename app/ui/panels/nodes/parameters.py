@@ -60,8 +60,8 @@ class ParametersView(QWidget):
         super().__init__()
         self.theme, self.parameters = theme, parameters
         self.clock: Callable[[], float] = time.monotonic
-        self._seen: tuple[object, ...] = ()
-        self._edited = self._waits = False
+        self._last_state: tuple[object, ...] = ()
+        self._edited = self._is_awaiting_reply = False
         self._fades_until = 0.0
         self.title = ElidedLabel("small", "textSecondary")
         self.title.setContentsMargins(12, 5, 12, 3)
@@ -140,9 +140,9 @@ class ParametersView(QWidget):
         if node is None:
             return
         state = (parameters.revision, node.key, node.gone_s is None, node.can_set_parameters, node.is_stale)
-        if state != self._seen:
-            another = not self._seen or state[1] != self._seen[1]
-            self._seen = state
+        if state != self._last_state:
+            another = not self._last_state or state[1] != self._last_state[1]
+            self._last_state = state
             if another:
                 self._edited = False
             self.title.setText(self._title_text())
@@ -189,8 +189,8 @@ class ParametersView(QWidget):
         if parameter.kind == "bool" and not options:
             options = ["false", "true"]
         is_pending = self.parameters.setting == parameter.name
-        if self._waits and not self.parameters.setting:
-            self._waits = False
+        if self._is_awaiting_reply and not self.parameters.setting:
+            self._is_awaiting_reply = False
             self._edited = bool(self.parameters.refusal)
         self._show_editor(parameter, options)
         self.field.setEnabled(not disabled_reason)
@@ -256,7 +256,7 @@ class ParametersView(QWidget):
         by_choice = self.editors.currentIndex() == CHOICE
         self.parameters.set(parameter.name, self.choice.value if by_choice else self.field.text())
         self._edited = True  # keep the typed text until the node has confirmed it
-        self._waits = bool(self.parameters.setting)
+        self._is_awaiting_reply = bool(self.parameters.setting)
         self._show_selected()
 
 
@@ -265,7 +265,7 @@ class ValueField(QLineEdit):
 
     def __init__(self, theme: Theme, on_submit: Callable[[], object], leave: Callable[[], object]) -> None:
         super().__init__()
-        self._take, self._leave = on_submit, leave
+        self._on_submit, self._leave = on_submit, leave
         self.setProperty("focusRadius", theme.radius("control"))
         self.setMinimumWidth(60)
         ContextMenuFilter(theme, self)
@@ -283,7 +283,7 @@ class ValueField(QLineEdit):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-            self._take()
+            self._on_submit()
         elif event.key() == Qt.Key.Key_Escape:
             self._leave()
         else:

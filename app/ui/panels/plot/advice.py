@@ -27,20 +27,20 @@ class PlotAdvice(QWidget):
         super().__init__()
         self.topic = ""
         """Topic without data, or ""."""
-        self._words = label("", "small", role="warn", wrap=True)
-        self._words.setMinimumWidth(0)
+        self._label = label("", "small", role="warn", wrap=True)
+        self._label.setMinimumWidth(0)
         self.why = LinkButton(theme, _("Why is nothing shown?"))
         self.why.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.why.clicked.connect(lambda: on_click(self.topic))
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 2, 12, 2)
         row.setSpacing(8)
-        row.addWidget(self._words, 1)
+        row.addWidget(self._label, 1)
         row.addWidget(self.why, 0, Qt.AlignmentFlag.AlignTop)
 
     def text(self) -> str:
         """Return the text of the hint, or ""."""
-        return self._words.text()
+        return self._label.text()
 
     def show_for(self, curves: Curves, plot_curves: Sequence[PlotCurve]) -> None:
         """Show the hint that applies to some curves, or hide the line.
@@ -57,7 +57,7 @@ class PlotAdvice(QWidget):
         self.topic = topics[0] if topics else ""
         if self.topic:
             message = _("No values that can be plotted yet.")
-        self._words.setText(message)
+        self._label.setText(message)
         show_when(self.why, bool(self.topic))
         show_when(self, bool(message))
 

@@ -207,7 +207,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         # like `marks`, at fixed times on dense lines, which have no dashes
         self.signs: list[tuple[PlotCurve, float, float]] = []
         self._lines: dict[str, pg.PlotCurveItem] = {}
-        self._held: tuple[str, QPointF] | None = None
+        self._drag_state: tuple[str, QPointF] | None = None
         self.ranges = {"left": ValueRange(), "right": ValueRange()}
         self._build()
         self.setAcceptDrops(True)
@@ -499,7 +499,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.setFocus(Qt.FocusReason.MouseFocusReason)
         position = event.position()
         if event.button() == Qt.MouseButton.LeftButton:
-            self._held = (self._cursor_at(position) or "", position)
+            self._drag_state = (self._cursor_at(position) or "", position)
             event.accept()
         else:
             event.ignore()
@@ -507,21 +507,21 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         position = event.position()
         self.mouse_s = self.time_at(position.x()) if self.area.contains(position) else None
-        if self._held is None:
+        if self._drag_state is None:
             is_over_cursor = self._cursor_at(position) is not None
             self.setCursor(Qt.CursorShape.SizeHorCursor if is_over_cursor else Qt.CursorShape.ArrowCursor)
             return
-        name, before = self._held
+        name, before = self._drag_state
         if name:
             self.cursor_moved.emit(name, self.time_at(position.x()))
         else:
             self.moved.emit(self.time_at(before.x()) - self.time_at(position.x()))
             if event.modifiers() & Qt.KeyboardModifier.ControlModifier:
                 self.scale_values(shift=(position.y() - before.y()) / max(1.0, self.area.height()))
-        self._held = (name, position)
+        self._drag_state = (name, position)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        self._held = None
+        self._drag_state = None
         event.accept()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:

@@ -44,8 +44,8 @@ class CsvWriter:
 
     def __init__(self, path: Path, columns: Sequence[CsvColumn], origin_ns: int) -> None:
         self.path = path
-        self._done: str | None = None
-        self._given_up = threading.Event()
+        self._result: str | None = None
+        self._cancelled = threading.Event()
         self._thread = threading.Thread(
             target=self._run, args=(columns, origin_ns), name="studio-plot-export", daemon=True
         )
@@ -55,26 +55,26 @@ class CsvWriter:
         try:
             write_atomically(self.path, self._encoded_lines(columns, origin_ns))
         except OSError as error:
-            self._done = error.strerror or type(error).__name__
+            self._result = error.strerror or type(error).__name__
         except MemoryError:
-            self._done = _("not enough memory")
+            self._result = _("not enough memory")
         else:
-            self._done = ""
+            self._result = ""
 
     def _encoded_lines(self, columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[bytes]:
         for lines in csv_chunks(columns, origin_ns):
-            if self._given_up.is_set():
+            if self._cancelled.is_set():
                 raise OSError(errno.ECANCELED, os.strerror(errno.ECANCELED))
             yield lines.encode()
 
     def pop_result(self) -> str | None:
         """Return None while the thread is writing, "" on success, or the reason of the failure."""
-        return self._done
+        return self._result
 
     def close(self) -> None:
         """Wait some seconds for the thread to finish, then cancel it and remove the partial file."""
         self._thread.join(CLOSE_TIMEOUT_S)
-        self._given_up.set()
+        self._cancelled.set()
         self._thread.join(CLOSE_TIMEOUT_S)
 
 
@@ -171,7 +171,7 @@ class PlotExport:
         curves: Callable[[], Sequence[PlotCurve]],
         visible_range: Callable[[], tuple[float, float]],
     ) -> None:
-        self._context, self._parts, self._curves, self._shown = context, parts, curves, visible_range
+        self._context, self._parts, self._curves, self._visible_range = context, parts, curves, visible_range
         self._writer: CsvWriter | None = None
 
     def menu(self, parent: QWidget) -> Menu:
@@ -212,7 +212,7 @@ class PlotExport:
             return
         curves = [each.curve for each in self._curves() if not each.is_hidden]
         origin_ns = self._context.session.series.origin_ns
-        self._writer = CsvWriter(path, columns_of(curves, *self._shown()), origin_ns)
+        self._writer = CsvWriter(path, columns_of(curves, *self._visible_range()), origin_ns)
 
     def poll(self) -> None:
         """Report the result of a CSV export once it has finished; call on every tick."""

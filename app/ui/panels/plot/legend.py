@@ -26,7 +26,7 @@ class LegendStats:
     def __init__(self) -> None:
         self.begin_s = self.end_s = 0.0
         self.cursors: tuple[float, float] | None = None
-        self._kept: dict[str, RangeStats] = {}
+        self._stats_cache: dict[str, RangeStats] = {}
 
     def set_range(self, begin_s: float, end_s: float, cursors: tuple[float, float] | None) -> None:
         """Set the time range of the statistics.
@@ -37,13 +37,15 @@ class LegendStats:
             cursors: Times of cursors A and B in s, or None without cursors.
         """
         self.begin_s, self.end_s, self.cursors = begin_s, end_s, cursors
-        self._kept.clear()
+        self._stats_cache.clear()
 
     def stats_for(self, plot_curve: PlotCurve) -> RangeStats:
         """Return minimum, maximum and mean of a curve."""
-        stats = self._kept.get(plot_curve.name)
+        stats = self._stats_cache.get(plot_curve.name)
         if stats is None:
-            stats = self._kept[plot_curve.name] = plot_curve.curve.samples.stats(self.begin_s, self.end_s)
+            stats = self._stats_cache[plot_curve.name] = plot_curve.curve.samples.stats(
+                self.begin_s, self.end_s
+            )
         return stats
 
     def value_at_cursor(self, plot_curve: PlotCurve, which: int) -> float | str | None:

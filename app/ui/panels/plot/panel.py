@@ -66,7 +66,7 @@ class PlotPanel(PanelWidget):
         self.figures = LegendStats()
         self._ticks = 0
         self._due = True
-        self._since_figures = IDLE_STATS_UPDATE_TICKS
+        self._ticks_since_stats = IDLE_STATS_UPDATE_TICKS
         self._pace = DrawThrottle()
         self._points = (0, True)
         self._last_cursor = "A"
@@ -262,8 +262,8 @@ class PlotPanel(PanelWidget):
             self._due = False
             with self._pace.measure(self.canvas):
                 self._draw()
-        self._since_figures += 1
-        if self._since_figures >= (
+        self._ticks_since_stats += 1
+        if self._ticks_since_stats >= (
             STATS_UPDATE_TICKS if drawn else IDLE_STATS_UPDATE_TICKS
         ):  # in the same repaint as the curves
             self._update_stats()
@@ -322,7 +322,7 @@ class PlotPanel(PanelWidget):
         self.canvas.marks = marks
 
     def _update_stats(self) -> None:
-        self._since_figures = 0
+        self._ticks_since_stats = 0
         cursors = self.canvas.cursors
         both = (cursors["A"], cursors["B"]) if len(cursors) == 2 else None
         begin_s, end_s = (min(both), max(both)) if both else (self.canvas.begin_s, self.canvas.end_s)
@@ -347,7 +347,7 @@ class PlotPanel(PanelWidget):
         topics = {topic for each in self.shown for topic in topics_of(each.curve.source)}
         self.set_title(_("Plot"), next(iter(topics)) if len(topics) == 1 else "")
         self.table.viewport().update()
-        self._since_figures = IDLE_STATS_UPDATE_TICKS
+        self._ticks_since_stats = IDLE_STATS_UPDATE_TICKS
         self._schedule_redraw()
 
     def _fit_table(self) -> None:

@@ -139,7 +139,7 @@ class AddCurveField(SearchField):
         self.offers = FieldCatalog(session)
         self.sentence = ""
         self._matches: _MatchPopup | None = None
-        self._known: dict[str, PlottableField] = {}
+        self._offered_fields: dict[str, PlottableField] = {}
         self._timer = QTimer(self)
         self._timer.setInterval(REFRESH_MS)
         self._timer.timeout.connect(self._refresh_fields)
@@ -181,7 +181,7 @@ class AddCurveField(SearchField):
         """Unsubscribe from topics and hide the list."""
         self._timer.stop()
         self.offers.close()
-        self._known.clear()
+        self._offered_fields.clear()
         if self._matches is not None:
             self._matches.hide()
 
@@ -210,19 +210,19 @@ class AddCurveField(SearchField):
     def _refresh_fields(self) -> None:
         # Refreshes fields and values.
         self.offers.open()
-        before = len(self._known)
+        before = len(self._offered_fields)
         self._read_fields()
-        if len(self._known) != before:
+        if len(self._offered_fields) != before:
             self._search(keep_selection=True)
             return
         match_list = self.matches.list
         for line in list(match_list.lines.lines):
-            field = None if isinstance(line, Heading) else self._known.get(line.entry.text)
+            field = None if isinstance(line, Heading) else self._offered_fields.get(line.entry.text)
             if field is not None and not isinstance(line, Heading):
                 match_list.update_entry(line.entry.id, _value_note(field))
 
     def _read_fields(self) -> None:
-        self._known = dict(self.offers.fields())
+        self._offered_fields = dict(self.offers.fields())
 
     def _search(self, *_text: object, keep_selection: bool = False) -> None:
         if not self.hasFocus():
@@ -242,7 +242,7 @@ class AddCurveField(SearchField):
     def _lines(self, typed: str) -> tuple[list[Line], int]:
         fields = [
             Entry(f"topic:{text}", text, ICONS[matches.kind], _value_note(matches))
-            for text, matches in self._known.items()
+            for text, matches in self._offered_fields.items()
         ]
         if typed:
             matches, count = Finder(fields).find(typed, MAX_SHOWN)
@@ -317,7 +317,7 @@ class AddCurveField(SearchField):
         start = max(typed.rfind(sign) for sign in "( ,+*") + 1
         before, last = typed[:start], typed[start:]
         candidates = [
-            *self._known,
+            *self._offered_fields,
             *self.offers.names(),
             *(f"{name}(" for name in (*FUNCTIONS, *WINDOW_FUNCTIONS)),
         ]
@@ -349,7 +349,7 @@ class AddCurveField(SearchField):
         # A complete expression takes precedence over the selected match.
         typed = self.text().strip()
         entry = self._matches.list.entry if self._matches is not None and self._matches.isVisible() else None
-        is_whole = typed in self._known or any(sign in typed for sign in "(+*") or " " in typed
+        is_whole = typed in self._offered_fields or any(sign in typed for sign in "(+*") or " " in typed
         text = typed if is_whole or entry is None else entry.text
         if text:
             self.add_requested.emit(text, right)

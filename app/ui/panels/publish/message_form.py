@@ -159,13 +159,13 @@ class MessageForm(QWidget):
         fields.setVerticalSpacing(8)
         fields.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDTH_PX)))
         fields.setColumnStretch(1, 1)
-        self._value_words = _make_name_label(_("Values"))
+        self._values_label = _make_name_label(_("Values"))
         rows = (
             (_make_name_label(_("Name")), self.name),
             (_make_name_label(_("Topic")), self.topic),
             (_make_name_label(_("Type")), self.kind),
         )
-        for index, (name_label, field) in enumerate((*rows, (self._value_words, self.values))):
+        for index, (name_label, field) in enumerate((*rows, (self._values_label, self.values))):
             if isinstance(field, QLineEdit):
                 name_label.setBuddy(field)
             fields.addWidget(name_label, index, 0, Qt.AlignmentFlag.AlignTop)
@@ -243,7 +243,7 @@ class MessageForm(QWidget):
         self.edit.mark_line(fault.line if fault is not None else 0)
         self.tidy.setEnabled(is_json and fault is None and not self.read.places)
         self.values.show_fields(self.read.manual_placeholders, dict(message.values))
-        for widget in (self._value_words, self.values):
+        for widget in (self._values_label, self.values):
             widget.setVisible(bool(self.read.manual_placeholders))
 
     def show_problem(self, problem: str) -> None:

@@ -40,9 +40,9 @@ class PublishPanel(PanelWidget):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Publish"))
         self.acting = context.session.acting
-        self._seen: tuple[object, ...] = ()
+        self._last_state: tuple[object, ...] = ()
         self._ticks = 0
-        self._wanted = ""
+        self._requested_id = ""
         self._peek: Watch | None = None
         self._peeked = ""
         self.count = label("", "small", role="textSecondary")
@@ -113,8 +113,8 @@ class PublishPanel(PanelWidget):
         self._poll_peek()
         acting, topics = self.acting, self.session.live.topics
         state = (acting.shelf.revision, acting.revision, acting.arming.revision, topics.revision)
-        if state != self._seen:
-            self._seen = state
+        if state != self._last_state:
+            self._last_state = state
             self._rebuild()
             self.form.topic.set_completions(sorted(topic.name for topic in topics.existing_topics()))
         elif self._ticks % STATE_UPDATE_TICKS == 0:
@@ -122,7 +122,7 @@ class PublishPanel(PanelWidget):
             self.list.refresh_visible()
 
     def source_changed(self) -> None:
-        self._seen = ()
+        self._last_state = ()
         self._end_peek()
 
     def _rebuild(self) -> None:
@@ -131,10 +131,10 @@ class PublishPanel(PanelWidget):
         rows = [
             each
             for each in messages
-            if each.id == self._wanted
+            if each.id == self._requested_id
             or all(keyword in f"{each.name} {each.topic}".casefold() for keyword in keywords)
         ]
-        selected = self._wanted or self.list.selected_key() or ""
+        selected = self._requested_id or self.list.selected_key() or ""
         model = self.list.model()
         model.set_rows(rows)  # type: ignore[attr-defined]  # always a TableModel
         if rows:
@@ -142,7 +142,7 @@ class PublishPanel(PanelWidget):
             target = selected if selected in ids else rows[0].id
             if self.list.selected_key() != target:
                 self.list.select_key(target)
-        self._wanted = ""
+        self._requested_id = ""
         self.list.refresh_visible()
         self.pages.setCurrentIndex(1 if messages else 0)
         text = ngettext("{count} saved message", "{count} saved messages", len(messages))
@@ -219,7 +219,7 @@ class PublishPanel(PanelWidget):
             text = _("You have {count} saved messages, the maximum. Delete one first.")
             self.context.show_toast(text.format(count=MAX_MESSAGES))
             return
-        self._wanted = message.id
+        self._requested_id = message.id
         self.filter.clear()
         self._rebuild()
         if not saved and topic:
@@ -304,7 +304,7 @@ class PublishPanel(PanelWidget):
         """Duplicate a message."""
         duplicate = self.acting.shelf.copy(id)
         if duplicate is not None:
-            self._wanted = duplicate.id
+            self._requested_id = duplicate.id
             self._rebuild()
 
     def delete(self, id: str) -> None:
@@ -319,7 +319,7 @@ class PublishPanel(PanelWidget):
     def _undo_delete(self) -> None:
         back = self.acting.shelf.restore()
         if back is not None:
-            self._wanted = back.id
+            self._requested_id = back.id
             self._rebuild()
 
     def menu_of(self, id: str) -> Menu:
@@ -358,7 +358,7 @@ class PublishPanel(PanelWidget):
         return {"message": self.list.selected_key() or ""}
 
     def restore_state(self, state: Mapping[str, object]) -> None:
-        self._wanted = str(state.get("message", ""))
+        self._requested_id = str(state.get("message", ""))
         self._rebuild()
 
     def suspendables(self) -> Iterable[Suspendable | None]:

@@ -31,11 +31,11 @@ class ValueFields(QWidget):
         self._theme = theme
         self.fields: dict[str, QLineEdit] = {}
         self._parts: list[QWidget] = []
-        self._place = QWidget()
-        self._flow = Flow(self._place, gap=12, row_gap=6)
+        self._container = QWidget()
+        self._flow = Flow(self._container, gap=12, row_gap=6)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self._place)
+        column.addWidget(self._container)
 
     def show_fields(self, names: Sequence[str], values: Mapping[str, str]) -> None:
         """Show a field for each placeholder. A field that exists already is reused and keeps the focus.

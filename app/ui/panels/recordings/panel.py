@@ -56,10 +56,10 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         self._recordings = context.session.recordings
         self._folder = RecordingFolder(self._recordings.folder, self._recordings.new_opener())
         self._opener = self._recordings.new_opener()
-        self._look = FolderScan(is_complete=False)
+        self._scan = FolderScan(is_complete=False)
         self._has_looked = False
         self._pictures: OrderedDict[tuple[Path, float, int], QImage | None] = OrderedDict()
-        self._asked: dict[str, tuple[Path, float, int]] = {}
+        self._requested_thumbnails: dict[str, tuple[Path, float, int]] = {}
         self._artist: BackgroundWorker[tuple[QImage | None]] = BackgroundWorker("recordings-pictures")
         self._job: RecordingExport | None = None
         self._strips: BackgroundWorker[tuple[FilmStripPreview | None, Sequence[QImage | None]]] = (
@@ -67,7 +67,7 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         )
         self._strip_of: tuple[Path, float, int] | None = None
         self._loop: tuple[int, int] | None = None
-        self._ticks, self._wanted, self._recorder_seen = 0, "", -1
+        self._ticks, self._requested_path, self._recorder_revision = 0, "", -1
         super().__init__(context, TABLE_TEXTS, "film")
         self.count = label("", "small", role="textSecondary")
         self.header.insert(0, self.count)
@@ -113,14 +113,14 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             self._folder = RecordingFolder(recordings.folder, recordings.new_opener())
             self._ticks = FIRST_SCAN_TICK
         revision = recordings.client.revision
-        is_new = revision != self._recorder_seen
+        is_new = revision != self._recorder_revision
         if self._ticks % SCAN_INTERVAL_TICKS == FIRST_SCAN_TICK:
             self._folder.start_scan(recordings.client.state.path if recordings.is_recording else None)
         scan = self._folder.pop_result()
         if scan is not None:
-            self._look, self._has_looked = scan, True
+            self._scan, self._has_looked = scan, True
         if scan is not None or is_new:
-            self._recorder_seen = revision
+            self._recorder_revision = revision
             self.rebuild()
         if self._collect_thumbnails():
             self.table.refresh_visible()
@@ -129,13 +129,13 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
 
     def rebuild(self) -> None:
         keywords = self.filter_words()
-        recordings = [self._with_live_state(each) for each in self._look.files]
+        recordings = [self._with_live_state(each) for each in self._scan.files]
         rows = [each for each in recordings if all(keyword in _haystack(each) for keyword in keywords)]
         self.model.set_rows(self.table.order.sort(rows))
         self.table.refresh_visible()
-        if self._wanted and self.model.index_of(self._wanted).isValid():
-            self.table.select_key(self._wanted)
-            self._wanted = ""
+        if self._requested_path and self.model.index_of(self._requested_path).isValid():
+            self.table.select_key(self._requested_path)
+            self._requested_path = ""
         self._update_counts(recordings)
         self.show_table(bool(rows), bool(keywords) and bool(recordings))
         self._show_details()
@@ -159,12 +159,12 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         return bool(state.phase) and info.path == state.path
 
     def _update_counts(self, recordings: Sequence[RecordingInfo]) -> None:
-        count = len(recordings) + self._look.omitted_count
+        count = len(recordings) + self._scan.omitted_count
         template = ngettext("{count} recording, {size}", "{count} recordings, {size}", count)
         size = size_text(sum(each.size_bytes for each in recordings))
         self.count.setText(template.format(count=group_digits(count), size=size) if count else "")
         self.filter.setVisible(count > 0)
-        left_out = self._look.omitted_count
+        left_out = self._scan.omitted_count
         older = ngettext(
             "{count} older recording not listed", "{count} older recordings not listed", left_out
         )
@@ -186,8 +186,8 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             text = _("Recordings in this folder appear here in a moment.")
             self.empty.set_texts(_("Reading the folder"), text, "folder-open")
             self.empty.set_actions([])
-        elif self._look.problem and is_own:
-            text = _("{folder}: {reason}.").format(folder=folder, reason=self._look.problem)
+        elif self._scan.problem and is_own:
+            text = _("{folder}: {reason}.").format(folder=folder, reason=self._scan.problem)
             self.empty.set_texts(_("The recordings folder doesn't exist"), text, "folder-open")
             choose = EmptyAction(_("Choose a folder"), lambda: self.context.run("recording.folder"), "folder")
             self.empty.set_actions([choose])
@@ -220,18 +220,18 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             self._pictures.move_to_end(mark)
             return self._pictures[mark]
         owner = str(info.path)
-        if self._asked.get(owner) != mark:
-            self._asked[owner] = mark
+        if self._requested_thumbnails.get(owner) != mark:
+            self._requested_thumbnails[owner] = mark
             self._artist.submit(owner, lambda: (_load_thumbnail(info.path, self._opener),))
         return None
 
     def _collect_thumbnails(self) -> bool:
         is_any = False
-        for owner, mark in list(self._asked.items()):
+        for owner, mark in list(self._requested_thumbnails.items()):
             result = self._artist.pop_result(owner)
             if result is not None:
                 is_any = True
-                del self._asked[owner]
+                del self._requested_thumbnails[owner]
                 self._pictures[mark] = result[0]
         while len(self._pictures) > MAX_CACHED_PICTURES:
             self._pictures.popitem(last=False)
@@ -290,15 +290,15 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
     def select_file(self, path: Path) -> None:
         """Select a recording as soon as it appears in the list."""
         self.filter.clear()
-        self._wanted = str(path)
+        self._requested_path = str(path)
         self._ticks = 0
         self.rebuild()
 
-    def _facts_of(self, key: str) -> RecordingInfo | None:
+    def _recording_info(self, key: str) -> RecordingInfo | None:
         return self.model.row_at(self.model.index_of(key))
 
     def _rename(self, key: str) -> None:
-        info = self._facts_of(key)
+        info = self._recording_info(key)
         if info is None or self._is_being_written(info):
             self.context.show_toast(_("A recording can be renamed after it has ended"))
             return
@@ -319,7 +319,7 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             return False
         if not self._move_files(path, new):
             return False
-        self._wanted = str(new)
+        self._requested_path = str(new)
         self._update_listing(path, new)
         return True
 
@@ -341,15 +341,15 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         # Shown before the next scan confirms the change.
         files = [
             replace(each, path=new) if each.path == path and new is not None else each
-            for each in self._look.files
+            for each in self._scan.files
             if each.path != path or new is not None
         ]
-        self._look = replace(self._look, files=tuple(files))
+        self._scan = replace(self._scan, files=tuple(files))
         self._ticks = 0
         self.rebuild()
 
     def _delete(self, key: str) -> None:
-        info = self._facts_of(key)
+        info = self._recording_info(key)
         if info is None or self._is_being_written(info):
             self.context.show_toast(_("A recording can be deleted after it has ended"))
             return
@@ -379,7 +379,7 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
                 message.format(file=path.name, reason=(error.strerror or str(error)).lower())
             )
             return
-        self._wanted = str(path)
+        self._requested_path = str(path)
         self._ticks = 0
 
     def _show_file(self, key: str) -> None:

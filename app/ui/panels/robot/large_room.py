@@ -27,7 +27,7 @@ class LargeRoom(QWidget):
     def __init__(self, theme: Theme, panel: QWidget, stage: QWidget, tools: Sequence[QWidget] = ()) -> None:
         workbench = _workbench_of(panel)
         super().__init__(workbench)
-        self._theme, self._over = theme, workbench
+        self._theme, self._workbench = theme, workbench
         self.filled = False
         self.setAccessibleName(_("Large room"))
         self.screen_button = Button(theme, _("Full screen"), "fullscreen", size="small")
@@ -63,7 +63,7 @@ class LargeRoom(QWidget):
     def _retain_focus(self, _old: QWidget | None, now: QWidget | None) -> None:
         # Covered widgets must not get the focus: Esc would not reach the overlay, and the editor would change
         # invisibly.
-        covered = now is not None and self._over.isAncestorOf(now) and not self.isAncestorOf(now)
+        covered = now is not None and self._workbench.isAncestorOf(now) and not self.isAncestorOf(now)
         if covered and now is not self and self.isVisible():
             self.setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -78,15 +78,15 @@ class LargeRoom(QWidget):
         """Close the overlay, leave full screen mode and return the stage to the panel."""
         if self.filled:
             self.toggle_full_screen()
-        self._over.removeEventFilter(self)
+        self._workbench.removeEventFilter(self)
         self._top.removeEventFilter(self)
         self.hide()
         self.closed.emit()
         self.deleteLater()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if watched is self._over and event.type() == QEvent.Type.Resize:
-            self.setGeometry(self._over.rect())
+        if watched is self._workbench and event.type() == QEvent.Type.Resize:
+            self.setGeometry(self._workbench.rect())
         if watched is self._top and isinstance(event, QKeyEvent) and self.isVisible():
             pressed = event.type() == QEvent.Type.KeyPress
             if pressed and event.key() == Qt.Key.Key_Escape:

@@ -71,8 +71,8 @@ class RobotPanel(OneRobotPanel):
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Robot"))
-        self._told: Mapping[str, object] | None = None
-        self._told_s = 0.0
+        self._last_drawing: Mapping[str, object] | None = None
+        self._last_drawing_s = 0.0
         self.chip = Chip(self.theme)
         self.add, self.reset = self._make_room_tools(size=30)
         self.reset.setVisible(False)
@@ -132,11 +132,11 @@ class RobotPanel(OneRobotPanel):
         self.sound = IconButton(self.theme, "volume-2", _("Unmute the robots"), size=26)
         self.sound.clicked.connect(self._toggle_sound)
         self.say.add(self.sound)
-        self._sound_shown: object = None
+        self._shown_sound_state: object = None
         self._update_sound_button()
         self._large: LargeRoom | None = None
-        self._things: tuple[int, tuple[Thing, ...]] = (-1, ())
-        self._looks: dict[str, Watch] = {}
+        self._cached_things: tuple[int, tuple[Thing, ...]] = (-1, ())
+        self._sensor_watches: dict[str, Watch] = {}
 
     def fleet_changed(self) -> None:
         self.choose.setVisible(bool(self.session.fleet.links))
@@ -151,12 +151,12 @@ class RobotPanel(OneRobotPanel):
         self.chip.set(link.chip_text, STATUS_BY_ROBOT_STATE[link.state])
         if link.drawing is not None:
             now = time.monotonic()
-            if link.drawing is not self._told:
-                self._told, self._told_s = link.drawing, now
+            if link.drawing is not self._last_drawing:
+                self._last_drawing, self._last_drawing_s = link.drawing, now
             self._show_room(link)
             self.view.set_caption(self._speech_caption())
             self.view.set_stale(
-                not link.is_connected or link.is_unresponsive or now - self._told_s > STALE_AFTER_S
+                not link.is_connected or link.is_unresponsive or now - self._last_drawing_s > STALE_AFTER_S
             )
             if self._large is None:
                 self.pages.setCurrentWidget(self.stage)
@@ -215,9 +215,9 @@ class RobotPanel(OneRobotPanel):
     def _update_sound_button(self) -> None:
         # The reason is shown if speech is on but does not work.
         on, problem = self.session.voices.is_on, self.session.voices.problem
-        if (on, problem) == self._sound_shown:
+        if (on, problem) == self._shown_sound_state:
             return
-        self._sound_shown = (on, problem)
+        self._shown_sound_state = (on, problem)
         self.sound.set_icon("volume-2" if on and not problem else "volume-x")
         text = _("Mute the robots") if on else _("Unmute the robots")
         self.sound.set_name(text)
@@ -234,8 +234,8 @@ class RobotPanel(OneRobotPanel):
             self.view.show_state(drawing)
             return
         room = self.session.room
-        if self._things[0] != room.revision:
-            self._things = (room.revision, things_of(room.room))
+        if self._cached_things[0] != room.revision:
+            self._cached_things = (room.revision, things_of(room.room))
         others = [
             (other.name, other.drawing)
             for other in self._watch_other_robots(link)
@@ -243,7 +243,7 @@ class RobotPanel(OneRobotPanel):
             and not other.is_unresponsive
             and RobotState.parse(other.drawing).is_room_shared
         ]
-        self.view.show_state(drawing, others, self._things[1])
+        self.view.show_state(drawing, others, self._cached_things[1])
 
     def _speech_caption(self) -> str:
         # Caption of speech that is still playing after its bubble disappeared, or of words that a robot
@@ -264,10 +264,10 @@ class RobotPanel(OneRobotPanel):
         fleet = self.session.fleet
         other_links = [each for each in fleet.connected if each.is_virtual and each.name != link.name]
         names = {each.name for each in other_links}
-        for name in self._looks.keys() - names:
-            self._looks.pop(name).close()
-        for name in names - self._looks.keys():
-            self._looks[name] = fleet.watch_sensors(name)
+        for name in self._sensor_watches.keys() - names:
+            self._sensor_watches.pop(name).close()
+        for name in names - self._sensor_watches.keys():
+            self._sensor_watches[name] = fleet.watch_sensors(name)
         return other_links
 
     def _move_thing(self, name: str, x: float, y: float) -> None:
@@ -355,18 +355,18 @@ class RobotPanel(OneRobotPanel):
                 self.session.fleet.change_world(robot or self._robot, change)
 
     def suspendables(self) -> Iterable[Suspendable | None]:
-        return (*super().suspendables(), *self._looks.values())
+        return (*super().suspendables(), *self._sensor_watches.values())
 
     def dispose(self) -> None:
         super().dispose()
-        for watch in self._looks.values():
+        for watch in self._sensor_watches.values():
             watch.close()
-        self._looks.clear()
+        self._sensor_watches.clear()
 
     def resume(self) -> None:
         if self._watch is not None and self._watch.is_suspended:
             # the watch was suspended, so the age of the state is unknown rather than stale
-            self._told_s = time.monotonic()
+            self._last_drawing_s = time.monotonic()
         super().resume()
 
 

@@ -119,7 +119,7 @@ class RoomView(QWidget):
         if state_key == self._data:
             return
         self._data = state_key
-        self._kept = (data, others)  # keeps the objects alive, so that their ids are not reused
+        self._state_refs = (data, others)  # keeps the objects alive, so that their ids are not reused
         state = RobotState.parse(data)
         if things is not None:
             state = replace(state, objects=things)

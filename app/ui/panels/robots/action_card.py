@@ -66,7 +66,7 @@ class ActionCard(Card):
         self.action = action
         self._title_of = title_of
         self._running = False
-        self._given: Mapping[str, object] = {}
+        self._submitted_input: Mapping[str, object] = {}
         self._folded = False
         self.form = ActionForm(theme, action, options, pictures)
         self.form.changed.connect(self._update_summary)
@@ -144,8 +144,8 @@ class ActionCard(Card):
         if self._running:
             self.cancelled.emit()
         else:
-            self._given = self.form.input()
-            self.try_requested.emit(dict(self._given))
+            self._submitted_input = self.form.input()
+            self.try_requested.emit(dict(self._submitted_input))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         has_ctrl = event.modifiers() & (
@@ -197,7 +197,7 @@ class ActionCard(Card):
         self.set_highlighted(self.border == "accent")
         share, text, remaining = None, "", ""
         if invocation is not None and self._running:
-            share = progress_of(self.action, self._given or invocation.input, invocation.feedback)
+            share = progress_of(self.action, self._submitted_input or invocation.input, invocation.feedback)
             text = state_text(self.action, invocation, self._title_of)
             remaining = remaining_text(invocation)
         self.progress.setVisible(share is not None)

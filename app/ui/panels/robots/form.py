@@ -50,7 +50,7 @@ class ActionForm(QWidget):
         super().__init__()
         self.action = action
         self.controls: dict[str, Control] = {}
-        self._sentences: dict[str, QLabel] = {}
+        self._error_labels: dict[str, QLabel] = {}
         self._rows: dict[str, tuple[QWidget, QWidget]] = {}
         self._heights: dict[QWidget, int] = {}
         self._stacked = False
@@ -96,7 +96,7 @@ class ActionForm(QWidget):
         self._heights[name] = max(ROW_HEIGHT, min(MIN_TALL_ROW_HEIGHT, control.widget.sizeHint().height()))
         self._position_row(2 * len(self._rows), name, cell)
         self.controls[parameter.name] = control
-        self._sentences[parameter.name] = error_label
+        self._error_labels[parameter.name] = error_label
         self._rows[parameter.name] = (name, cell)
         control.changed(self._control_changed)
         control.finished(lambda: self._validate_field(parameter))
@@ -184,7 +184,7 @@ class ActionForm(QWidget):
 
     def _show_errors_of(self, parameter: Parameter, problems: Sequence[str]) -> None:
         control = self.controls[parameter.name]
-        self._set_errors(self._sentences[parameter.name], () if control.error_text else problems)
+        self._set_errors(self._error_labels[parameter.name], () if control.error_text else problems)
         self._set_invalid(control.widget, is_invalid=bool(problems or control.error_text))
         if problems and parameter.advanced:
             self.more.setChecked(True)

@@ -221,7 +221,7 @@ class TryList(QWidget):
     def __init__(self, theme: Theme, action: Action) -> None:
         super().__init__()
         self._theme, self._action = theme, action
-        self._shown: tuple[str, ...] = ()
+        self._shown_ids: tuple[str, ...] = ()
         self.rows: list[TryRow] = []
         self.setAccessibleName(_("Recent results of {action}").format(action=action.title))
         self._column = QVBoxLayout(self)
@@ -240,9 +240,9 @@ class TryList(QWidget):
             if invocation.action == self._action.name and not invocation.is_running
         ][-MAX_TRIES:]
         ids = tuple(invocation.id for invocation in ended)
-        if ids == self._shown:
+        if ids == self._shown_ids:
             return
-        self._shown = ids
+        self._shown_ids = ids
         for row in self.rows:
             self._column.removeWidget(row)
             row.deleteLater()

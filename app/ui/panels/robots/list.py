@@ -49,7 +49,7 @@ class RobotItem(PaintedButton):
         super().__init__(theme, radius="panel", checkable=True)
         self.name = name
         self.where = ""
-        self._away = self.may_be_forgotten = False
+        self._is_disconnected = self.may_be_forgotten = False
         self.setAutoExclusive(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.chip = Chip(theme)
@@ -68,7 +68,7 @@ class RobotItem(PaintedButton):
         location = _("virtual, this computer") if link.is_virtual else link.robot.title
         is_away = not link.is_connected
         self._show(link.state, last_seen if is_away and last_seen else location, is_away=is_away)
-        self.may_be_forgotten = self._away and not link.is_virtual
+        self.may_be_forgotten = self._is_disconnected and not link.is_virtual
 
     def show_disconnected(self, last_seen: str) -> None:
         """Show a robot of an earlier session that is not connected. A click opens its context menu.
@@ -84,7 +84,7 @@ class RobotItem(PaintedButton):
     def _show(self, state: str, location: str, *, is_away: bool) -> None:
         state_label = _(STATE_LABELS[state])
         self.chip.set(state_label, STATUS_BY_ROBOT_STATE[state])
-        self.where, self._away = location, is_away
+        self.where, self._is_disconnected = location, is_away
         self.setAccessibleName(f"{self.name}, {location}, {state_label}")
         self.update()
 
@@ -101,7 +101,7 @@ class RobotItem(PaintedButton):
         if self.isChecked() or self.is_hovered:
             fill = "selected" if self.isChecked() else "hover"
             paint.box(painter, rect, theme.radius("panel"), theme.colour(fill))
-        quiet = self._away and not self.isChecked()
+        quiet = self._is_disconnected and not self.isChecked()
         tile = QRectF(12, rect.center().y() - 18, 36, 36)
         paint.box(painter, tile, theme.radius("panel"), theme.colour("sunken"))
         icon = theme.colour("textTertiary" if quiet else "textSecondary")
@@ -136,7 +136,7 @@ class RobotList(QWidget):
         super().__init__()
         self._theme = theme
         self._run = run
-        self._known: dict[str, KnownRobot] = {}
+        self._known_robots: dict[str, KnownRobot] = {}
         self.items: dict[str, RobotItem] = {}
         self.away: dict[str, RobotItem] = {}
         self.setFixedWidth(LIST_WIDTH)
@@ -174,17 +174,19 @@ class RobotList(QWidget):
         Returns:
             The names of the robots of this session.
         """
-        self._known = {robot.name: robot for robot in fleet.known.robots}
+        self._known_robots = {robot.name: robot for robot in fleet.known.robots}
         links = [
-            link for link in fleet.links if link.is_connected or link.is_virtual or link.name in self._known
+            link
+            for link in fleet.links
+            if link.is_connected or link.is_virtual or link.name in self._known_robots
         ]
         names = [link.name for link in links]
-        self._show(links, [robot for name, robot in self._known.items() if name not in names])
+        self._show(links, [robot for name, robot in self._known_robots.items() if name not in names])
         return names
 
     def last_seen_text(self, name: str) -> str:
         """Return the text with the time when a robot was last seen; "" for unknown and virtual robots."""
-        return seen_text(self._known[name].last_connected_s) if name in self._known else ""
+        return seen_text(self._known_robots[name].last_connected_s) if name in self._known_robots else ""
 
     def _show(self, links: Sequence[RobotLink], away_robots: Sequence[KnownRobot]) -> None:
         away_by_name = {robot.name: robot for robot in away_robots}

@@ -113,8 +113,8 @@ class RobotsPanel(OneRobotPanel):
         self.cards: dict[str, ActionCard] = {}
         self._cards_of = ""
         self._pictures = SessionImageSource(self.session, self.context.files)
-        self._seen: dict[str, tuple[object, ...]] = {}
-        self._told: dict[tuple[str, str], list[str]] = {}
+        self._shown_values: dict[str, tuple[object, ...]] = {}
+        self._last_sensor_values: dict[tuple[str, str], list[str]] = {}
         self._lay_out()
         application = QApplication.instance()
         if isinstance(application, QApplication):
@@ -206,14 +206,14 @@ class RobotsPanel(OneRobotPanel):
 
     def _has_changed(self, key: str, *now: object) -> bool:
         # Returns True if the value differs from the one that was shown last.
-        changed = self._seen.get(key) != now
-        self._seen[key] = now
+        changed = self._shown_values.get(key) != now
+        self._shown_values[key] = now
         return changed
 
     def discard(self, name: str) -> None:
         """Remove a disconnected robot from the list until it connects again."""
         self.session.fleet.known.discard(name)
-        self._seen.pop(name, None)
+        self._shown_values.pop(name, None)
         self._revision = -1
         self.refresh()
 
@@ -225,7 +225,7 @@ class RobotsPanel(OneRobotPanel):
             self.switch_to(link)
 
     def show_robot(self, link: RobotLink) -> None:
-        self._seen.pop("cards", None)
+        self._shown_values.pop("cards", None)
         if link.name in self.items:
             self.items[link.name].setChecked(True)
         self._make_forms()
@@ -276,7 +276,9 @@ class RobotsPanel(OneRobotPanel):
             self._card_column.removeWidget(card)
             card.deleteLater()
         self.cards = {}
-        self._seen = {key: value for key, value in self._seen.items() if not key.startswith("card ")}
+        self._shown_values = {
+            key: value for key, value in self._shown_values.items() if not key.startswith("card ")
+        }
 
     def _offered_values(self, link: RobotLink) -> tuple[object, ...]:
         # The forms are rebuilt when the offered values change.
@@ -306,8 +308,10 @@ class RobotsPanel(OneRobotPanel):
         link = self.session.fleet.link(self._robot)
         value = link.values.get(name) if link is not None else None
         if isinstance(value, (list, tuple)):
-            self._told[self._robot, name] = [str(item) for item in value]
-        return self._told.get((self._robot, name), [])  # the last known values, while the watch is suspended
+            self._last_sensor_values[self._robot, name] = [str(item) for item in value]
+        return self._last_sensor_values.get(
+            (self._robot, name), []
+        )  # the last known values, while the watch is suspended
 
     def _apply_filter(self) -> None:
         keywords = self.finder.text().casefold().split()

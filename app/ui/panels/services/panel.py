@@ -52,10 +52,10 @@ class ServicesPanel(PanelWidget):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Services"))
         self.acting = context.session.acting
-        self._seen: tuple[object, ...] = ()
-        self._wanted = ""
+        self._last_state: tuple[object, ...] = ()
+        self._requested_service = ""
         self._texts: dict[str, str] = {}
-        self._shown = ""
+        self._shown_service = ""
         self._is_showing = False
         self.count = label("", "small", role="textSecondary")
         self.chips = [self.count]
@@ -167,8 +167,8 @@ class ServicesPanel(PanelWidget):
         limit_row.addWidget(label(_("time limit"), "small", role="textSecondary"))
         limit_row.addWidget(self.seconds)
         buttons.addWidget(limit)
-        self._asks = QWidget()
-        request = QVBoxLayout(self._asks)
+        self._request_widget = QWidget()
+        request = QVBoxLayout(self._request_widget)
         request.setContentsMargins(12, 8, 12, 8)
         request.setSpacing(8)
         request.addLayout(header)
@@ -181,7 +181,7 @@ class ServicesPanel(PanelWidget):
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         for index, (widget, stretch) in enumerate(
             (
-                (self._asks, 4),
+                (self._request_widget, 4),
                 (Separator(self.theme), 0),
                 (self.answer, 3),
                 (Separator(self.theme), 0),
@@ -206,14 +206,14 @@ class ServicesPanel(PanelWidget):
             acting.arming.revision,
             self.session.master.kind,
         )
-        if state != self._seen:
-            self._seen = state
+        if state != self._last_state:
+            self._last_state = state
             self._rebuild()
         elif acting.calls.in_flight is not None:
             self._update_call()
 
     def source_changed(self) -> None:
-        self._seen = ()
+        self._last_state = ()
 
     def _rebuild(self) -> None:
         services = offered_services(self.session.live.graph)
@@ -221,17 +221,17 @@ class ServicesPanel(PanelWidget):
         rows = [
             each
             for each in services
-            if each.name == self._wanted
+            if each.name == self._requested_service
             or all(keyword in f"{each.name} {each.servers_text}".casefold() for keyword in keywords)
         ]
-        selected = self._wanted or self.list.selected_key() or self._shown
+        selected = self._requested_service or self.list.selected_key() or self._shown_service
         self.list.model().set_rows(rows)  # type: ignore[attr-defined]  # always a TableModel
         names = [each.name for each in rows]
         if names:
             target = selected if selected in names else names[0]
             if self.list.selected_key() != target:
                 self.list.select_key(target)
-            self._wanted = ""
+            self._requested_service = ""
         self.list.refresh_visible()
         self.count.setText(count_text(services))
         self.pages.setCurrentIndex(1 if services else 0)
@@ -258,8 +258,8 @@ class ServicesPanel(PanelWidget):
 
     def _show_selected(self) -> None:
         name = self.service
-        if name and name != self._shown:
-            self._shown = name
+        if name and name != self._shown_service:
+            self._shown_service = name
             self.name.setText(name)
             self.form.reset_kinds()
             self._set_text(self._request_text(name))
@@ -277,11 +277,11 @@ class ServicesPanel(PanelWidget):
     @property
     def text(self) -> str:
         """Request as JSON text."""
-        return self._texts.get(self._shown, EMPTY_REQUEST)
+        return self._texts.get(self._shown_service, EMPTY_REQUEST)
 
     def _set_text(self, text: str) -> None:
         # Updates the form and the JSON editor.
-        self._texts[self._shown] = text
+        self._texts[self._shown_service] = text
         self._is_showing = True
         self.edit.set_text(text)
         read = parse_json_text(text)
@@ -346,7 +346,7 @@ class ServicesPanel(PanelWidget):
 
     def open_for(self, service: str) -> None:
         """Select a service and focus the Call button."""
-        self._wanted = service
+        self._requested_service = service
         self.filter.clear()
         self._rebuild()
         self.call_button.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -443,7 +443,7 @@ class ServicesPanel(PanelWidget):
         return {"service": self.service}
 
     def restore_state(self, state: Mapping[str, object]) -> None:
-        self._wanted = str(state.get("service", ""))
+        self._requested_service = str(state.get("service", ""))
         self._rebuild()
 
     def dispose(self) -> None:

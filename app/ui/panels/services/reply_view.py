@@ -165,12 +165,12 @@ class ReplyView(QWidget):
         controls.addStretch(1)
         controls.addWidget(self.way)
         controls.addWidget(self.copy)
-        self._head = QBoxLayout(QBoxLayout.Direction.LeftToRight)
-        self._head.setContentsMargins(12, 4, 8, 0)
-        self._head.setSpacing(4)
-        self._head.addLayout(ended, 1)
-        self._head.addLayout(controls)
-        return self._head
+        self._header = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._header.setContentsMargins(12, 4, 8, 0)
+        self._header.setSpacing(4)
+        self._header.addLayout(ended, 1)
+        self._header.addLayout(controls)
+        return self._header
 
     def minimumSizeHint(self) -> QSize:
         # With a wider minimum width the values of the reply would be clipped.
@@ -180,8 +180,8 @@ class ReplyView(QWidget):
         super().resizeEvent(event)
         is_narrow = self.width() < self._theme.scaled(ONE_ROW_WIDTH_PX)
         direction = QBoxLayout.Direction.TopToBottom if is_narrow else QBoxLayout.Direction.LeftToRight
-        if self._head.direction() != direction:
-            self._head.setDirection(direction)
+        if self._header.direction() != direction:
+            self._header.setDirection(direction)
 
     def show_record(self, record: CallRecord | None, waited_s: float = 0.0) -> None:
         """Show a call and its reply.

@@ -80,7 +80,7 @@ class TimelineCanvas(QAbstractScrollArea):
         self._lanes: QPixmap | None = None
         self._marks: list[LaneMark] = []
         self.field: RenameField | None = None
-        self._held = ""  # dragged part: "playhead", "start" or "end"
+        self._dragged_part = ""  # dragged part: "playhead", "start" or "end"
         self._position_ns = 0
         self._loop: tuple[int, int] | None = None
         self._follows = True
@@ -117,7 +117,7 @@ class TimelineCanvas(QAbstractScrollArea):
         if (position_ns, loop) == (self._position_ns, self._loop):
             return
         self._position_ns, self._loop = position_ns, loop
-        if self.scale is not None and self._follows and not self._held:
+        if self.scale is not None and self._follows and not self._dragged_part:
             self.set_scale(self.scale.with_time(position_ns))
         self.viewport().update()
 
@@ -500,29 +500,29 @@ class TimelineCanvas(QAbstractScrollArea):
         if mark is not None:
             self._replay.seek(mark.at_ns)
             return
-        self._held = self._grip_at(event.position())
+        self._dragged_part = self._grip_at(event.position())
         topic = self.topic_at(event.position().y())
         if topic:
             self.selected.emit(topic)
-        if self._held == "playhead":
+        if self._dragged_part == "playhead":
             self._replay.seek(self.time_at(event.position().x()))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        grip = self._held or self._grip_at(event.position())
+        grip = self._dragged_part or self._grip_at(event.position())
         self.viewport().setCursor(
             Qt.CursorShape.SplitHCursor if grip in {"start", "end"} else Qt.CursorShape.ArrowCursor
         )
-        if not self._held or self._replay is None:
+        if not self._dragged_part or self._replay is None:
             return
         at_ns = self.time_at(event.position().x())
-        if self._held == "playhead":
+        if self._dragged_part == "playhead":
             self._replay.seek(at_ns)
         elif self._loop is not None:
             start_ns, end_ns = self._loop
-            self._replay.loop(*((at_ns, end_ns) if self._held == "start" else (start_ns, at_ns)))
+            self._replay.loop(*((at_ns, end_ns) if self._dragged_part == "start" else (start_ns, at_ns)))
 
     def mouseReleaseEvent(self, _event: QMouseEvent) -> None:
-        self._held = ""
+        self._dragged_part = ""
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         mark = self.mark_at(event.position())

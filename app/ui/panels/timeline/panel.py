@@ -35,7 +35,7 @@ class TimelinePanel(PanelWidget):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Timeline"))
         theme = self.theme
-        self._shown: Replay | None = None
+        self._shown_replay: Replay | None = None
         self._state: tuple[object, ...] = ()
         self.transport, self.canvas = TransportRow(theme), TimelineCanvas(theme)
         self.ruler = Segments(
@@ -81,11 +81,11 @@ class TimelinePanel(PanelWidget):
         replay = self.session.replay
         player = replay.player if replay is not None else None
         if replay is None or player is None or replay.opened is None:
-            self._shown = None
+            self._shown_replay = None
             self._update_text()
             return
-        if replay is not self._shown:
-            self._shown, self._state = replay, ()
+        if replay is not self._shown_replay:
+            self._shown_replay, self._state = replay, ()
             self.set_title(_("Timeline"), replay.name)
             self.chip.set(pgettext("message", "recorded"), "info", "")
             self.canvas.show_replay(replay)
@@ -135,7 +135,7 @@ class TimelinePanel(PanelWidget):
         self.ruler.setVisible(False)
 
     def source_changed(self) -> None:
-        self._shown = None
+        self._shown_replay = None
         self.canvas.show_replay(None)
         self._below.setCurrentWidget(self.canvas)
 
@@ -150,8 +150,8 @@ class TimelinePanel(PanelWidget):
         self.canvas.show_topic(name)
 
     def _select_topic(self, topic: str) -> None:
-        if self._shown is not None:
-            self._shown.select_topic(topic)
+        if self._shown_replay is not None:
+            self._shown_replay.select_topic(topic)
 
     def _set_ruler(self, which: str) -> None:
         self.canvas.by_clock = which == BY_CLOCK
@@ -163,10 +163,10 @@ class TimelinePanel(PanelWidget):
     def event(self, event: QEvent) -> bool:
         # Within the panel, F2 and Delete apply to the bookmark at the playhead.
         if isinstance(event, QKeyEvent) and event.key() in BOOKMARK_KEYS and has_no_modifiers(event):
-            if event.type() == QEvent.Type.ShortcutOverride and self._shown is not None:
+            if event.type() == QEvent.Type.ShortcutOverride and self._shown_replay is not None:
                 event.accept()
                 return True
-            if event.type() == QEvent.Type.KeyPress and self._shown is not None:
+            if event.type() == QEvent.Type.KeyPress and self._shown_replay is not None:
                 self._run_on_current_bookmark(
                     self.rename_bookmark if event.key() == Qt.Key.Key_F2 else self.delete_bookmark
                 )
@@ -174,7 +174,7 @@ class TimelinePanel(PanelWidget):
         return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if self._shown is None or not self._handle_key(event, self._shown):
+        if self._shown_replay is None or not self._handle_key(event, self._shown_replay):
             super().keyPressEvent(event)
 
     def _handle_key(self, event: QKeyEvent, replay: Replay) -> bool:
@@ -212,7 +212,7 @@ class TimelinePanel(PanelWidget):
 
     def _select_neighbour(self, by: int) -> None:
         # Selects the next topic above or below.
-        replay = self._shown
+        replay = self._shown_replay
         if replay is not None and (topics := list(replay.recorded_topics)):
             index = topics.index(replay.chosen) if replay.chosen in topics else 0
             self.show_topic(topics[max(0, min(len(topics) - 1, index + by))])
@@ -221,7 +221,7 @@ class TimelinePanel(PanelWidget):
 
     def show_send_chooser(self) -> None:
         """Show the page for choosing topics that are sent to the live network."""
-        replay = self._shown
+        replay = self._shown_replay
         if replay is not None and replay.sending is not None:
             counts = {name: topic.message_count for name, topic in replay.recorded_topics.items()}
             self._below.setCurrentWidget(self.chooser)
@@ -240,7 +240,7 @@ class TimelinePanel(PanelWidget):
     # -- bookmarks ----------------------------------------------------------------------------------------
 
     def _run_on_current_bookmark(self, action: Callable[[Bookmark], object]) -> None:
-        mark = self._shown.current_bookmark() if self._shown is not None else None
+        mark = self._shown_replay.current_bookmark() if self._shown_replay is not None else None
         if mark is not None:
             action(mark)
         else:
@@ -258,7 +258,7 @@ class TimelinePanel(PanelWidget):
 
     def rename_bookmark(self, mark: Bookmark) -> None:
         """Start editing the name of a bookmark in place."""
-        replay = self._shown
+        replay = self._shown_replay
         if replay is not None and not self._reject_note(mark):
             self.canvas.rename(
                 mark, lambda name: self._apply_change(lambda: replay.rename_bookmark(mark, name.strip()))
@@ -266,7 +266,7 @@ class TimelinePanel(PanelWidget):
 
     def delete_bookmark(self, mark: Bookmark) -> None:
         """Delete a bookmark; the toast offers to undo it."""
-        replay = self._shown
+        replay = self._shown_replay
         if (
             replay is None
             or self._reject_note(mark)
@@ -300,7 +300,7 @@ class TimelinePanel(PanelWidget):
 
     def more_actions(self) -> list[QAction]:
         actions = []
-        path = self._shown.path if self._shown is not None else None
+        path = self._shown_replay.path if self._shown_replay is not None else None
         rows = (
             (_("Open a recording"), "folder-open", "replay.open"),
             *([(_("Export a range"), "download", f"recording.export:{path}")] if path else []),

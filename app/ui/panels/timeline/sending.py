@@ -108,7 +108,7 @@ class SendChooser(QWidget):
         self._theme = theme
         self._sending: ReplaySending | None = None
         self._counts: dict[str, int] = {}
-        self._seen: object = None
+        self._last_state: object = None
         self.model: TableModel[SendRow] = TableModel(_columns(), lambda row: row.topic)
         self.table: TableView[SendRow] = TableView(theme, self.model, "topic")
         self.table.setAccessibleName(_("Topics that can be sent"))
@@ -159,7 +159,7 @@ class SendChooser(QWidget):
             counts: Number of recorded messages by topic.
             selected: Topic whose row is selected.
         """
-        self._sending, self._counts, self._seen = sending, counts, None
+        self._sending, self._counts, self._last_state = sending, counts, None
         sending.analyze()
         self.problem.setText("")
         self.refresh()
@@ -170,9 +170,9 @@ class SendChooser(QWidget):
     def refresh(self) -> None:
         """Update the table if the topics to send have changed."""
         sending = self._sending
-        if sending is None or self._seen == (sending, sending.revision):
+        if sending is None or self._last_state == (sending, sending.revision):
             return
-        self._seen = (sending, sending.revision)
+        self._last_state = (sending, sending.revision)
         self._show_rows()
         hint = _("While armed, these topics are also sent to the live network during playback.")
         moving = _("Topics that move a robot are marked and need confirmation.")
@@ -214,7 +214,7 @@ class SendChooser(QWidget):
 
     def _set_problem(self, problem: str) -> None:
         self.problem.setText(problem)
-        self._seen = None
+        self._last_state = None
         self.refresh()
         if problem:
             self.arm.setEnabled(False)

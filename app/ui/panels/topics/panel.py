@@ -90,10 +90,10 @@ class TopicsPanel(NetworkTable[TreeRow]):
         parts = ((self.pages, 1), (self.networks, 0), (self.line, 0), (self.foot, 0), (self.doctor, 0))
         for widget, stretch in parts:
             column.addWidget(widget, stretch)
-        self._seen: tuple[object, ...] = ()
-        self._ours: tuple[str, ...] = ()
+        self._last_snapshot: tuple[object, ...] = ()
+        self._virtual_robots: tuple[str, ...] = ()
         self._ticks = 0
-        self._wanted = ""
+        self._requested_topic = ""
 
     def make_model(self) -> TableModel[TreeRow]:
         table_columns = columns(self._is_own, self.has_other_networks, lambda: self._tree is not None)
@@ -109,15 +109,15 @@ class TopicsPanel(NetworkTable[TreeRow]):
         if topic.network:
             return are_own_nodes(topic.publisher_nodes)
         if not topic.publisher_nodes:
-            return topic.name.startswith(tuple(f"/{robot}/" for robot in self._ours))
-        return {*self._ours, NODE_NAME}.issuperset(topic.publisher_nodes)
+            return topic.name.startswith(tuple(f"/{robot}/" for robot in self._virtual_robots))
+        return {*self._virtual_robots, NODE_NAME}.issuperset(topic.publisher_nodes)
 
     def refresh(self) -> None:
         self._ticks += 1
         state = self._snapshot()
         order = self.table.order.column
         lively = order is not None and order.name in CHANGING_COLUMNS
-        if state != self._seen or (lively and self._ticks % SORT_TICKS == 0):
+        if state != self._last_snapshot or (lively and self._ticks % SORT_TICKS == 0):
             self.rebuild()
         if self._ticks % STATS_UPDATE_TICKS == 0 and self.model.rowCount():
             if self._tree is not None:
@@ -129,18 +129,18 @@ class TopicsPanel(NetworkTable[TreeRow]):
         return topics.revision, len(topics), networks.revision, self.session.master.kind
 
     def source_changed(self) -> None:
-        self._seen = ()
+        self._last_snapshot = ()
 
     def rebuild(self) -> None:
-        self._seen = self._snapshot()
+        self._last_snapshot = self._snapshot()
         topics = [*self.session.topics, *self.session.networks.topics]
-        self._ours = self.session.launcher.virtual_robots
+        self._virtual_robots = self.session.launcher.virtual_robots
         keywords = self.filter_words()
         fit = topic_filter(keywords)
         rows = [topic for topic in topics if fit(topic.name, _haystack(topic))] if keywords else topics
         self._show_rows(rows, filtered=bool(keywords))
-        if self._wanted:
-            self.show_topic(self._wanted)
+        if self._requested_topic:
+            self.show_topic(self._requested_topic)
         self._update_counts(len(topics), len(rows) if keywords else None)
         self.show_table(bool(rows), bool(keywords))
         self.show_networks()
@@ -254,9 +254,11 @@ class TopicsPanel(NetworkTable[TreeRow]):
             above := folders_above(*split_key(name)[::-1])
         ):
             self._closed.difference_update(above)
-            self._wanted = ""
+            self._requested_topic = ""
             self.rebuild()
-        self._wanted = "" if self.model.index_of(name).isValid() else name  # selected when its row appears
+        self._requested_topic = (
+            "" if self.model.index_of(name).isValid() else name
+        )  # selected when its row appears
         self.table.select_key(name)
 
     def save_state(self) -> dict[str, object]:

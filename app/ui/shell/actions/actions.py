@@ -42,11 +42,11 @@ class Actions:
         self._theme, self._commands = theme, commands
         self._groups: dict[str, QActionGroup] = {}
         self._actions: dict[str, QAction] = {}
-        self._why_not: dict[str, Callable[[], str]] = {}
+        self._disabled_reasons: dict[str, Callable[[], str]] = {}
         for command in commands:
             action = self._actions[command.id] = self._make(command, window)
             action.triggered.connect(lambda _on=False, run=command.run: run(handlers))
-            self._why_not[command.id] = partial(command.disabled_reason, handlers)
+            self._disabled_reasons[command.id] = partial(command.disabled_reason, handlers)
 
     def _make(self, command: Command[Any], window: QWidget) -> QAction:
         action = QAction("\t".join(filter(None, (command.label, command.displayed_key))), window)
@@ -98,7 +98,7 @@ class Actions:
         The reason is a short phrase without a full stop.
         """
         self[name]
-        return self._why_not[name]()
+        return self._disabled_reasons[name]()
 
     def disable_unavailable(self) -> None:
         """Disable the actions of unavailable commands, except for Stop, which is always enabled."""

@@ -144,7 +144,7 @@ class Shortcuts(QObject):
         super().__init__()
         self._settings, self._complain, self._platform = settings, complain, platform
         self.commands: Mapping[str, Command[Any]] = {command.id: command for command in commands}
-        self._own = self._read()
+        self._custom_keys = self._read()
 
     def _read(self) -> dict[str, tuple[str, ...]]:
         saved: dict[str, object] = self._settings.get("shortcuts", {})
@@ -168,10 +168,13 @@ class Shortcuts(QObject):
 
     def keys_of(self, name: str) -> tuple[str, ...]:
         """Return the current shortcuts of a command; menus show the first one."""
-        keys = self._own.get(name, self.default_keys(name))
+        keys = self._custom_keys.get(name, self.default_keys(name))
         if name == STOP_COMMAND:
             assigned = {
-                key for other, other_keys in self._own.items() if other != STOP_COMMAND for key in other_keys
+                key
+                for other, other_keys in self._custom_keys.items()
+                if other != STOP_COMMAND
+                for key in other_keys
             }
             return (STOP_KEY, *(key for key in keys if key != STOP_KEY and key not in assigned))
         return tuple(key for key in keys if key != STOP_KEY)
@@ -217,16 +220,16 @@ class Shortcuts(QObject):
         """
         key, owner = normal(key), self.command_for(key)
         if owner and owner != name:
-            self._own[owner] = tuple(each for each in self.keys_of(owner) if each != key)
-        self._own[name] = (key,) if key else ()
+            self._custom_keys[owner] = tuple(each for each in self.keys_of(owner) if each != key)
+        self._custom_keys[name] = (key,) if key else ()
         self._save()
 
     def swap(self, name: str, key: str) -> None:
         """Assign a shortcut to a command, and the command's first shortcut to the one that had it."""
         owner, before = self.command_for(key), self.first(name)
-        self._own[name] = (normal(key),)
+        self._custom_keys[name] = (normal(key),)
         if owner and owner != name:
-            self._own[owner] = (before,) if before and before != STOP_KEY else ()
+            self._custom_keys[owner] = (before,) if before and before != STOP_KEY else ()
         self._save()
 
     def reset(self, name: str) -> None:
@@ -235,24 +238,26 @@ class Shortcuts(QObject):
         Another command that loses its only shortcut gets its default back, unless that is assigned to a
         third command. After a swap, therefore, no command is left without a shortcut.
         """
-        self._own.pop(name, None)
+        self._custom_keys.pop(name, None)
         for key in self.default_keys(name):
-            for other in [each for each in self._own if each != name and key in self._own[each]]:
-                self._own[other] = tuple(each for each in self._own[other] if each != key)
-                if not self._own[other] and not any(map(self.command_for, self.default_keys(other))):
-                    del self._own[other]
+            for other in [
+                each for each in self._custom_keys if each != name and key in self._custom_keys[each]
+            ]:
+                self._custom_keys[other] = tuple(each for each in self._custom_keys[other] if each != key)
+                if not self._custom_keys[other] and not any(map(self.command_for, self.default_keys(other))):
+                    del self._custom_keys[other]
         self._save()
 
     def reset_all(self) -> None:
         """Restore the default shortcuts of all commands."""
-        self._own = {}
+        self._custom_keys = {}
         self._save()
 
     def _save(self) -> None:
-        for name in [name for name in self._own if not self.is_customised(name)]:
-            del self._own[name]
+        for name in [name for name in self._custom_keys if not self.is_customised(name)]:
+            del self._custom_keys[name]
         try:
-            self._settings.set("shortcuts", {name: list(keys) for name, keys in self._own.items()})
+            self._settings.set("shortcuts", {name: list(keys) for name, keys in self._custom_keys.items()})
         except SettingsError as error:
             self._complain(str(error))
         self.changed.emit()

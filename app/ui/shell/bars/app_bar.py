@@ -180,13 +180,13 @@ class PaletteField(PaintedButton):
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(theme, _("Find a command or panel"), radius="control", parent=parent)
         self._key = ""
-        self._bare = False
+        self._is_icon_only = False
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     def set_icon_only(self, icon_only: bool) -> None:
         """Hide the shortcut if `icon_only`, so that the button can be narrower."""
-        if icon_only != self._bare:
-            self._bare = icon_only
+        if icon_only != self._is_icon_only:
+            self._is_icon_only = icon_only
             self.updateGeometry()
             self.update()
 
@@ -200,7 +200,7 @@ class PaletteField(PaintedButton):
         return self._theme.scaled(ICON)
 
     def _key_cap_width(self) -> float:
-        return paint.key_width(self._theme, self._key) + 7 if self._key and not self._bare else 0.0
+        return paint.key_width(self._theme, self._key) + 7 if self._key and not self._is_icon_only else 0.0
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("body")
@@ -230,7 +230,7 @@ class PaletteField(PaintedButton):
             paint.text_line(
                 painter, area, self.text() if is_full_text else _("Find"), font, theme.colour("textSecondary")
             )
-        if self._key and not self._bare:
+        if self._key and not self._is_icon_only:
             paint.key_cap(painter, theme, rect.right() - 6, middle, self._key)
 
 

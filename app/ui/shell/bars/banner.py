@@ -268,7 +268,7 @@ class AlertBanner(QWidget):
         self._alert: AlertLike | None = None
         self._alerts: Sequence[AlertLike] = ()
         self._offer: tuple[Callable[[], object], Callable[[], object]] | None = None
-        self._placed = ""
+        self._positioned_identity = ""
         self._fresh_until = 0.0
         self.on_action: Callable[[str], object] = lambda _name: None
         self.on_dismiss: Callable[[str], object] = lambda _alert_id: None
@@ -277,7 +277,7 @@ class AlertBanner(QWidget):
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(self.banner)
         self.banner.pressed.connect(self._next_step)
-        self.banner.second_pressed.connect(lambda: self._answer(1))
+        self.banner.second_pressed.connect(lambda: self._run_offer_action(1))
         self.banner.more_pressed.connect(self._show_more)
         self.banner.closed.connect(self._close)
         self.banner.mouse_exited.connect(lambda: self.show_alerts(self._alerts))
@@ -347,7 +347,7 @@ class AlertBanner(QWidget):
                 return updated
         return alerts[0] if alerts else None
 
-    def _answer(self, which: int) -> None:
+    def _run_offer_action(self, which: int) -> None:
         if self._offer is not None:
             action = self._offer[which]
             self._offer = None
@@ -356,7 +356,7 @@ class AlertBanner(QWidget):
 
     def _next_step(self) -> None:
         if self._offer is not None:
-            self._answer(0)
+            self._run_offer_action(0)
         elif self._alert is not None and self._alert.action is not None:
             self.on_action(self._alert.action)
 
@@ -379,11 +379,11 @@ class AlertBanner(QWidget):
         mouse pointer ignores clicks for `CLICK_GUARD_S`.
         """
         if not self.identity:
-            self._placed = ""
+            self._positioned_identity = ""
             return
         paint.show_when(self, area.width() >= self._theme.scaled(MIN_WIDTH))
-        if area != self.geometry() or self.identity != self._placed:
-            self._placed = self.identity
+        if area != self.geometry() or self.identity != self._positioned_identity:
+            self._positioned_identity = self.identity
             self.setGeometry(area)
             self.raise_()
             self._fresh_until = self.clock() + CLICK_GUARD_S if self._is_under_mouse() else 0.0

@@ -30,7 +30,7 @@ class ChoiceButton(PaintedButton):
         # `key` is "" for choices beyond the number keys.
         super().__init__(theme, text, radius="large")
         self.key = key
-        self._shown = plain.make_breakable(text)
+        self._display_text = plain.make_breakable(text)
         self.setProperty("ownFocus", True)
 
     def _font(self) -> QFont:
@@ -46,7 +46,7 @@ class ChoiceButton(PaintedButton):
     def height_for(self, width: int) -> int:
         """Return the height in px that the button needs at a width in px."""
         room = QRectF(0, 0, max(1.0, width - self._text_left() - PADDING), 1e6)
-        needed = QFontMetricsF(self._font()).boundingRect(room, _WRAP_FLAGS, self._shown).height()
+        needed = QFontMetricsF(self._font()).boundingRect(room, _WRAP_FLAGS, self._display_text).height()
         return max(round(self._theme.scaled(MIN_HEIGHT)), math.ceil(needed) + 2 * PADDING)
 
     def sizeHint(self) -> QSize:
@@ -77,7 +77,7 @@ class ChoiceButton(PaintedButton):
             paint.key_cap(painter, theme, right, rect.center().y(), self.key)
         painter.setFont(self._font())
         painter.setPen(role("text" if self.isEnabled() else "textDisabled"))
-        painter.drawText(rect.adjusted(self._text_left(), 0, -PADDING, 0), _WRAP_FLAGS, self._shown)
+        painter.drawText(rect.adjusted(self._text_left(), 0, -PADDING, 0), _WRAP_FLAGS, self._display_text)
 
 
 class ChoiceGrid(QWidget):

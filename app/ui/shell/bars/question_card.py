@@ -42,10 +42,10 @@ class QuestionCard(FloatingCard):
     def __init__(self, theme: Theme, window: QWidget, answer: Callable[[AskedQuestion, str], object]) -> None:
         # `answer` gets the question and the text or choice.
         super().__init__(window)
-        self._theme, self._answer = theme, answer
+        self._theme, self._on_answer = theme, answer
         self._question: AskedQuestion | None = None
         self._before: QWidget | None = None
-        self._held = False
+        self._is_paused = False
         self.words = label("", "heading", wrap=True)
         self.field = QLineEdit()
         self.field.setMaxLength(MAX_ANSWER_LENGTH)
@@ -89,7 +89,7 @@ class QuestionCard(FloatingCard):
                 self._close()
             else:
                 self._open(question)
-        if question is not None and paused != self._held:
+        if question is not None and paused != self._is_paused:
             self._set_paused(paused=paused)
 
     def _open(self, question: AskedQuestion) -> None:
@@ -116,7 +116,7 @@ class QuestionCard(FloatingCard):
 
     def focus_input(self) -> None:
         """Set the focus to the input if there is a question and the card is enabled."""
-        if self._question is None or self._held:
+        if self._question is None or self._is_paused:
             return
         if self.choices.buttons:
             self.choices.focus_first()
@@ -136,7 +136,7 @@ class QuestionCard(FloatingCard):
 
     def _set_paused(self, *, paused: bool) -> None:
         had_focus = self._has_focus()
-        self._held = paused
+        self._is_paused = paused
         if had_focus and paused and self.choices.buttons:
             # Otherwise Qt would move the focus from the disabled widget to the next one in the window.
             self.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -192,8 +192,8 @@ class QuestionCard(FloatingCard):
 
     def _send(self, text: str) -> None:
         question = self._question
-        if question is not None and not self._held:
-            self._answer(question, text)
+        if question is not None and not self._is_paused:
+            self._on_answer(question, text)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme

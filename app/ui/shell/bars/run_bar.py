@@ -185,7 +185,7 @@ class StopResultLabel(QWidget):
     def __init__(self, theme: Theme, *, compact: bool = False) -> None:
         super().__init__()
         self._theme, self._compact = theme, compact
-        self._look, self._text = "", ""
+        self._appearance, self._text = "", ""
         self._status: StopStatus = "off"
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self.updateGeometry)
@@ -199,7 +199,7 @@ class StopResultLabel(QWidget):
     @property
     def appearance(self) -> str:
         """Style of the widget: "ok", "off", "error", "counting", "reminder", or "" if there is no result."""
-        return self._look
+        return self._appearance
 
     @property
     def status(self) -> StopStatus:
@@ -218,8 +218,8 @@ class StopResultLabel(QWidget):
         elif view.last_stop and not self._compact:
             appearance, text = "reminder", view.last_stop
         status = view.last_stop_status if appearance == "reminder" else view.result_status
-        if (appearance, text, status) != (self._look, self._text, self._status):
-            self._look, self._text, self._status = appearance, text, status
+        if (appearance, text, status) != (self._appearance, self._text, self._status):
+            self._appearance, self._text, self._status = appearance, text, status
             self.setAccessibleName(text)
             self.setToolTip(plain.tip(text))
             if appearance in {"ok", "off", "error"}:
@@ -229,21 +229,21 @@ class StopResultLabel(QWidget):
             self.update()
 
     def _font(self) -> QFont:
-        if self._compact or self._look == "reminder":
+        if self._compact or self._appearance == "reminder":
             font = self._theme.font("small" if self._compact else "body")
             font.setWeight(font.Weight.Medium)
             return font
         return self._theme.font("button")
 
     def _icon(self) -> int:
-        return 14 if self._compact else 16 if self._look == "reminder" else 20
+        return 14 if self._compact else 16 if self._appearance == "reminder" else 20
 
     def sizeHint(self) -> QSize:
         width = paint.width_of(self._font(), self._text)
-        if self._look == "counting":
+        if self._appearance == "counting":
             return QSize(round(width) + 10, 44 if not self._compact else 28)
-        width += self._icon() + (6 if self._compact or self._look == "reminder" else 10)
-        if self._look != "reminder":
+        width += self._icon() + (6 if self._compact or self._appearance == "reminder" else 10)
+        if self._appearance != "reminder":
             width += 17 if self._compact else 28
         min_height = 28 if self._compact else 44
         return QSize(round(width) + 2, max(min_height, round(paint.height_of(self._font())) + 10))
@@ -255,10 +255,10 @@ class StopResultLabel(QWidget):
         theme = self._theme
         painter = QPainter(self)
         rect = QRectF(self.rect())
-        if self._look == "counting":
+        if self._appearance == "counting":
             area, colour = rect.adjusted(0, 0, -8, 0), theme.colour("textSecondary")
             paint.text_line(painter, area, self._text, self._font(), colour, paint.RIGHT)
-        elif self._look == "reminder":
+        elif self._appearance == "reminder":
             self._paint_reminder(painter, rect)
         else:
             status = theme.status(self._status)
@@ -282,7 +282,7 @@ class StopResultLabel(QWidget):
         side = self._icon()
         icon_area = QRectF(rect.left(), rect.center().y() - side / 2, side, side)
         paint_icon(painter, icon_area, status.icon, theme.colour(status.colour))
-        text_left = side + (6 if self._compact or self._look == "reminder" else 10)
+        text_left = side + (6 if self._compact or self._appearance == "reminder" else 10)
         paint.text_line(
             painter, rect.adjusted(text_left, 0, 0, 0), self._text, self._font(), theme.colour(status.colour)
         )

@@ -28,13 +28,13 @@ class Toast(FloatingCard):
         self._theme = theme
         self._run: Callable[[], object] | None = None
         self._until: Callable[[], bool] | None = None
-        self._words = label("", "bodyLarge", wrap=True)
+        self._label = label("", "bodyLarge", wrap=True)
         self.button = Button(theme, "", kind="ghost", size="small")
         self.button.clicked.connect(self._on_button_pressed)
         row = QHBoxLayout(self)
         row.setContentsMargins(16, 10, 12, 10)
         row.setSpacing(10)
-        row.addWidget(self._words)
+        row.addWidget(self._label)
         row.addWidget(self.button)
         shadow = QGraphicsDropShadowEffect(self)
         shadow.setBlurRadius(24)
@@ -48,7 +48,7 @@ class Toast(FloatingCard):
     @property
     def text(self) -> str:
         """Sentence of the current or last toast."""
-        return self._words.text()
+        return self._label.text()
 
     def show_toast(
         self,
@@ -67,7 +67,7 @@ class Toast(FloatingCard):
             until: Returns True when the sentence is outdated, which closes the toast early.
         """
         self._until = until
-        self._words.setText(text)
+        self._label.setText(text)
         self.setAccessibleName(text)
         paint.announce(self, text)
         self._run = run
@@ -99,8 +99,8 @@ class Toast(FloatingCard):
             self.move(max(MARGIN, left), window.height() - self.height() - BOTTOM_MARGIN)
 
     def _fit(self, room: int) -> None:
-        aside = self.sizeHint().width() - self._words.sizeHint().width()
-        line = paint.width_of(self._words.font(), self._words.text()) + 2
+        aside = self.sizeHint().width() - self._label.sizeHint().width()
+        line = paint.width_of(self._label.font(), self._label.text()) + 2
         width = min(room, round(line) + aside)
         layout = self.layout()
         height = layout.totalHeightForWidth(width) if layout is not None else 0

@@ -47,7 +47,7 @@ class Commands:
         self.replay = ReplayCommands(shell, session, dialogs)
         self.files.open_recording = self.replay.open
         self.files.open_layout = self.view.open_layout
-        self._do = Handlers(
+        self._handlers = Handlers(
             session,
             shell,
             self.files,
@@ -61,7 +61,7 @@ class Commands:
             self.replay,
             ActingCommands(shell),
         )
-        self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._do)
+        self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._handlers)
         self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.disabled_reason, keys)
         menus = self.actions.fill(shell.menu_bar, MENUS)
         self.menus = DynamicMenus(shell, session, self.actions, menus, self.view, self.files.open)
@@ -91,4 +91,4 @@ class Commands:
         command = _ARGUMENT_COMMANDS_BY_ID.get(id)
         if command is None:
             raise UnknownCommandError(id)
-        return command.run(self._do, argument)
+        return command.run(self._handlers, argument)

@@ -32,7 +32,7 @@ class EditCommands:
 
     def __init__(self, shell: Shell) -> None:
         self._shell = shell
-        self._had: QWidget | None = None
+        self._last_focused: QWidget | None = None
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.focusChanged.connect(self._on_focus_changed)
@@ -40,7 +40,7 @@ class EditCommands:
     def _on_focus_changed(self, _old: QWidget | None, now: QWidget | None) -> None:
         # The menu bar takes the focus when it is opened by Alt: remember the widget that had it before.
         if now is not None and not isinstance(now, (QMenu, QMenuBar)):
-            self._had = now
+            self._last_focused = now
 
     def run(self, edit: Edit) -> None:
         """Apply an edit to the focused field or to the blocks."""
@@ -60,5 +60,7 @@ class EditCommands:
         return "" if self._shell.current_layout == "behaviour" else _("Only for blocks and text fields")
 
     def _focused_field(self) -> Field | None:
-        focused = self._had if self._had is not None and isValid(self._had) else None
+        focused = (
+            self._last_focused if self._last_focused is not None and isValid(self._last_focused) else None
+        )
         return focused if isinstance(focused, FIELD_TYPES) and focused.isVisible() else None

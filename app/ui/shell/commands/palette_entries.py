@@ -36,10 +36,10 @@ class PaletteEntries:
     ) -> None:
         # `why_not` returns the reason why a command is unavailable, or "".
         self._shell, self._session, self._shortcuts = shell, session, shortcuts
-        self._shown = [command for command in commands if command.in_palette]
-        self._why_not = disabled_reason
+        self._palette_commands = [command for command in commands if command.in_palette]
+        self._disabled_reason = disabled_reason
         self._topics: list[Entry] = []
-        self._topics_seen = (-1, -1)
+        self._topic_revisions = (-1, -1)
 
     def all(self) -> list[Entry]:
         """Return all entries. Among equally good matches the palette keeps this order."""
@@ -55,8 +55,8 @@ class PaletteEntries:
 
     def _commands(self) -> list[Entry]:
         entries = []
-        for command in self._shown:
-            key, reason = self._shortcuts.first(command.id), self._why_not(command.id)
+        for command in self._palette_commands:
+            key, reason = self._shortcuts.first(command.id), self._disabled_reason(command.id)
             icon = command.icon or "chevrons-right"
             entries.append(Entry(f"command:{command.id}", command.label, icon, _(command.menu), key, reason))
         return entries
@@ -102,8 +102,8 @@ class PaletteEntries:
 
     def _topic_entries(self) -> list[Entry]:
         topics, networks = self._session.topics, self._session.networks
-        if (topics.revision, networks.revision) != self._topics_seen:
-            self._topics_seen = topics.revision, networks.revision
+        if (topics.revision, networks.revision) != self._topic_revisions:
+            self._topic_revisions = topics.revision, networks.revision
             current_topics = [
                 *topics.existing_topics(),
                 *(topic for topic in networks.topics if topic.gone_since is None),

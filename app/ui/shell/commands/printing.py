@@ -53,7 +53,7 @@ class PrintCommands:
         printers: Callable[[], list[str]] | None = None,
     ) -> None:
         # `printers` returns the names of the computer's printers.
-        self._shell, self._session, self._asks = shell, session, dialogs
+        self._shell, self._session, self._dialogs = shell, session, dialogs
         self._printers = printers if printers is not None else printer_names
 
     def show_dialog(self) -> None:
@@ -92,7 +92,7 @@ class PrintCommands:
 
     def ask_save_pdf(self) -> None:
         """Ask for a file and save the blocks to it as PDF."""
-        self._asks.save_as(
+        self._dialogs.save_as(
             _("Save blocks as PDF"),
             suggested_path(self._session.document),
             (FileKind("PDF", ".pdf"),),

@@ -56,7 +56,7 @@ class ImageCommands:
     """Handlers that save or copy an image of the current behaviour's blocks."""
 
     def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
-        self._shell, self._session, self._asks = shell, session, dialogs
+        self._shell, self._session, self._dialogs = shell, session, dialogs
 
     def ask_save(self) -> None:
         """Ask for a file and format, then save the image."""
@@ -65,7 +65,7 @@ class ImageCommands:
         def take(path: Path, kind: FileKind) -> None:
             self.save(path, kind.suffix.lstrip("."), kind in OPAQUE_IMAGE_KINDS)
 
-        self._asks.save_as(_("Save blocks as image"), suggestion, IMAGE_KINDS, take)
+        self._dialogs.save_as(_("Save blocks as image"), suggestion, IMAGE_KINDS, take)
 
     def save(self, path: Path, kind: str, white: bool) -> None:
         """Save an image of the blocks, adding the file extension if it is missing.

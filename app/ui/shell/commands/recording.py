@@ -33,7 +33,7 @@ class RecordCommands:
     """Handlers of the commands for recording, used by shortcuts, menus, the tool bar and the sheet."""
 
     def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
-        self._shell, self._session, self._asks = shell, session, dialogs
+        self._shell, self._session, self._dialogs = shell, session, dialogs
         self._recordings = session.recordings
         self._recordings.on_made = self._on_saved
         self._sheet: record_sheet.RecordSheet | None = None
@@ -141,7 +141,7 @@ class RecordCommands:
             self._shell.show_toast(_("Recordings are saved in {folder}").format(folder=folder))
 
         start_folder = recordings.folder
-        self._asks.select_folder(str(start_folder if start_folder.is_dir() else Path.home()), take)
+        self._dialogs.select_folder(str(start_folder if start_folder.is_dir() else Path.home()), take)
 
     def _on_saved(self, path: Path, kind: str) -> None:
         if kind == "kept":

@@ -28,13 +28,13 @@ class ReplayCommands:
     """Handlers of the commands that show a recording in place of the live network."""
 
     def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
-        self._shell, self._session, self._asks = shell, session, dialogs
+        self._shell, self._session, self._dialogs = shell, session, dialogs
 
     def ask_open(self) -> None:
         """Ask for a recording and open it."""
         replay = self._session.replay
         start_folder = replay.path.parent if replay is not None else folder.default_folder()
-        self._asks.open_recording(str(start_folder), self.open)
+        self._dialogs.open_recording(str(start_folder), self.open)
 
     def open(self, path: Path) -> None:
         """Open a recording and show the timeline; an error is shown as an alert."""

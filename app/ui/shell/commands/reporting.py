@@ -46,7 +46,7 @@ class ReportCommands:
         clock: Callable[[], float] = time.time,
     ) -> None:
         # `clock` returns seconds since 1970.
-        self._shell, self._session, self._files, self._asks = shell, session, files, dialogs
+        self._shell, self._session, self._files, self._dialogs = shell, session, files, dialogs
         self._clock = clock
         self._sheet: report_sheet.ReportSheet | None = None
 
@@ -62,7 +62,7 @@ class ReportCommands:
         shell, session = self._shell, self._session
         if self._sheet is None:
             self._sheet = report_sheet.ReportSheet(
-                shell.theme, shell.surface, self._asks, shell.show_toast, self._clock
+                shell.theme, shell.surface, self._dialogs, shell.show_toast, self._clock
             )
         parts = problem_report.ReportParts(
             qt_info(shell.surface), session.settings.all(), lambda: session.doctor.report(DOCTOR_TIMEOUT_S)

@@ -43,7 +43,7 @@ class AboutSheet(Overlay):
     def __init__(self, theme: Theme, window: QWidget, notify: Callable[[str], object]) -> None:
         # `say` confirms that the versions were copied.
         super().__init__(theme, window, TITLE)
-        self._say = notify
+        self._notify = notify
         column = QVBoxLayout(self)
         column.setContentsMargins(20, 16, 20, 18)
         column.setSpacing(12)
@@ -80,7 +80,7 @@ class AboutSheet(Overlay):
     def _copy(self) -> None:
         text = "\n".join(f"{name}: {version}" for name, version in versions())
         QGuiApplication.clipboard().setText(text)
-        self._say(_("Copied version information"))
+        self._notify(_("Copied version information"))
 
     def first(self) -> QWidget:
         return self._close

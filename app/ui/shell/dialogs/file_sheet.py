@@ -168,8 +168,8 @@ class FileSheet(Overlay):
         # `places` is called whenever the sheet opens.
         super().__init__(theme, window, _("Files"))
         self._scrim.pressed.disconnect(self.dismiss)  # a click outside must not discard a typed name
-        self._places = locations
-        self._take: Callable[[Path], object] = lambda _path: None
+        self._locations = locations
+        self._callback: Callable[[Path], object] = lambda _path: None
         self.question = OPEN_QUESTION
         self.folder = Path.home()
         self.heading = label("", "heading")
@@ -177,7 +177,7 @@ class FileSheet(Overlay):
         self.up.clicked.connect(lambda: self.go_to(self.folder.parent))
         self.path = ElidedLabel("body", "textSecondary")
         self.new_folder = Button(theme, _("New folder"), "folder-plus", size="small")
-        self.new_folder.clicked.connect(self._ask_folder)
+        self.new_folder.clicked.connect(self._start_new_folder)
         self.folder_name = QLineEdit()
         self.folder_name.setPlaceholderText(_("Folder name"))
         self.folder_name.setAccessibleName(_("Folder name"))
@@ -343,7 +343,7 @@ class FileSheet(Overlay):
         self._validate()
 
     def _ask(self, question: FileQuestion, folder: Path, callback: Callable[[Path], object]) -> None:
-        self.question, self._take = question, callback
+        self.question, self._callback = question, callback
         heading = _(question.heading)
         self.heading.setText(heading)
         self.setAccessibleName(heading)
@@ -378,7 +378,7 @@ class FileSheet(Overlay):
         while column.count() > 1 and (item := column.takeAt(0)) is not None:
             if (old := item.widget()) is not None:
                 old.deleteLater()
-        for number, location in enumerate(self._places()):
+        for number, location in enumerate(self._locations()):
             button = Button(self.theme, location.name, location.icon, kind="ghost", size="small")
             button.allow_shrinking()
             button.setToolTip(plain.tip(str(location.folder)))
@@ -445,7 +445,7 @@ class FileSheet(Overlay):
         elif isinstance(item, _Row):
             self.name.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _ask_folder(self) -> None:
+    def _start_new_folder(self) -> None:
         self._show_folder_field(True)
         self.folder_name.clear()
         self.folder_name.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -561,7 +561,7 @@ class FileSheet(Overlay):
 
     def _finish(self, path: Path) -> None:
         self.dismiss()
-        self._take(path)
+        self._callback(path)
 
     def _reload(self) -> None:
         if self.isVisible():

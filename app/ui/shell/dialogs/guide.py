@@ -117,9 +117,9 @@ class PageView(QTextBrowser):
         self.setProperty("bare", "true")
         self.setOpenLinks(False)
         self.setAccessibleName(_("Page"))
-        self._again = QTimer(self)
-        self._again.setSingleShot(True)
-        self._again.timeout.connect(self._fit_pictures)
+        self._fit_timer = QTimer(self)
+        self._fit_timer.setSingleShot(True)
+        self._fit_timer.timeout.connect(self._fit_pictures)
 
     def show_page(self, page: GuidePage) -> None:
         """Show a page and scroll to its start."""
@@ -137,7 +137,7 @@ class PageView(QTextBrowser):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         if self._laid_for and self._laid_for != self._available_width():
-            self._again.start(0)
+            self._fit_timer.start(0)
 
     def _available_width(self) -> int:
         return self.viewport().width() - 2 * round(self.document().documentMargin())

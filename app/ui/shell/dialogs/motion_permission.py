@@ -52,7 +52,7 @@ class MotionPermissionCard(QWidget):
         # `complain` is called with a message if "always" can't be saved.
         super().__init__(window)
         self._theme, self._moving = theme, moving
-        self._seen = moving.revision
+        self._last_revision = moving.revision
         self._before: QWidget | None = None
         self._complain = complain
         self._always_for = ""
@@ -98,9 +98,9 @@ class MotionPermissionCard(QWidget):
 
     def refresh(self) -> None:
         """Show the pending question, or hide the card if there is none."""
-        if self._moving.revision == self._seen:
+        if self._moving.revision == self._last_revision:
             return
-        self._seen = self._moving.revision
+        self._last_revision = self._moving.revision
         question = self._moving.question
         if question is None:
             self._close()
@@ -119,7 +119,7 @@ class MotionPermissionCard(QWidget):
         if not self.isVisible():
             self._before = QApplication.focusWidget()
         self.show()  # before measuring: showing the card applies fonts and margins of the style sheet
-        self._place()
+        self._reposition()
         self.raise_()
         self.not_now.setFocus(Qt.FocusReason.PopupFocusReason)
 
@@ -138,7 +138,7 @@ class MotionPermissionCard(QWidget):
             self._complain(error.sentence)
         self.refresh()
 
-    def _place(self) -> None:
+    def _reposition(self) -> None:
         window = self.parentWidget()
         if window is None:
             return
@@ -164,7 +164,7 @@ class MotionPermissionCard(QWidget):
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize and self.isVisible():
-            self._place()
+            self._reposition()
         return False
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -24,8 +24,8 @@ class NameSheet(Overlay):
 
     def __init__(self, theme: Theme, window: QWidget) -> None:
         super().__init__(theme, window, _("Name"))
-        self._refusal: Callable[[str], str] = lambda _name: ""
-        self._take: Callable[[str], object] = lambda _name: None
+        self._rejection_reason: Callable[[str], str] = lambda _name: ""
+        self._callback: Callable[[str], object] = lambda _name: None
         self.heading = label("", "heading")
         self.field = QLineEdit()
         self.field.setProperty("focusRadius", theme.radius("control"))
@@ -64,7 +64,7 @@ class NameSheet(Overlay):
             take: Called with the name if it is valid.
             name: Initial text.
         """
-        self._refusal, self._take = refusal, take
+        self._rejection_reason, self._callback = refusal, take
         self.setAccessibleName(question)
         self.heading.setText(question)
         self.field.setAccessibleName(question)
@@ -101,15 +101,15 @@ class NameSheet(Overlay):
     def _on_edited(self, text: str) -> None:
         # No error is shown for an empty field until the button is pressed.
         name = text.strip()
-        message = self._refusal(name) if name else ""
+        message = self._rejection_reason(name) if name else ""
         self._show_error(message)
-        self.button.setEnabled(not message and bool(name or not self._refusal("")))
+        self.button.setEnabled(not message and bool(name or not self._rejection_reason("")))
 
     def _submit(self) -> None:
         name = self.field.text().strip()
-        message = self._refusal(name)
+        message = self._rejection_reason(name)
         if message:
             self._show_error(message)
             return
         self.dismiss()
-        self._take(name)
+        self._callback(name)

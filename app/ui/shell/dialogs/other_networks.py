@@ -37,9 +37,9 @@ class OtherNetworksSheet(Overlay):
         super().__init__(theme, window, _("Other networks"))
         self.rows = [NetworkRow(theme, each, networks) for each in networks]
         self.introduction = label(_(INTRODUCTION), "body", role="textSecondary", wrap=True)
-        self._inside = QWidget()
-        self._inside.setProperty("bare", "true")
-        content_column = QVBoxLayout(self._inside)
+        self._content = QWidget()
+        self._content.setProperty("bare", "true")
+        content_column = QVBoxLayout(self._content)
         content_column.setContentsMargins(SIDE, 0, SIDE, 0)
         content_column.setSpacing(GAP)
         content_column.addWidget(self.introduction)
@@ -52,13 +52,13 @@ class OtherNetworksSheet(Overlay):
         self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._area.viewport().setAutoFillBackground(False)
-        self._area.setWidget(self._inside)
-        self._head = self.make_header(label(_("Other networks"), "heading"))
-        self._head.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._area.setWidget(self._content)
+        self._header = self.make_header(label(_("Other networks"), "heading"))
+        self._header.setContentsMargins(SIDE, 0, SIDE, 0)
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 14, 1, 16)
         column.setSpacing(10)
-        column.addLayout(self._head)
+        column.addLayout(self._header)
         column.addWidget(self._area, 1)
         self._timer = QTimer(self)
         self._timer.setInterval(REFRESH_MS)
@@ -75,7 +75,7 @@ class OtherNetworksSheet(Overlay):
         height = self.introduction.heightForWidth(inner)
         # measured per row, because layout items are updated late after a change of text
         height += sum(row.height_for(inner) + 1 + 2 * GAP for row in self.rows)
-        return QSize(width, min(room.height(), height + self._head.sizeHint().height() + 14 + 10 + 16 + 4))
+        return QSize(width, min(room.height(), height + self._header.sizeHint().height() + 14 + 10 + 16 + 4))
 
     def open(self) -> None:
         """Open the sheet and update the states until it is closed."""
@@ -117,7 +117,7 @@ class NetworkRow(QWidget):
         )
         caption = label(address_label, "small", role="textTertiary")
         self.state = label("", "small", role="textSecondary", wrap=True)
-        self._wrong = ""
+        self._error = ""
         above = QHBoxLayout()
         above.setSpacing(10)
         above.addWidget(self.switch)
@@ -147,8 +147,8 @@ class NetworkRow(QWidget):
 
     def show_state(self) -> None:
         """Update the text of the state, which shows an error if the last change failed."""
-        text = self._wrong or state_text(self._network)
-        role = "error" if self._wrong else "warn" if self._network.state == "lost" else "textSecondary"
+        text = self._error or state_text(self._network)
+        role = "error" if self._error else "warn" if self._network.state == "lost" else "textSecondary"
         set_role(self.state, role)
         if text != self.state.text():
             self.state.setText(text)
@@ -179,7 +179,7 @@ class NetworkRow(QWidget):
                 self.address.setText(self._network.address)
 
     def _show_error(self, message: str) -> None:
-        self._wrong = message
+        self._error = message
         self.address.set_invalid(is_invalid=bool(message))
         self.show_state()
         if message:
@@ -191,7 +191,7 @@ class AddressField(QLineEdit):
 
     def __init__(self, theme: Theme, name: str, example: str, callback: Callable[[], object]) -> None:
         super().__init__()
-        self._take = callback
+        self._on_submit = callback
         self.setAccessibleName(name)
         self.setPlaceholderText(example)
         self.setProperty("focusRadius", theme.radius("control"))
@@ -207,7 +207,7 @@ class AddressField(QLineEdit):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-            self._take()
+            self._on_submit()
         else:
             super().keyPressEvent(event)
 

@@ -105,8 +105,8 @@ class RecordSheet(Overlay):
     ) -> None:
         # `keep` saves the contents of the flight recorder.
         super().__init__(theme, window, _("Record"))
-        self._session, self._recordings, self._say = session, session.recordings, show_toast
-        self._seen: object = None
+        self._session, self._recordings, self._show_toast = session, session.recordings, show_toast
+        self._last_state: object = None
         self._included: set[str] = set()
         self._written: tuple[float, int] | None = None
         self._speed: float | None = None
@@ -253,9 +253,9 @@ class RecordSheet(Overlay):
         return box
 
     def _make_scroll_area(self) -> QScrollArea:
-        self._inside = QWidget()
-        self._inside.setProperty("bare", "true")
-        column = QVBoxLayout(self._inside)
+        self._content = QWidget()
+        self._content.setProperty("bare", "true")
+        column = QVBoxLayout(self._content)
         column.setContentsMargins(SIDE, 0, SIDE, 4)
         column.setSpacing(12)
         column.addWidget(self._meters)
@@ -269,7 +269,7 @@ class RecordSheet(Overlay):
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         area.viewport().setAutoFillBackground(False)
-        area.setWidget(self._inside)
+        area.setWidget(self._content)
         return area
 
     def _arrange(self) -> None:
@@ -295,7 +295,7 @@ class RecordSheet(Overlay):
 
     def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
-        min_width = self._inside.minimumSizeHint().width() + 2
+        min_width = self._content.minimumSizeHint().width() + 2
         return QSize(max(round(scaled(WIDE)), min_width), round(scaled(HIGH))).boundedTo(room)
 
     def _is_docked(self) -> bool:
@@ -403,7 +403,7 @@ class RecordSheet(Overlay):
         self.ring_topics.set_invalid(bool(settings.problem))
         self.seconds.show_number(settings.seconds)
         self.size_gb.show_number(settings.size_gb)
-        self._seen = None
+        self._last_state = None
 
     def _show_pattern_problem(self, problem: str) -> None:
         self.wrong.setText(problem)
@@ -482,8 +482,8 @@ class RecordSheet(Overlay):
     def _show_topics(self) -> None:
         topics = sorted(self._session.topics.existing_topics(), key=lambda topic: topic.name)
         state = (self._session.topics.revision, self.choice)
-        if state != self._seen:
-            self._seen = state
+        if state != self._last_state:
+            self._last_state = state
             selection = self._selection()
             self._included = {
                 each.name for each in topics if selection is not None and selection.has(each.name)
@@ -578,7 +578,7 @@ class RecordSheet(Overlay):
 
     def _add_bookmark(self) -> None:
         self._recordings.client.add_bookmark("")
-        self._say(_("Bookmark at {time}").format(time=length_text(self._recordings.elapsed_s)))
+        self._show_toast(_("Bookmark at {time}").format(time=length_text(self._recordings.elapsed_s)))
 
     def _toggle_recording(self) -> None:
         recordings = self._recordings
@@ -587,7 +587,7 @@ class RecordSheet(Overlay):
         else:
             reason = recordings.record(self.name.text(), self.note.text())
             if reason:
-                self._say(reason)
+                self._show_toast(reason)
         self.show_state()
 
 

@@ -76,7 +76,7 @@ class ReportSheet(Overlay):
     ) -> None:
         # `say` announces a finished report if the sheet is closed; `clock` returns seconds since 1970.
         super().__init__(theme, window, _("Report a problem"))
-        self._asks, self._say, self._clock = dialogs, notify, clock
+        self._dialogs, self._notify, self._clock = dialogs, notify, clock
         self._parts: ReportParts | None = None
         self._behaviours: ReportedWorkGetter = tuple
         self._writer: ReportWriter | None = None
@@ -100,33 +100,33 @@ class ReportSheet(Overlay):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        self._head = self.make_header(label(_("Report a problem"), "heading"))
-        self._head.setContentsMargins(SIDE, 0, SIDE, 0)
-        self._inside = QWidget()
-        self._inside.setProperty("bare", "true")
-        self._fill(QVBoxLayout(self._inside))
+        self._header = self.make_header(label(_("Report a problem"), "heading"))
+        self._header.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._content = QWidget()
+        self._content.setProperty("bare", "true")
+        self._fill(QVBoxLayout(self._content))
         self._area = QScrollArea()
         self._area.setWidgetResizable(True)
         self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._area.viewport().setAutoFillBackground(False)
-        self._area.setWidget(self._inside)
-        self._foot = QHBoxLayout()
-        self._foot.setContentsMargins(SIDE, 0, SIDE, 0)
-        self._foot.setSpacing(10)
-        self._foot.addStretch(1)
-        self._foot.addWidget(self.write)
-        self._foot.addWidget(self.show_file)
+        self._area.setWidget(self._content)
+        self._footer = QHBoxLayout()
+        self._footer.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._footer.setSpacing(10)
+        self._footer.addStretch(1)
+        self._footer.addWidget(self.write)
+        self._footer.addWidget(self.show_file)
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 14, 1, 16)
         column.setSpacing(10)
-        column.addLayout(self._head)
+        column.addLayout(self._header)
         column.addWidget(self._area, 1)
-        self._said = QHBoxLayout()
-        self._said.setContentsMargins(SIDE, 0, SIDE, 0)
-        self._said.addWidget(self.state)
-        column.addLayout(self._said)
-        column.addLayout(self._foot)
+        self._state_layout = QHBoxLayout()
+        self._state_layout.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._state_layout.addWidget(self.state)
+        column.addLayout(self._state_layout)
+        column.addLayout(self._footer)
 
     def _fill(self, column: QVBoxLayout) -> None:
         column.setContentsMargins(SIDE, 0, SIDE, 4)
@@ -142,8 +142,8 @@ class ReportSheet(Overlay):
         column.addWidget(label(_("Not included"), "title"))
         left_out = QVBoxLayout()
         left_out.setSpacing(4)
-        self._left_out = [_PartRow(self.theme, _(text), "x") for text in EXCLUDED_PARTS]
-        for line in self._left_out:
+        self._excluded_rows = [_PartRow(self.theme, _(text), "x") for text in EXCLUDED_PARTS]
+        for line in self._excluded_rows:
             left_out.addWidget(line)
         column.addLayout(left_out)
         column.addSpacing(6)
@@ -167,7 +167,7 @@ class ReportSheet(Overlay):
                 line.deleteLater()
         for text in describe_contents(parts):
             self.list.addWidget(_PartRow(self.theme, text, "check"))
-        self._left_out[0].words.setText(_(NO_BEHAVIOURS_UNLESS if names else NO_BEHAVIOURS))
+        self._excluded_rows[0].words.setText(_(NO_BEHAVIOURS_UNLESS if names else NO_BEHAVIOURS))
         self.work.setChecked(False)
         self.names.setText(work_text(names) if names else "")
         for widget in (self.work, self.names):
@@ -182,13 +182,13 @@ class ReportSheet(Overlay):
     def preferred_size(self, room: QSize) -> QSize:
         buttons = self.write.sizeHint().width() + self.show_file.sizeHint().width() + 2 * SIDE + 40
         width = min(room.width(), max(round(self.theme.scaled(WIDE)), buttons))
-        layout = self._inside.layout()
+        layout = self._content.layout()
         inner = width - 2 - SCROLL_BAR
         content_height = layout.totalHeightForWidth(inner) if layout is not None else 0
-        footer_height = self._foot.sizeHint().height()
+        footer_height = self._footer.sizeHint().height()
         if self.state.text():
             footer_height += self.state.heightForWidth(width - 2 - 2 * SIDE) + 10
-        height = content_height + self._head.sizeHint().height() + footer_height + 14 + 2 * 10 + 16 + 4
+        height = content_height + self._header.sizeHint().height() + footer_height + 14 + 2 * 10 + 16 + 4
         return QSize(width, min(room.height(), height))
 
     def _set_status(self, text: str, role: str = "textSecondary", path: Path | None = None) -> None:
@@ -207,7 +207,9 @@ class ReportSheet(Overlay):
 
     def _ask_path(self) -> None:
         suggestion = documents_folder() / file_name(self._clock())
-        self._asks.save_as(_("Write report"), suggestion, (ZIP_KIND,), lambda path, _kind: self._start(path))
+        self._dialogs.save_as(
+            _("Write report"), suggestion, (ZIP_KIND,), lambda path, _kind: self._start(path)
+        )
 
     def _start(self, path: Path) -> None:
         parts = self._parts
@@ -237,13 +239,13 @@ class ReportSheet(Overlay):
         if self.isVisible():
             (self.show_file if not writer.problem else self.write).setFocus(Qt.FocusReason.OtherFocusReason)
         else:
-            self._say(message)
+            self._notify(message)
 
     def _show_file(self) -> None:
         if self.written is not None:
             folder = self.written.parent
             if not open_externally(QUrl.fromLocalFile(str(folder))):
-                self._say(_("The file is in {folder}").format(folder=folder))
+                self._notify(_("The file is in {folder}").format(folder=folder))
 
 
 class _PartRow(QWidget):

@@ -100,14 +100,14 @@ class SettingsSheet(Overlay):
     def _lay_out(self) -> None:
         header = self.make_header(label(_("Settings"), "heading"))
         header.setContentsMargins(19, 0, 19, 0)
-        self._inside = QWidget()
-        self._inside.setProperty("bare", "true")
-        self._fill(QGridLayout(self._inside))
+        self._content = QWidget()
+        self._content.setProperty("bare", "true")
+        self._fill(QGridLayout(self._content))
         self._area = QScrollArea()
         self._area.setWidgetResizable(True)
         self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._area.viewport().setAutoFillBackground(False)
-        self._area.setWidget(self._inside)
+        self._area.setWidget(self._content)
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 14, 1, 16)
         column.setSpacing(12)
@@ -154,7 +154,7 @@ class SettingsSheet(Overlay):
         return self.language.selected_button() or self
 
     def preferred_size(self, room: QSize) -> QSize:
-        content_size = self._inside.sizeHint()
+        content_size = self._content.sizeHint()
         width = max(round(self.theme.scaled(WIDTH)), content_size.width() + 14)
         height = content_size.height() + self.sizeHint().height() - self._area.sizeHint().height() + 4
         return QSize(min(room.width(), width), min(room.height(), height))

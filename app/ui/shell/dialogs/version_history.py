@@ -94,9 +94,9 @@ class VersionHistorySheet(Overlay):
     def _lay_out(self) -> None:
         header = self.make_header(self.heading)
         header.setContentsMargins(19, 0, 19, 0)
-        self._foot = QWidget()
-        self._foot.setProperty("bare", "true")
-        footer = QHBoxLayout(self._foot)
+        self._footer = QWidget()
+        self._footer.setProperty("bare", "true")
+        footer = QHBoxLayout(self._footer)
         footer.setContentsMargins(19, 0, 19, 0)
         footer.setSpacing(12)
         footer.addWidget(self.hint, 1)
@@ -107,7 +107,7 @@ class VersionHistorySheet(Overlay):
         column.addLayout(header)
         column.addWidget(self.rows, 1)
         column.addWidget(self.empty, 1)
-        column.addWidget(self._foot)
+        column.addWidget(self._footer)
 
     def show_for(
         self,
@@ -141,7 +141,7 @@ class VersionHistorySheet(Overlay):
         self.heading.setText(_("Earlier versions of {name}").format(name=title or name))
         self.setAccessibleName(self.heading.text())
         self._show_empty_state(name, path)
-        for widget, needs_lines in ((self.rows, True), (self._foot, True), (self.empty, False)):
+        for widget, needs_lines in ((self.rows, True), (self._footer, True), (self.empty, False)):
             paint.show_when(widget, needs_lines == bool(lines))
         self.rows.show_lines(lines)
         self._reading.start(0)

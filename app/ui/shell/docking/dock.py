@@ -172,7 +172,7 @@ class Dock(QDockWidget):
         self.number, self.key = number, format_key(description.name, number)
         self.failed = False
         self.front = False
-        self._seen_s = -SUSPEND_DELAY_S
+        self._last_displayed_s = -SUSPEND_DELAY_S
         self._theme, self._density = theme, density
         self.setObjectName(f"panel.{self.key}")
         self.setAccessibleName(self.windowTitle())
@@ -223,9 +223,9 @@ class Dock(QDockWidget):
         if self.failed:
             return None
         if self.is_displayed():
-            self._seen_s = now
+            self._last_displayed_s = now
             return self._try(self.panel.resume)
-        return self._try(self.panel.suspend) if now - self._seen_s >= SUSPEND_DELAY_S else None
+        return self._try(self.panel.suspend) if now - self._last_displayed_s >= SUSPEND_DELAY_S else None
 
     def refresh(self) -> str | None:
         """Refresh the panel if it is visible.

@@ -32,15 +32,15 @@ class TitleTab(PaintedButton):
     def __init__(self, theme: Theme, text: str, icon: str, checked: bool) -> None:
         super().__init__(theme, text, checkable=True)
         self._icon = icon
-        self._bare = False
+        self._is_icon_only = False
         self.badge: tuple[str, str] | None = None
         self.setChecked(checked)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
     def set_icon_only(self, icon_only: bool) -> None:
         """Show only the icon if `icon_only`, else the icon and the name."""
-        if icon_only != self._bare:
-            self._bare = icon_only
+        if icon_only != self._is_icon_only:
+            self._is_icon_only = icon_only
             self.updateGeometry()
             self.update()
 
@@ -69,14 +69,14 @@ class TitleTab(PaintedButton):
 
     def sizeHint(self) -> QSize:
         height = max(26, round(paint.height_of(self._theme.font("title"))) + 6)
-        return QSize(self.icon_only_width() if self._bare else self.full_width(), height)
+        return QSize(self.icon_only_width() if self._is_icon_only else self.full_width(), height)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(min(self.icon_only_width(), self.full_width()), self.sizeHint().height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        if self._bare:
+        if self._is_icon_only:
             self.setProperty("shortened", True)
             self.setToolTip(plain.tip(self.text()))
 
@@ -86,7 +86,7 @@ class TitleTab(PaintedButton):
             paint.box(painter, rect, theme.radius("small"), theme.colour("hover"))
         colour = theme.colour("text" if self.isChecked() else "textSecondary")
         room = rect.adjusted(0, 0, -self._badge_room(), 0)
-        if self._bare:
+        if self._is_icon_only:
             side = theme.scaled(ICON)
             icon_area = QRectF(0, 0, side, side)
             icon_area.moveCenter(room.center())
@@ -118,8 +118,8 @@ class DockTitle(QWidget):
     def __init__(self, theme: Theme, panel: PanelWidget, density: Density) -> None:
         super().__init__()
         self._theme, self._panel, self._density = theme, panel, density
-        self._least = theme.size("panelTitle", density)  # cached, because layouts read it often
-        self._whole = panel.title_widget()
+        self._min_height = theme.size("panelTitle", density)  # cached, because layouts read it often
+        self._title_widget = panel.title_widget()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.name = ElidedLabel("titleLarge" if density == "comfortable" else "title", "textSecondary", 120)
         self._subtitle = ElidedLabel("code", "textTertiary")
@@ -148,9 +148,9 @@ class DockTitle(QWidget):
         comfortable = self._density == "comfortable"
         self._row.setContentsMargins(13 if comfortable else 11, 1, 8 if comfortable else 6, 1)
         self._row.setSpacing(8)
-        if self._whole is not None:
+        if self._title_widget is not None:
             self._row.setContentsMargins(6, 1, 6, 1)
-            self._row.addWidget(self._whole, 1)
+            self._row.addWidget(self._title_widget, 1)
             self.more.hide()
             return
         self._row.addWidget(self.name)
@@ -169,12 +169,12 @@ class DockTitle(QWidget):
         return QSize(120, self._height())
 
     def _height(self) -> int:
-        return self._shared_height() + max(self._least, self._row.sizeHint().height())
+        return self._shared_height() + max(self._min_height, self._row.sizeHint().height())
 
     def _shared_height(self) -> int:
-        if self._whole is None or not self._tabs:
+        if self._title_widget is None or not self._tabs:
             return 0
-        return max(self._least, self._shared_row.sizeHint().height())
+        return max(self._min_height, self._shared_row.sizeHint().height())
 
     def minimumSizeHint(self) -> QSize:
         return QSize(80, self._height())  # doesn't call sizeHint, because this is called often
@@ -183,7 +183,7 @@ class DockTitle(QWidget):
         """Update the name and the subtitle to those of the panel."""
         self.name.setText(self._panel.title())
         self._subtitle.setText(self._panel.subtitle())
-        paint.show_when(self._subtitle, bool(self._panel.subtitle()) and self._whole is None)
+        paint.show_when(self._subtitle, bool(self._panel.subtitle()) and self._title_widget is None)
         for tab in self._tabs:
             if tab.isChecked():
                 tab.setText(self._panel.title())
@@ -203,13 +203,13 @@ class DockTitle(QWidget):
             row.removeWidget(old)
             old.deleteLater()
         self._tabs = []
-        paint.show_when(self.name, not names and self._whole is None)
+        paint.show_when(self.name, not names and self._title_widget is None)
         for index, (text, icon, is_current, bring) in enumerate(names):
             tab = TitleTab(self._theme, text, icon, is_current)
             tab.clicked.connect(lambda _on=False, bring=bring: bring())
             row.insertWidget(index, tab)
             self._tabs.append(tab)
-        if self._whole is not None:
+        if self._title_widget is not None:
             self._shared.setFixedHeight(self._shared_height())
             paint.show_when(self._shared, bool(names))
             self.updateGeometry()
@@ -221,7 +221,7 @@ class DockTitle(QWidget):
     @property
     def _tab_row(self) -> QHBoxLayout:
         # Panel tabs are never in one row with the tabs of a panel itself.
-        return self._row if self._whole is None else self._shared_row
+        return self._row if self._title_widget is None else self._shared_row
 
     def fit_tabs(self) -> None:
         """Shorten chips and tabs until the title bar fits into its width.
@@ -285,7 +285,7 @@ class DockTitle(QWidget):
         return super().eventFilter(watched, event)
 
     def _left_margin(self) -> int:
-        if self._whole is not None:
+        if self._title_widget is not None:
             return 6
         return 13 if self._density == "comfortable" else 11
 

@@ -49,14 +49,14 @@ class Workbench(QMainWindow):
         super().__init__()
         self._theme, self._layout, self._panels, self._context = theme, layout, panels, context
         self.docks: dict[str, Dock] = {}
-        self._ahead: dict[str, Dock] = {}  # created in advance
+        self._prepared_docks: dict[str, Dock] = {}  # created in advance
         self._floating: list[Dock] = []
         self._sharing: dict[Dock, list[Dock]] = {}  # panels of a shared place in tab order
         self._folded: tuple[Fold, ...] = ()  # active folds, because of a small window or large text
-        self._wide = QByteArray()  # state before folding
+        self._unfolded_state = QByteArray()  # state before folding
         self._arranged = False
         self._moved = False  # the user has moved a separator
-        self._used: list[str] = []  # panels by last focus, latest at the end
+        self._focus_order: list[str] = []  # panels by last focus, latest at the end
         self._halves: tuple[Dock, Dock] | None = None  # two docks to be resized to equal sizes
         self._heights: dict[str, int] = {}  # last heights of closed panels below all others
         self._set_aside: dict[str, Mapping[str, object]] = {}  # states of panels that a reset deleted
@@ -85,8 +85,8 @@ class Workbench(QMainWindow):
     def preload(self, name: str) -> None:
         """Create a panel in advance to avoid a delay when it is opened. The panel is suspended until then."""
         description = self._panels.get(name)
-        if description is not None and name not in self.docks and name not in self._ahead:
-            self._ahead[name] = dock = make_dock(description, self._context, self._layout.density)
+        if description is not None and name not in self.docks and name not in self._prepared_docks:
+            self._prepared_docks[name] = dock = make_dock(description, self._context, self._layout.density)
             dock.update_suspension(0.0)
 
     def reset_layout(self) -> None:
@@ -193,7 +193,7 @@ class Workbench(QMainWindow):
         description = self._panels.get(name)
         if description is None or number > (MAX_PANELS_PER_KIND if description.allows_multiple else 1):
             return None
-        dock = self._ahead.pop(key, None)
+        dock = self._prepared_docks.pop(key, None)
         dock = dock or make_dock(description, self._context, self._layout.density, number)
         dock.another_requested.connect(self.open_another)
         dock.closed.connect(self._on_dock_closed)
@@ -278,18 +278,20 @@ class Workbench(QMainWindow):
 
     def notify_source_changed(self) -> None:
         """Notify all panels, including closed ones, that the source has changed."""
-        for dock in (*self.docks.values(), *self._ahead.values()):
+        for dock in (*self.docks.values(), *self._prepared_docks.values()):
             dock.panel.source_changed()
 
     def record_use(self, dock: Dock) -> None:
         """Mark a panel as the most recently used one."""
-        if self._used[-1:] != [dock.key]:
-            self._used = [*(key for key in self._used if key != dock.key), dock.key]
+        if self._focus_order[-1:] != [dock.key]:
+            self._focus_order = [*(key for key in self._focus_order if key != dock.key), dock.key]
 
     def recently_used(self) -> tuple[str, ...]:
         """Return the keys of the open docks, most recently used first."""
         opened = self.open_names()
-        return tuple(sorted(opened, key=lambda key: -self._used.index(key) if key in self._used else 1))
+        return tuple(
+            sorted(opened, key=lambda key: -self._focus_order.index(key) if key in self._focus_order else 1)
+        )
 
     def _on_dock_closed(self, key: str) -> None:
         # An additional panel is deleted unless it is reopened immediately.
@@ -316,7 +318,7 @@ class Workbench(QMainWindow):
         for together in self._sharing.values():
             if dock in together:
                 together.remove(dock)
-        self._used = [key for key in self._used if key != dock.key]
+        self._focus_order = [key for key in self._focus_order if key != dock.key]
         self._floating = [each for each in self._floating if each is not dock]
         self._halves = None
         dock.dispose()
@@ -373,7 +375,7 @@ class Workbench(QMainWindow):
             self._unfold()
             return
         if not self._folded and folds:
-            self._wide = self.saveState(STATE_VERSION)
+            self._unfolded_state = self.saveState(STATE_VERSION)
         for fold in folds:
             if fold not in self._folded:
                 self._fold(fold)
@@ -411,7 +413,7 @@ class Workbench(QMainWindow):
         # Restores the state before folding, because splitting a dock off a tab would create a new tab.
         self._folded = ()
         opened = self.open_names()
-        if not self.restoreState(self._wide, STATE_VERSION):
+        if not self.restoreState(self._unfolded_state, STATE_VERSION):
             self.reset_layout()
         for name, dock in list(self.docks.items()):
             if name not in opened:
@@ -490,7 +492,7 @@ class Workbench(QMainWindow):
                 name for name, dock in self.docks.items() if not dock.isHidden() or dock in self._floating
             ],
             "docks": encode_state(self.saveState(STATE_VERSION)),
-            "wide": encode_state(self._wide),
+            "wide": encode_state(self._unfolded_state),
             "panels": {name: dock.saved_state() for name, dock in self.docks.items()},
             "folds": [fold.panels[0] for fold in self._folded],
             "moved": self._moved,
@@ -513,7 +515,7 @@ class Workbench(QMainWindow):
             self.reset_layout()
             return False
         self._size_timer.stop()  # keep the saved sizes instead of those of `arrange`
-        self._wide = decode_state(saved.get("wide"))
+        self._unfolded_state = decode_state(saved.get("wide"))
         self._folded, self._moved = self._folds_of(saved), saved.get("moved") is True
         for name, dock in self.docks.items():
             panel_state = panels.get(name) if isinstance(panels, Mapping) else None
@@ -532,7 +534,7 @@ class Workbench(QMainWindow):
 
     def dispose(self) -> None:
         """Release the resources of all panels before the window closes."""
-        for dock in (*self.docks.values(), *self._ahead.values()):
+        for dock in (*self.docks.values(), *self._prepared_docks.values()):
             dock.dispose()
 
 

@@ -56,7 +56,7 @@ class RobotArt(Art):
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
         self._drawing = RobotDrawing(theme.font("bodyLarge"))
-        self._made: tuple[tuple[object, ...], QPixmap] | None = None
+        self._pixmap_cache: tuple[tuple[object, ...], QPixmap] | None = None
         self.setAccessibleName(_("A small white robot in a room, waving"))
 
     def picture(self, painter: QPainter, area: QRectF) -> None:
@@ -67,7 +67,7 @@ class RobotArt(Art):
         # Cached for each size and theme, in a pixmap because the drawing sets its own clip.
         ratio = self.devicePixelRatioF()
         key = (area.width(), area.height(), ratio, self._theme.dark)
-        if self._made is None or self._made[0] != key:
+        if self._pixmap_cache is None or self._pixmap_cache[0] != key:
             pixmap = QPixmap((area.size() * ratio).toSize())
             pixmap.setDevicePixelRatio(ratio)
             pixmap.fill(Qt.GlobalColor.transparent)
@@ -75,8 +75,8 @@ class RobotArt(Art):
             inner.setRenderHint(QPainter.RenderHint.Antialiasing)
             self._drawing.paint(inner, room.translated(-area.topLeft()), PREVIEW_STATE, dark=self._theme.dark)
             inner.end()
-            self._made = (key, pixmap)
-        return self._made[1]
+            self._pixmap_cache = (key, pixmap)
+        return self._pixmap_cache[1]
 
 
 class EmptyPageArt(Art):

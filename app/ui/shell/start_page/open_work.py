@@ -128,7 +128,7 @@ class OpenWorkList(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._shown: tuple[OpenWork, ...] = ()
+        self._shown_items: tuple[OpenWork, ...] = ()
         self.rows: list[OpenRow] = []
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 24)
@@ -144,9 +144,9 @@ class OpenWorkList(QWidget):
 
     def show_work(self, items: Sequence[OpenWork]) -> None:
         """Set the open behaviours; unchanged rows are not recreated."""
-        if tuple(items) == self._shown:
+        if tuple(items) == self._shown_items:
             return
-        self._shown = tuple(items)
+        self._shown_items = tuple(items)
         focused_key = self._focused_key(self.rows)
         for row in self.rows:
             self._grid.removeWidget(row)

@@ -216,7 +216,7 @@ class LongTextField(QWidget):
     def __init__(self, theme: Theme, name: str) -> None:
         super().__init__()
         self._theme = theme
-        self._wrong = False
+        self._is_invalid = False
         self.setAccessibleName(name)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setProperty("focusRadius", theme.radius("control"))
@@ -247,12 +247,12 @@ class LongTextField(QWidget):
     @property
     def is_invalid(self) -> bool:
         """True while the text is shown as invalid."""
-        return self._wrong
+        return self._is_invalid
 
     def set_invalid(self, *, is_invalid: bool) -> None:
         """Show the text as invalid if `is_invalid`, else as valid."""
-        if is_invalid != self._wrong:
-            self._wrong = is_invalid
+        if is_invalid != self._is_invalid:
+            self._is_invalid = is_invalid
             self.update()
 
     def _lines(self) -> int:
@@ -285,7 +285,7 @@ class LongTextField(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
-        edge = "error" if self._wrong else "accent" if self.edit.hasFocus() else "controlBorder"
+        edge = "error" if self._is_invalid else "accent" if self.edit.hasFocus() else "controlBorder"
         fill = theme.colour("sunken" if theme.dark else "panel")
         width = 2.0 if self.edit.hasFocus() else 1.0
         paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, theme.colour(edge), width)

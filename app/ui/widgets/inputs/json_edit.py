@@ -204,7 +204,7 @@ class JsonEdit(QWidget):
     def __init__(self, theme: Theme, name: str, *, least_lines: int = 6) -> None:
         # `name` is the accessible name; `least_lines` determines the minimum height.
         super().__init__()
-        self._theme, self._least = theme, least_lines
+        self._theme, self._min_lines = theme, least_lines
         self._is_wrong = False
         self.edit = JsonLinesEdit(theme)
         self.edit.setAccessibleName(name)
@@ -262,10 +262,10 @@ class JsonEdit(QWidget):
         return round(lines * paint.height_of(self.edit.font())) + 12
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(150, self._height_for(self._least))
+        return QSize(150, self._height_for(self._min_lines))
 
     def sizeHint(self) -> QSize:
-        return QSize(320, self._height_for(max(self._least, 12)))
+        return QSize(320, self._height_for(max(self._min_lines, 12)))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)

@@ -38,7 +38,7 @@ class RenameField(QLineEdit):
     ) -> None:
         # `said` is the accessible name.
         super().__init__(name, parent)
-        self._take, self._is_over = callback, False
+        self._callback, self._is_closed = callback, False
         self.setAccessibleName(accessible_name)
         self.setProperty("focusRadius", theme.radius("control"))
         ContextMenuFilter(theme, self)
@@ -51,21 +51,21 @@ class RenameField(QLineEdit):
         if event.key() == Qt.Key.Key_Escape:
             self.close_field()
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and has_no_modifiers(event):
-            if self._take(self.text()):
+            if self._callback(self.text()):
                 self.close_field()
         else:
             super().keyPressEvent(event)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        if event.reason() != Qt.FocusReason.PopupFocusReason and not self._is_over:
-            self._take(self.text())
+        if event.reason() != Qt.FocusReason.PopupFocusReason and not self._is_closed:
+            self._callback(self.text())
             self.close_field()
 
     def close_field(self) -> None:
         """Close and delete the field without applying the text."""
-        if not self._is_over:
-            self._is_over = True
+        if not self._is_closed:
+            self._is_closed = True
             self.hide()
             self.closed.emit()
             self.deleteLater()

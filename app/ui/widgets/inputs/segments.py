@@ -30,14 +30,14 @@ class _Segment(PaintedButton):
 
     def __init__(self, theme: Theme, label: str, icon: str | None, size: str, check: bool) -> None:
         self._icon, self._check = icon, check
-        self._bare = self._dot = self.has_dot = False
+        self._is_icon_only = self._dot = self.has_dot = False
         self._height, self._padding, self._kind = _HEIGHTS[size]
         super().__init__(theme, label, checkable=True)
         self.setAutoExclusive(True)
 
     def set_icon_only(self, icon_only: bool) -> None:
         # The text becomes the tooltip.
-        self._bare = icon_only and self._icon is not None
+        self._is_icon_only = icon_only and self._icon is not None
         self.updateGeometry()
         self.update()
 
@@ -50,11 +50,11 @@ class _Segment(PaintedButton):
             self.update()
 
     def displayed_text(self) -> str:
-        return "" if self._bare else self.text()
+        return "" if self._is_icon_only else self.text()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        if self._bare:
+        if self._is_icon_only:
             self.setProperty("shortened", True)
             self.setToolTip(plain.tip(self.text()))
 
@@ -68,7 +68,7 @@ class _Segment(PaintedButton):
 
     def _icons_width(self) -> int:
         icon_count = int(self._icon is not None) + int(self._check) + int(self.has_dot) / 2
-        return round((self._icon_side() + GAP) * icon_count) - (GAP if self._bare else 0)
+        return round((self._icon_side() + GAP) * icon_count) - (GAP if self._is_icon_only else 0)
 
     def sizeHint(self) -> QSize:
         width = paint.width_of(self._font(), self.displayed_text()) + 2 * self._padding + self._icons_width()
@@ -89,7 +89,7 @@ class _Segment(PaintedButton):
             "text" if is_checked else "textSecondary" if self.isEnabled() else "textDisabled"
         )
         icons = [name for name in ("check" if self._check and is_checked else None, self._icon) if name]
-        text_width = paint.width_of(self._font(), self.displayed_text()) - (GAP if self._bare else 0)
+        text_width = paint.width_of(self._font(), self.displayed_text()) - (GAP if self._is_icon_only else 0)
         side = self._icon_side()
         dot = (side + GAP) / 2 if self._dot else 0.0
         left = max(6.0, rect.center().x() - (text_width + len(icons) * (side + GAP) + dot) / 2)

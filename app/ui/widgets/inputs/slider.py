@@ -135,15 +135,15 @@ class SliderWithUnit(QWidget):
         self.field = NumberEdit(theme, minimum, maximum, unit, digits)
         self.field.setFixedWidth(FIELD_WIDTH)
         self._digits = digits
-        self._sentence = label("", "small", role="error", wrap=True)
-        self._sentence.hide()
+        self._error_label = label("", "small", role="error", wrap=True)
+        self._error_label.hide()
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(12)
         grid.setVerticalSpacing(4)
         grid.addWidget(self.track, 0, 0)
         grid.addWidget(self.field, 0, 1)
-        grid.addWidget(self._sentence, 1, 0, 1, 2)
+        grid.addWidget(self._error_label, 1, 0, 1, 2)
         self._set_name(name)
         self.set_value(value if value is not None else self._default)
         self.track.valueChanged.connect(self._on_track_changed)
@@ -179,5 +179,5 @@ class SliderWithUnit(QWidget):
             self.changed.emit(value)
 
     def _show_problem(self, message: str) -> None:
-        self._sentence.setText(message)
-        self._sentence.setVisible(bool(message))
+        self._error_label.setText(message)
+        self._error_label.setVisible(bool(message))

@@ -128,7 +128,7 @@ class TokenField(QWidget):
 
     def __init__(self, theme: Theme, name: str, example: str, add: str = "") -> None:
         super().__init__()
-        self._add_words = add
+        self._add_placeholder = add
         self._theme, self._example, self._is_wrong = theme, example, False
         self._tokens: list[Token] = []
         self.edit = _TokenEdit(self)
@@ -202,7 +202,7 @@ class TokenField(QWidget):
         self._flow.add_elastic(self.edit, greedy=True)
         if before is not None:
             QWidget.setTabOrder(before, self.edit)
-        self.edit.setPlaceholderText(self._add_words if self._tokens else self._example)
+        self.edit.setPlaceholderText(self._add_placeholder if self._tokens else self._example)
         self.updateGeometry()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:

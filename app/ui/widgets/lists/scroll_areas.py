@@ -21,7 +21,7 @@ class ContentScrollArea(QScrollArea):
 
     def __init__(self, content: QWidget) -> None:
         super().__init__()
-        self._inside = content
+        self._content = content
         content.setProperty("bare", "true")
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
@@ -35,15 +35,15 @@ class ContentScrollArea(QScrollArea):
         self.setSizePolicy(policy)
 
     def heightForWidth(self, width: int) -> int:
-        content = self._inside
+        content = self._content
         return content.heightForWidth(width) if content.hasHeightForWidth() else content.sizeHint().height()
 
     def sizeHint(self) -> QSize:
         width = max(1, self.width())
-        return QSize(self._inside.sizeHint().width(), self.heightForWidth(width))
+        return QSize(self._content.sizeHint().width(), self.heightForWidth(width))
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(60, round(1.5 * QFontMetricsF(self._inside.font()).height()))
+        return QSize(60, round(1.5 * QFontMetricsF(self._content.font()).height()))
 
     def viewportEvent(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.LayoutRequest:

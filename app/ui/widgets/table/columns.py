@@ -19,30 +19,33 @@ class ColumnChoice:
     def __init__(self, columns: Sequence[Column[Any]]) -> None:
         # The first column is always shown, because it identifies the row.
         self._columns = tuple(columns)
-        self._chosen: dict[str, bool] = {}
+        self._visibility_by_column: dict[str, bool] = {}
 
     def should_show(self, column: Column[Any]) -> bool:
         """Return True if the column should be shown, provided that there is space."""
         if column.is_available is not None and not column.is_available():
             return False
-        return self._chosen.get(column.name, not column.is_hidden_by_default) or column is self._columns[0]
+        return (
+            self._visibility_by_column.get(column.name, not column.is_hidden_by_default)
+            or column is self._columns[0]
+        )
 
     def show(self, name: str, shown: bool) -> None:
         """Show a column if `shown`, else hide it. Has no effect on the first column."""
         for column in self._columns[1:]:
             if column.name == name:
-                self._chosen.pop(name, None)
+                self._visibility_by_column.pop(name, None)
                 if shown is column.is_hidden_by_default:
-                    self._chosen[name] = shown
+                    self._visibility_by_column[name] = shown
 
     def reset(self) -> None:
         """Restore the default visibility of all columns."""
-        self._chosen.clear()
+        self._visibility_by_column.clear()
 
     @property
     def changed(self) -> bool:
         """True if the visibility of a column differs from its default."""
-        return bool(self._chosen)
+        return bool(self._visibility_by_column)
 
     def fitting_columns(self, widths: Sequence[int], room: int) -> set[int]:
         """Return the indexes of the columns to show in a given width.
@@ -57,7 +60,8 @@ class ColumnChoice:
         yielding = sorted(
             (self._columns[index].hide_order, index)
             for index in visible_columns
-            if self._columns[index].hide_order and not self._chosen.get(self._columns[index].name)
+            if self._columns[index].hide_order
+            and not self._visibility_by_column.get(self._columns[index].name)
         )
         while yielding and sum(widths[index] for index in visible_columns) > room:
             visible_columns.discard(yielding.pop()[1])
@@ -100,11 +104,11 @@ class ColumnChoice:
 
     def saved_state(self) -> dict[str, bool]:
         """Return the visibility of the columns that the user has shown or hidden, for `restore`."""
-        return dict(self._chosen)
+        return dict(self._visibility_by_column)
 
     def restore(self, saved: object) -> None:
         """Restore the visibility of columns from a saved state; invalid entries are ignored."""
-        self._chosen.clear()
+        self._visibility_by_column.clear()
         if isinstance(saved, Mapping):
             for name, visible in saved.items():
                 if isinstance(name, str) and isinstance(visible, bool):

@@ -70,7 +70,9 @@ class Ros2Client(ClientCalls[_Call]):
         self._guid = secrets.randbits(63)
         self._channel: ServiceChannel | None = None
         given_name = service_type_name(spec.msg_type)
-        self._given_type = None if given_name is None else find_service_type(participant.types, given_name)
+        self._specified_type = (
+            None if given_name is None else find_service_type(participant.types, given_name)
+        )
         try:
             channel: ServiceChannel | None = None
             with contextlib.suppress(NepError):  # reported by calls: another server may appear meanwhile
@@ -90,7 +92,9 @@ class Ros2Client(ClientCalls[_Call]):
                 if (name := service_type_of(each.type)) is not None
             ]
             type_name = (
-                self._given_type.name if self._given_type is not None else next(iter(sorted(type_names)), "")
+                self._specified_type.name
+                if self._specified_type is not None
+                else next(iter(sorted(type_names)), "")
             )
             channel = self._channel
             if not type_name or self.is_closed or (channel is not None and channel.kind.name == type_name):
@@ -101,7 +105,7 @@ class Ros2Client(ClientCalls[_Call]):
                 self._participant,
                 self._node_id,
                 self.spec.service,
-                self._given_type or find_service_type(self._participant.types, type_name),
+                self._specified_type or find_service_type(self._participant.types, type_name),
                 self.spec.id,
                 guid=self._guid,
                 on_part=self._handle_response,

@@ -46,7 +46,7 @@ class Ros2Server:
         self.endpoints = ("ros2",)
         self._on_close = on_close
         self._participant = participant
-        self._refusals = RejectionLog()
+        self._rejections = RejectionLog()
         self._type = service_type_for(participant.types, spec.msg_type)
         self._channel = ServiceChannel(
             participant, node_id, spec.service, self._type, spec.id, on_part=self._handle_request
@@ -75,7 +75,7 @@ class Ros2Server:
         try:
             request = self._type.decode_call(part.cdr)
         except NepError as error:
-            if self._refusals.add(str(error)):
+            if self._rejections.add(str(error)):
                 _logger.warning("malformed call to '%s': %s", self.spec.service, error)
             self._reply(part, error_reply(CallKind.REJECTED, "", str(error)))
             return

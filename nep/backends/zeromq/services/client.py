@@ -151,7 +151,7 @@ class SocketClient:
         """Time at which the connection to an unlisted server is closed if new calls wait."""
         self._attempts = 0
         self._retry_at = 0.0
-        self._refusals = RejectionLog()
+        self._rejections = RejectionLog()
         self._is_closed = False
         self._replied = self._failed = self._late = 0
 
@@ -311,7 +311,7 @@ class SocketClient:
 
     def counts(self) -> SubscriberCount:
         """Return the statistics that a renewal reports."""
-        problem = self._refusals.recent_message()
+        problem = self._rejections.recent_message()
         return SubscriberCount(self.spec.id, clamp_count(self._replied), clamp_count(self._failed), problem)
 
     # ---- in the I/O thread: the socket
@@ -356,7 +356,7 @@ class SocketClient:
                     return False
                 number, outcome = self._framing.read_reply(parts)
             except WireError as error:
-                if self._refusals.add(error.reason):
+                if self._rejections.add(error.reason):
                     _logger.warning("malformed reply from the server of '%s': %s", self._name, error)
                 if not self._framing.is_in_order:
                     continue

@@ -382,9 +382,9 @@ class SharedReader:
         if self._opened is None:
             raise LookupError
         self.generation = generation
-        self._held = 0
+        self._held_slots = 0
         self._returned: deque[None] = deque()
-        self._ahead: tuple[int, int, Any] | None = None
+        self._next_sample: tuple[int, int, Any] | None = None
         self._slots = _SlotViews()
         try:
             self._service = self._opened.service(publisher, generation).open()
@@ -401,13 +401,13 @@ class SharedReader:
             may_copy: True to copy small payloads, which frees their slots.
         """
         while True:
-            sample, self._ahead = self._ahead or self._receive_next(), None
+            sample, self._next_sample = self._next_sample or self._receive_next(), None
             if sample is None:
                 return None
             if sample[0] == number:
                 return self._extract_payload(*sample[1:], may_copy=may_copy)
             if sample[0] > number:
-                self._ahead = sample
+                self._next_sample = sample
                 return None
 
     def _receive_next(self) -> tuple[int, int, Any] | None:
@@ -430,10 +430,10 @@ class SharedReader:
         array = (ctypes.c_uint8 * size).from_address(address + _HEADER_BYTES)
         while self._returned:
             self._returned.popleft()
-            self._held -= 1
-        if self._held >= _MAX_HELD_SLOTS:
+            self._held_slots -= 1
+        if self._held_slots >= _MAX_HELD_SLOTS:
             return memoryview(bytes(array))
-        self._held += 1
+        self._held_slots += 1
         array.held = _HeldSample(sample, self._returned)  # type: ignore[attr-defined]
         return memoryview(array).cast("B").toreadonly()
 

@@ -111,7 +111,7 @@ class SharedSources:
 
     def __init__(self, subscriber: int, answer: Callable[[OfferAcceptance], None]) -> None:
         self._subscriber = subscriber
-        self._answer = answer
+        self._send_acceptance = answer
         self._readers: dict[int, SharedReader] = {}
 
     def open(self, publisher: int, generation: int) -> None:
@@ -127,7 +127,7 @@ class SharedSources:
                 self._readers[publisher] = SharedReader(publisher, generation)
             except LookupError:
                 return
-        self._answer(OfferAcceptance(self._subscriber, publisher, generation))
+        self._send_acceptance(OfferAcceptance(self._subscriber, publisher, generation))
 
     def read(
         self, publisher: int, part: bytes | memoryview, *, may_copy: bool = False

@@ -92,7 +92,7 @@ class Channels:
     ) -> None:
         self._context = context
         self._format = channels
-        self._tell = send
+        self._send = send
         self._channels: dict[str, _Channel] = {}
         self._subscriptions: dict[int, _Subscription] = {}
         self._last_id = 0
@@ -150,10 +150,10 @@ class Channels:
                     "schema": base64.b64encode(data).decode() if is_binary else data.decode(),
                 }
             )
-        self._tell({"op": "advertise", "channels": channels})
+        self._send({"op": "advertise", "channels": channels})
 
     async def _unadvertise(self, channel: _Channel) -> None:
-        self._tell({"op": "unadvertise", "channelIds": [channel.id]})
+        self._send({"op": "unadvertise", "channelIds": [channel.id]})
         for subscription in [
             subscription for subscription in self._subscriptions.values() if subscription.channel is channel
         ]:

@@ -33,7 +33,7 @@ class GraphUpdates:
         self._service_ids: dict[tuple[str, str], int] = {}
         """Ids of services by (name, type)."""
         self._last_id = 0
-        self._are_connections_wanted = False
+        self._are_connections_enabled = False
         self._connections = _NO_CONNECTIONS
 
     def set_connections_enabled(self, *, is_wanted: bool) -> None:
@@ -41,7 +41,7 @@ class GraphUpdates:
 
         After being enabled, the first update contains all of them.
         """
-        self._are_connections_wanted = is_wanted
+        self._are_connections_enabled = is_wanted
         self._connections = _NO_CONNECTIONS
 
     def service_name(self, id_: int) -> str:
@@ -53,7 +53,7 @@ class GraphUpdates:
     def update(self, view: GraphView) -> list[dict[str, object]]:
         """Return the messages that update the client's view of the graph."""
         messages = self._update_services(view)
-        if not self._are_connections_wanted:
+        if not self._are_connections_enabled:
             return messages
         previous, self._connections = self._connections, _connections(view)
         return [*messages, *_changes(previous, self._connections)]

@@ -58,7 +58,7 @@ class RosApi:
             motion_refusal: Returns the reason why the page may not publish (topic, message type), or "".
         """
         self._node = node
-        self._motion_refusal = motion_refusal
+        self._motion_denial_reason = motion_refusal
 
     def reply(self, service: str, args: object) -> Mapping[str, object]:
         """Execute a service of rosapi and return the fields of its reply. Raises `NepError`."""
@@ -260,7 +260,7 @@ class RosApi:
         for topic in self._view.topics.values():
             if not _has_member(topic.subscribers, ids):
                 continue
-            if reason := self._motion_refusal(topic.name, topic.msg_type):
+            if reason := self._motion_denial_reason(topic.name, topic.msg_type):
                 raise NepError(reason)
         with self._node.parameters_of(node, _PARAMETER_TIMEOUT_S) as remote:
             remote.set(name, value)

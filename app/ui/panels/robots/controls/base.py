@@ -43,7 +43,7 @@ class Control:
         self.widget = widget
         self.changed = changed
         self._value, self._show = value, show
-        self._finished, self._sentence, self._close = finished, error_text, close
+        self._finished, self._error_text, self._close = finished, error_text, close
 
     def value(self) -> object:
         """Return the value for the action.
@@ -69,7 +69,7 @@ class Control:
     @property
     def error_text(self) -> str:
         """Error message that the control shows itself; "" if there is none."""
-        return "" if self._sentence is None else self._sentence()
+        return "" if self._error_text is None else self._error_text()
 
     def close(self) -> None:
         """Release resources before the form is deleted."""

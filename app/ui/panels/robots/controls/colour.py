@@ -214,7 +214,7 @@ class ColourChoice(QWidget):
         self.field.setPlaceholderText("#33aaff")
         self.field.setFixedWidth(round(theme.scaled(96)))
         self.sentence = ""
-        self._wrong = label("", "small", role="error", wrap=True)
+        self._error_label = label("", "small", role="error", wrap=True)
         self._lay_out()
         self.other.toggled.connect(self._set_expanded)
         self.swatches.changed.connect(self._swatch_selected)
@@ -236,9 +236,9 @@ class ColourChoice(QWidget):
         column.setSpacing(4)
         column.addLayout(first)
         column.addWidget(self._more)
-        column.addWidget(self._wrong)
+        column.addWidget(self._error_label)
         self._more.hide()
-        self._wrong.hide()
+        self._error_label.hide()
 
     def value(self) -> str:
         """Return the colour as ``#rrggbb``, or the typed text if it is invalid."""
@@ -284,8 +284,8 @@ class ColourChoice(QWidget):
     def _show_error(self, message: str, *, quiet: bool = False) -> None:
         self.sentence = message
         is_visible = bool(message) and not quiet
-        self._wrong.setText(message if is_visible else "")
-        self._wrong.setVisible(is_visible)
+        self._error_label.setText(message if is_visible else "")
+        self._error_label.setVisible(is_visible)
         self.field.setProperty("wrong", "true" if is_visible else "false")
         self.field.style().unpolish(self.field)
         self.field.style().polish(self.field)

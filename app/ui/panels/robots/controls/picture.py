@@ -124,7 +124,7 @@ class PictureChoice(QWidget):
         super().__init__()
         self._theme, self._parameter, self._pictures = theme, parameter, pictures
         self._stream: ImageStream | None = None
-        self._seen: object = None
+        self._last_picture: object = None
         self._file: Path | None = None
         self._image: QImage | None = None
         self.sentence = ""
@@ -137,8 +137,8 @@ class PictureChoice(QWidget):
         self.choose.setAccessibleName(_("Choose a file for {value}").format(value=parameter.title))
         self.camera = Button(theme, _("Camera"), "camera", size="form")
         self.camera.setAccessibleName(_("Use a camera image for {value}").format(value=parameter.title))
-        self._wrong = label("", "small", role="error", wrap=True)
-        self._wrong.hide()
+        self._error_label = label("", "small", role="error", wrap=True)
+        self._error_label.hide()
         self._lay_out()
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
@@ -157,7 +157,7 @@ class PictureChoice(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
         column.addLayout(row)
-        column.addWidget(self._wrong)
+        column.addWidget(self._error_label)
 
     # -- value --------------------------------------------------------------------------------------------
 
@@ -255,8 +255,8 @@ class PictureChoice(QWidget):
         if stream is None:
             return
         picture = stream.picture
-        if picture is not None and picture is not self._seen and not stream.is_awaiting_image:
-            self._seen = picture
+        if picture is not None and picture is not self._last_picture and not stream.is_awaiting_image:
+            self._last_picture = picture
             data = picture.bgra.data
             rows, columns = picture.bgra.shape[:2]
             frame = QImage(data, columns, rows, QImage.Format.Format_RGB32)
@@ -269,7 +269,7 @@ class PictureChoice(QWidget):
         self._timer.stop()
         if self._stream is not None:
             self._stream.close()
-        self._stream, self._seen = None, None
+        self._stream, self._last_picture = None, None
 
     def _clear_image(self) -> None:
         self._image = None
@@ -279,8 +279,8 @@ class PictureChoice(QWidget):
 
     def _show_error(self, message: str) -> None:
         self.sentence = message
-        self._wrong.setText(message)
-        self._wrong.setVisible(bool(message))
+        self._error_label.setText(message)
+        self._error_label.setVisible(bool(message))
 
 
 def _image_from_url(address: str) -> QImage | None:

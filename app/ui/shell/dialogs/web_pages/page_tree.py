@@ -125,7 +125,7 @@ class PageTree(QTreeView):
         self._keyboard = False
         self._widths = dict(_WIDTHS)
         self._hovered = QPersistentModelIndex()
-        self._over_button = False
+        self._is_button_hovered = False
         self.setModel(model)
         self._heights = _RowHeightDelegate(theme, self)
         self.setItemDelegate(self._heights)
@@ -246,8 +246,8 @@ class PageTree(QTreeView):
 
     def _hover(self, position: QPoint) -> None:
         index, is_over_button = QPersistentModelIndex(self.indexAt(position)), self._is_on_button(position)
-        if (index, is_over_button) != (self._hovered, self._over_button):
-            self._hovered, self._over_button = index, is_over_button
+        if (index, is_over_button) != (self._hovered, self._is_button_hovered):
+            self._hovered, self._is_button_hovered = index, is_over_button
             self.viewport().setToolTip(plain.tip(_("Disconnect (Delete)")) if is_over_button else "")
             self.viewport().update()
 
@@ -360,7 +360,7 @@ class PageTree(QTreeView):
                 painter, text_area, location_text(listed_page.page), self._font("body"), theme.colour(role)
             )
         if not is_gone:
-            is_over = self._over_button and self._hovered == index
+            is_over = self._is_button_hovered and self._hovered == index
             side = theme.scaled(_ICON)
             icon_area = QRectF(button.right() - side, rect.center().y() - side / 2, side, side)
             if is_over:

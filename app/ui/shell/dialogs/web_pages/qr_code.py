@@ -39,7 +39,7 @@ class QrCode(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._text, self._words = "", ""
+        self._text, self._message = "", ""
         self._modules: tuple[bytes, ...] = ()
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self.updateGeometry)
@@ -63,7 +63,7 @@ class QrCode(QWidget):
         except ImportError:
             self.show_message(_("Install segno to show the QR code: pip install segno"))
             return
-        self._text, self._modules, self._words = text, modules, ""
+        self._text, self._modules, self._message = text, modules, ""
         self.setAccessibleName(
             _("QR code that opens {address} on a tablet. It contains the token.").format(address=address)
         )
@@ -71,8 +71,8 @@ class QrCode(QWidget):
 
     def show_message(self, message: str) -> None:
         """Show a message that explains why there is no code."""
-        if message != self._words:
-            self._text, self._modules, self._words = "", (), message
+        if message != self._message:
+            self._text, self._modules, self._message = "", (), message
             self.setAccessibleName(message)
             self.update()
 
@@ -120,4 +120,4 @@ class QrCode(QWidget):
         painter.setPen(theme.colour("textSecondary"))
         text_area = rect.adjusted(_PADDING, _PADDING, -_PADDING, -_PADDING)
         flags = int(Qt.AlignmentFlag.AlignCenter) | int(Qt.TextFlag.TextWordWrap)
-        painter.drawText(text_area, flags, self._words)
+        painter.drawText(text_area, flags, self._message)

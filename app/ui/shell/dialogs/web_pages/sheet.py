@@ -65,7 +65,7 @@ class WebPagesSheet(Overlay):
     ) -> None:
         # `robots` returns the names of connected robots; `open_url` opens a page in the browser.
         super().__init__(theme, window, _("Web pages and tablets"))
-        self._web, self._say, self._open_url = web, show_toast, open_url
+        self._web, self._show_toast, self._open_url = web, show_toast, open_url
         self._dismissed: set[tuple[str, ...]] = set()
         self._tab_order: list[QWidget] = []
         self.access = AccessForm(theme, web)
@@ -109,9 +109,9 @@ class WebPagesSheet(Overlay):
         self.test_page = Button(theme, _("Open the test page"), "external-link", kind="primary")
 
     def _lay_out(self) -> None:
-        self._inside = QWidget()
-        self._inside.setProperty("bare", "true")
-        column = QVBoxLayout(self._inside)
+        self._content = QWidget()
+        self._content.setProperty("bare", "true")
+        column = QVBoxLayout(self._content)
         column.setContentsMargins(0, 2, 0, 6)
         column.setSpacing(0)
         column.addLayout(self._form())
@@ -124,7 +124,7 @@ class WebPagesSheet(Overlay):
         self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._area.viewport().setAutoFillBackground(False)
-        self._area.setWidget(self._inside)
+        self._area.setWidget(self._content)
         notice = QHBoxLayout()
         notice.setContentsMargins(_TABLE_SIDE, 0, _TABLE_SIDE, 0)
         notice.addWidget(self.notice)
@@ -214,7 +214,7 @@ class WebPagesSheet(Overlay):
         return self.switch
 
     def preferred_size(self, room: QSize) -> QSize:
-        min_width = self._inside.minimumSizeHint().width() + _SCROLL_BAR
+        min_width = self._content.minimumSizeHint().width() + _SCROLL_BAR
         return QSize(min(room.width(), max(round(self.theme.scaled(WIDTH)), min_width)), room.height())
 
     def _geometry_at(self, top: int) -> QRect:
@@ -326,7 +326,7 @@ class WebPagesSheet(Overlay):
 
     def _copy(self, text: str, message: str) -> None:
         QGuiApplication.clipboard().setText(text)
-        self._say(message)
+        self._show_toast(message)
 
     def _copy_address(self) -> None:
         self._copy(self._web.url, _("Copied the address"))
@@ -350,7 +350,9 @@ class WebPagesSheet(Overlay):
             if web.token and web.host:
                 self._apply(partial(web.set_token, before))
 
-        self._say(message.format(count=group_digits(count)) if count else _("New token"), _("Undo"), undo)
+        self._show_toast(
+            message.format(count=group_digits(count)) if count else _("New token"), _("Undo"), undo
+        )
 
     def _disconnect(self, page_id: int) -> None:
         page = next((each for each in self._web.connected if each.id == page_id), None)
@@ -359,7 +361,7 @@ class WebPagesSheet(Overlay):
         self._web.block_page(page)
         self.refresh()
         message = _("Disconnected {page}. It is now blocked.")
-        self._say(
+        self._show_toast(
             message.format(page=page_name(page)),
             _("Undo"),
             lambda: self._apply(partial(self._web.unblock_page, page_id)),
