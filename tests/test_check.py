@@ -75,7 +75,7 @@ def test_last_surplus_test_worker_receives_no_window_tests() -> None:
     assert may_take("gw5", 6, 8, window)
 
 
-def test_crashed_test_worker_fails_one_test_and_the_others_complete(
+def test_crashed_test_worker_fails_one_test_and_the_other_tests_complete(
     tmp_path: Path,
 ) -> None:
     """Both workers have finished some files before the crash; the new worker gets files of one test."""

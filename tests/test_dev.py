@@ -122,7 +122,7 @@ def test_user_without_root_is_shown_the_install_command() -> None:
     assert system.ran == []
 
 
-def test_test_packages_are_installed_for_root_and_printed_for_others(
+def test_test_packages_are_installed_by_root_and_printed_for_users_without_root(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     names = {name for packages in system_packages.TEST_PACKAGES.values() for name in packages}
@@ -157,7 +157,7 @@ def test_system_packages_command_installs_or_prints_the_command(capsys: pytest.C
     assert "libnss3" in system.installed
 
 
-def test_other_operating_systems_are_skipped() -> None:
+def test_system_packages_are_not_installed_outside_linux_or_without_apt() -> None:
     system = FakeSystem()
     for platform in ("win32", "darwin"):
         computer = system.computer(platform=platform, environ={})
@@ -239,7 +239,7 @@ def test_dev_environment_satisfies_studio_and_studio_environment_does_not_satisf
     assert dev.is_fresh(folder, "studio")
 
 
-def test_failed_installation_is_retried(folder: Path) -> None:
+def test_failed_installation_raises_and_the_environment_stays_outdated(folder: Path) -> None:
     failing = replace(fake_pip(FakeSystem()), do=lambda command, environ, log: 1)
     with pytest.raises(dev.Trouble, match="packages couldn't be installed"):
         dev.make_environment(failing, folder, "dev")

@@ -116,7 +116,7 @@ def test_source_distribution_contains_exactly_the_tracked_files(built: Built) ->
     assert built.in_sdist() == {*built.sources, "PKG-INFO"}
 
 
-def test_distribution_metadata_is_valid_and_correct(built: Built) -> None:
+def test_distribution_metadata_matches_the_version_licence_and_supported_pythons(built: Built) -> None:
     told = built.metadata()
     assert (told.name, str(told.version), told.license_expression) == ("nep-studio", __version__, "MIT")
     assert f" {told.author}\n" in (ROOT / "LICENSE").read_text(encoding="utf-8")
@@ -181,7 +181,7 @@ def fresh_environment(folder: Path, asked_for: Iterable[Requirement]) -> Path:
     return venv_python(folder, sys.platform)
 
 
-def test_nep_works_from_the_wheel_in_a_fresh_environment(built: Built, tmp_path: Path) -> None:
+def test_installed_wheel_runs_messages_services_and_commands_in_a_fresh_environment(built: Built, tmp_path: Path) -> None:
     python = fresh_environment(tmp_path / "fresh", built.metadata().requires_dist or ())
     pip = [sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index"]
     for step in (

@@ -73,11 +73,11 @@ def test_new_findings_are_reported_and_earlier_findings_are_not(
     assert findings_in(tmp_path / "none") == []
 
 
-def test_fuzz_target_that_ended_early_is_a_failure(tmp_path: Path) -> None:
+def test_fuzz_target_that_exits_with_an_error_is_a_failure(tmp_path: Path) -> None:
     assert Fuzzing(tmp_path, code=1).run() == 1
 
 
-def test_invalid_fuzz_requests_are_reported(tmp_path: Path) -> None:
+def test_fuzzing_rejects_unknown_targets_other_systems_missing_packages_and_durations(tmp_path: Path) -> None:
     with pytest.raises(Trouble, match="no target 'nothing'"):
         Fuzzing(tmp_path).run("nothing")
     with pytest.raises(Trouble, match="Linux only"):

@@ -107,7 +107,7 @@ def virtual_pepper(master: Master) -> Iterator[Program]:
         yield program
 
 
-def test_readme_blocks_run_in_order_and_print(
+def test_readme_blocks_run_in_order_print_their_output_and_do_not_busy_wait(
     virtual_pepper: Program, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(

@@ -41,7 +41,7 @@ def test_fewer_colours_make_the_file_smaller(picture: Path) -> None:
     assert len(np.unique(cv2.imread(str(picture)).reshape(-1, 3), axis=0)) <= 64
 
 
-def test_image_with_few_colours_is_unchanged(tmp_path: Path) -> None:
+def test_image_with_few_colours_keeps_its_exact_pixels(tmp_path: Path) -> None:
     path = tmp_path / "few.png"
     made = np.arange(0, 250, 5, dtype=np.uint8).reshape(5, 10, 1).repeat(3, axis=2)
     cv2.imwrite(str(path), made)

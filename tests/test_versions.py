@@ -78,7 +78,7 @@ def test_interpreter_that_does_not_report_the_expected_version_is_ignored(said: 
         versions(system.computer(), [], tmp_path / "made", tmp_path)
 
 
-def test_other_python_implementations_are_ignored(tmp_path: Path) -> None:
+def test_python_implementations_except_cpython_are_ignored(tmp_path: Path) -> None:
     system = Pythons({sys.executable: f"{HERE} pypy {sys.executable}\n"})
     assert found(system.computer(), tmp_path) == {}
 
@@ -126,7 +126,7 @@ def test_mac_package_uses_wheels_for_the_oldest_macos(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("platform", "is_for_oldest"), [("darwin", False), ("linux", True), ("win32", True)])
-def test_pip_selects_the_wheels_on_other_systems(platform: str, is_for_oldest: bool, tmp_path: Path) -> None:
+def test_pip_selects_the_wheels_except_for_the_oldest_macos(platform: str, is_for_oldest: bool, tmp_path: Path) -> None:
     system = Pythons({})
     environment(
         system.computer(platform), "python3", tmp_path / "env", "package", is_for_oldest=is_for_oldest

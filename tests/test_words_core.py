@@ -212,7 +212,7 @@ def test_graph_changes_are_translated() -> None:
         said(*lines)
 
 
-def test_questions_and_errors_are_translated() -> None:
+def test_permission_question_and_errors_are_translated() -> None:
     question = PermissionQuestion({"Nao": ("Xx",), "Turtle": ("Xx", "zz")}, lambda: None)
     said(question.title, question.message, MayNotMoveError(["Nao", "Turtle"]))
     said(

@@ -43,7 +43,7 @@ def test_number_field_reads_and_validates_values():
             field.read(wrong)
 
 
-def test_choice_field_returns_value_of_its_label():
+def test_choice_field_reads_saved_values_and_shows_their_labels():
     field = ChoiceField("C", (("yes", True), ("three", 3), ("all", "all")))
     assert [field.read(saved) for saved in ("true", "3", "all", None)] == [True, 3, "all", True]
     assert field.option_text(3) == "three"
@@ -162,6 +162,6 @@ def test_placeholders_in_robot_block_text_are_parsed():
     assert BlockTemplate("wave", []).text == "%ROBOT wave"
 
 
-def test_ids_are_made_unique():
+def test_duplicate_and_missing_block_ids_are_made_unique():
     saved = {"blocks": {"blocks": [{"type": "a", "id": "x"}, {"type": "b", "id": "x"}, {"type": "c"}]}}
     assert [block.id for block in parse_workspace(saved).all_blocks()] == ["block", "x~2", "x"]

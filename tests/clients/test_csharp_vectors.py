@@ -78,7 +78,7 @@ def test_batches_are_decoded_as_in_the_vectors(wire: MonoProgram) -> None:
             }
 
 
-def test_ids_are_derived_from_the_key(wire: MonoProgram) -> None:
+def test_node_publisher_and_subscriber_ids_are_derived_from_the_node_key(wire: MonoProgram) -> None:
     for node in vectors("ids")["nodes"]:
         key = "e9" if node["key"] == "\u00e9" else node["key"]
         assert json.loads(wire.ask(f"id {key}")) == node["node_id"]
@@ -86,7 +86,7 @@ def test_ids_are_derived_from_the_key(wire: MonoProgram) -> None:
             assert json.loads(wire.ask(f"id {key} {number}")) == wanted
 
 
-def test_master_replies_survive_decode_and_encode(wire: MonoProgram) -> None:
+def test_master_requests_and_replies_round_trip(wire: MonoProgram) -> None:
     for asked in vectors("master")["asked"]:
         for body in (asked["request"], asked["answer"]):
             again = bytes.fromhex(json.loads(wire.ask(f"pack {body}")))
@@ -95,7 +95,7 @@ def test_master_replies_survive_decode_and_encode(wire: MonoProgram) -> None:
 
 
 @pytest.mark.skipif(not HAS_CODES, reason="these vectors are not there yet")
-def test_malformed_messages_are_rejected_with_the_same_codes(wire: MonoProgram) -> None:
+def test_malformed_messages_are_rejected_with_the_codes_of_the_vectors(wire: MonoProgram) -> None:
     wrong = [
         (vector, answer)
         for vector in vectors("malformed")

@@ -255,7 +255,7 @@ def test_late_subscribers_receive_latched_messages_and_history(program, python):
     assert [each["value"] for each in program.messages] == [2, 3]
 
 
-def test_patterns_match_later_topics(program, python):
+def test_pattern_subscriber_receives_topics_published_later(program, python):
     sub = program.do("subscriber", topic="/*/camera", type="json")["sub"]
     for name in ("left", "right"):
         python.new_pub(f"/{name}/camera", "json").publish(name)
@@ -335,7 +335,7 @@ def test_master_restart_under_traffic_loses_nothing(monkeypatch):
         program.end()
 
 
-def test_killed_program_leaves_the_graph_and_does_not_delay_new_publishers(program, python):
+def test_killed_program_is_removed_from_the_subscribers_of_a_publisher(program, python):
     program.do("subscriber", topic="test", type="json")
     publisher = python.new_pub("test", "json")
     assert publisher.subscribers == 1
@@ -344,7 +344,7 @@ def test_killed_program_leaves_the_graph_and_does_not_delay_new_publishers(progr
     publisher.publish(1)
 
 
-def test_suspended_subscriber_counts_its_losses(program, python):
+def test_blocked_subscriber_counts_its_losses(program, python):
     sub = program.do("subscriber", topic="large", type="bytes", latest=True)["sub"]
     publisher = python.new_pub("large", "bytes")
     hang = program.begin("hang", seconds=0.5)
@@ -359,7 +359,7 @@ def test_suspended_subscriber_counts_its_losses(program, python):
     eventually(is_complete)
 
 
-def test_publisher_bounds_messages_in_flight_to_a_slow_subscriber(program, python):
+def test_messages_beyond_the_in_flight_limit_of_a_slow_subscriber_are_counted_as_lost(program, python):
     subscriber = python.new_sub("large", "bytes")
     pub = program.do("publisher", topic="large", type="bytes")["pub"]
     payload = base64.b64encode(bytes(LARGE_BYTES)).decode()

@@ -21,7 +21,7 @@ from tests.robots.driver.test_rize_dialect import (
     primitive,
     test_commands_for_other_robots_are_ignored,
     test_rize_receives_its_command_back_with_the_result,
-    test_several_primitives_are_answered_once_with_text_numbers_and_named_inputs,
+    test_several_primitives_with_numbers_as_text_and_named_inputs_are_answered_once,
     test_stop_is_reported_to_rize_and_rize_can_cancel,
     test_unsupported_rize_command_is_answered_with_failure,
 )
@@ -29,7 +29,7 @@ from tests.robots.driver.test_rize_dialect import (
 __all__ = [
     "test_commands_for_other_robots_are_ignored",
     "test_rize_receives_its_command_back_with_the_result",
-    "test_several_primitives_are_answered_once_with_text_numbers_and_named_inputs",
+    "test_several_primitives_with_numbers_as_text_and_named_inputs_are_answered_once",
     "test_stop_is_reported_to_rize_and_rize_can_cancel",
     "test_unsupported_rize_command_is_answered_with_failure",
 ]

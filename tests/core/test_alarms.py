@@ -124,7 +124,7 @@ def at_rest(folder: Path) -> Session:
     return Session(Settings(folder), address="127.0.0.1:1", start_processes=False)
 
 
-def test_alarms_and_their_history_survive_a_restart(tmp_path: Path) -> None:
+def test_complete_alarms_and_their_snooze_are_restored_after_a_restart(tmp_path: Path) -> None:
     first = at_rest(tmp_path)
     kept = first.alarms.create(BELOW)
     first.alarms.create(AlarmCondition("silent", "", for_s=2.0))  # nobody has said which topic
@@ -173,7 +173,7 @@ def test_active_alarm_is_shown_even_if_its_history_record_was_evicted(tmp_path: 
 
 
 @pytest.mark.parametrize("data", [b"{oops", b"\xff", b"[]", b""])
-def test_damaged_file_is_backed_up_and_reported(tmp_path: Path, data: bytes) -> None:
+def test_damaged_alarm_file_is_backed_up_and_reported(tmp_path: Path, data: bytes) -> None:
     (tmp_path / FILE_NAME).write_bytes(data)
     session = at_rest(tmp_path)
     assert session.alarms.rules == ()
@@ -195,7 +195,7 @@ def test_invalid_alarm_in_the_file_does_not_disable_the_others(tmp_path: Path) -
     session.close()
 
 
-def test_file_of_a_newer_version_is_not_modified(tmp_path: Path) -> None:
+def test_alarm_file_of_a_newer_version_is_not_modified(tmp_path: Path) -> None:
     data = b'{"format": 2, "alarms": [], "more": true}'
     (tmp_path / FILE_NAME).write_bytes(data)
     session = at_rest(tmp_path)

@@ -84,7 +84,7 @@ def test_records_of_a_local_program_are_not_duplicated() -> None:
     assert [line.text for line in console.records] == ["theirs", "unsaid"]
 
 
-def test_malformed_log_messages_are_shown_as_one_record_or_reported_as_alerts() -> None:
+def test_undecodable_log_message_is_skipped_and_unusual_records_are_shown() -> None:
     console = Console(lambda: 5.0)
     console.add_messages([
         Message(LOG_TOPIC, b"{oops", "json", LOG_TYPE),
@@ -97,7 +97,7 @@ def test_malformed_log_messages_are_shown_as_one_record_or_reported_as_alerts() 
     assert long.text.endswith(f"… ({MAX_TEXT_LENGTH + 1} characters)")
 
 
-def test_full_ring_of_unread_records_keeps_the_newest() -> None:
+def test_full_console_of_unread_records_keeps_the_newest() -> None:
     console = Console(capacity=3)
     console.add_messages([record(text=str(number)) for number in range(10)])
     console.add("info", "studio", "end")

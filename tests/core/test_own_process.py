@@ -20,7 +20,7 @@ def program(tmp_path: Path) -> Path:
     return made
 
 
-def test_unchanged_program_is_reported_as_unchanged(program: Path) -> None:
+def test_unmodified_program_file_is_not_reported_as_changed(program: Path) -> None:
     own = OwnProgram(program)
     program.read_bytes()
     assert own.executable_state() == ""
@@ -70,7 +70,7 @@ def test_alert_about_a_changed_program_is_shown_and_resolved_with_its_cause(
         session.close()
 
 
-def test_check_of_the_program_file_preserves_the_alert_of_a_behaviour(
+def test_check_of_the_program_file_keeps_the_alert_about_a_stopped_behaviour(
     tmp_path: Path,
 ) -> None:
     session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=False)

@@ -164,7 +164,7 @@ def test_unwritable_journal_raises_an_alert_until_it_is_writable(session: Sessio
     tick_until(session, lambda: not session.alerts.has("journal"))
 
 
-def test_invalid_input_is_rejected_before_it_is_sent(session: Session) -> None:
+def test_invalid_action_input_and_unknown_robot_are_rejected_before_sending(session: Session) -> None:
     with nep.node("lamp") as node:
         driver = Driver(LAMP, "Lamp", node)
         driver.start()

@@ -56,7 +56,7 @@ def texts(studio: Studio) -> list[str]:
     return [each["text"] for each in studio.look() if each["text"]]
 
 
-def test_click_in_a_image_publishes_its_pixel_once_armed(studio: Studio, address: str) -> None:
+def test_click_in_an_image_publishes_its_pixel_only_after_arming(studio: Studio, address: str) -> None:
     studio.find("Use the virtual robot", enabled=True)
     studio.screen.key("2", held=["Alt"])
     studio.says(f"Master {address}", 40)

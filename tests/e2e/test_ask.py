@@ -90,7 +90,7 @@ def test_choice_is_selected_by_key_or_mouse_also_in_the_enlarged_room(
     until(lambda: not studio.all(kind="QuestionCard"), "the card goes")
 
 
-def test_stop_removes_choices(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_stop_removes_the_choices_of_a_question(start: Callable[..., Studio], tmp_path: Path) -> None:
     script = started(chooses("Play?", ["yes", "no"], says_the_answer()))
     studio = start(str(write(tmp_path / "Mine.nepb", script)))
     studio.spot("[data-id=started]")  # a menu that is open when the blocks come is closed by them

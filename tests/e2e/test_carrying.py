@@ -72,7 +72,7 @@ def test_blocks_dropped_on_another_tab_are_moved_to_that_tab(studio: Studio) -> 
     assert studio.quit() == 0
 
 
-def test_blocks_dropped_elsewhere_return_and_blocks_on_plus_create_a_behaviour(studio: Studio) -> None:
+def test_blocks_dropped_outside_return_and_blocks_dropped_on_plus_create_a_behaviour(studio: Studio) -> None:
     before = shown(studio)
     studio.find("Quiz", kind="BehaviourTab")
     stack = studio.spot(PATH.format("say Two"))

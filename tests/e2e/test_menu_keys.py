@@ -42,7 +42,7 @@ def test_edit_menu_copies_and_pastes_the_focused_block(mine: Studio) -> None:
     until(lambda: mine.page(BLOCKS) > before, "it is pasted")
 
 
-def test_edit_menu_works_in_a_field_of_the_page(mine: Studio) -> None:
+def test_edit_menu_selects_cuts_and_pastes_in_a_text_field_of_the_editor_page(mine: Studio) -> None:
     mine.screen.key("f", ["Ctrl"])
     until(lambda: mine.page("document.activeElement?.tagName") == "INPUT", "the field has the keyboard")
     mine.screen.type("one")

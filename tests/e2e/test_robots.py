@@ -66,7 +66,7 @@ def test_real_robot_moves_only_after_permission_which_is_requested_once(table: S
     table.find("Try turn")
 
 
-def test_second_virtual_robot_connects_and_is_drawn(start: Callable[..., Studio]) -> None:
+def test_virtual_turtle_connects_and_moves_without_a_motion_permission(start: Callable[..., Studio]) -> None:
     studio = start()
     studio.choose("Robots", "Use the virtual Turtle")
     studio.says("Turtle ready", 40)

@@ -70,7 +70,7 @@ def test_program_written_for_the_original_package_exchanges_messages_with_the_or
         eventually(is_heard)
 
 
-def test_classes_of_the_original_package_work(start):
+def test_classes_of_the_original_package_call_services_and_exchange_messages(start):
     with nep.node("python") as python:
         python.new_server("/double", lambda request: 2 * request, threads=1)
         answers = python.new_sub("answers", "json")

@@ -144,7 +144,7 @@ def test_clients_and_servers_of_originals_connect_to_each_other(peers, master, a
     assert client.hears({"echo": {"a": 1}})
 
 
-def test_nep_0546_and_0547_are_named_with_their_nodes_and_do_not_affect_others(
+def test_nep_0546_and_0547_are_named_with_their_nodes_and_do_not_affect_other_programs(
     peers, master, node, graph_shows
 ):
     heard = peers.start("0.5.4.8", "subscriber", "t", name="served").wait_ready()

@@ -163,7 +163,7 @@ def test_blackboard_keeps_the_next_perception_after_hostile_messages():
         assert board.wait_for("honest.head", timeout_s=30.0) == 5
 
 
-def test_servers_answer_after_hostile_requests():
+def test_servers_reply_after_hostile_requests():
     asked: dict[str, hostile.Message] = {
         "blackboard/set": {"key": "human.1", "value": {"a": 1}, "lives_s": 5},
         "blackboard/get": {"key": "human.1", "max_age_s": 5},

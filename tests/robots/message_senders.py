@@ -115,7 +115,7 @@ class WhoseWordsCount:
         with nep.node("evil", master=master.address) as made:
             yield made
 
-    def test_answer_of_another_publisher_does_not_end_an_action(
+    def test_reply_of_another_publisher_does_not_end_an_action(
         self, pepper: WireRobot, evil: nep.Node, side: Side
     ) -> None:
         side.meet(pepper.described, pepper._node.id)
@@ -148,7 +148,7 @@ class WhoseWordsCount:
             side.until(told)
             assert side.value("battery") == 84
 
-    def test_answer_of_another_publisher_does_not_confirm_a_stop(
+    def test_reply_of_another_publisher_does_not_confirm_a_stop(
         self, pepper: WireRobot, evil: nep.Node, side: Side
     ) -> None:
         side.meet(pepper.described, pepper._node.id)
@@ -170,7 +170,7 @@ class WhoseWordsCount:
         assert side.stop_says() == "Pepper didn't reply"
 
     @pytest.mark.parametrize("silent", [False, True])
-    def test_stop_requires_an_answer_of_every_program_with_the_robot_name(
+    def test_stop_requires_a_reply_of_every_program_with_the_robot_name(
         self, pepper: WireRobot, master: Master, side: Side, silent: bool
     ) -> None:
         side.meet(pepper.described, pepper._node.id)
@@ -185,7 +185,7 @@ class WhoseWordsCount:
             twin.close()
 
     @pytest.mark.parametrize("states", [("succeeded",), ("accepted", "running", "succeeded")], ids=len)
-    def test_answer_of_an_unlisted_publisher_is_queued_until_the_master_lists_the_publisher(
+    def test_reply_of_an_unlisted_publisher_is_queued_until_the_master_lists_the_publisher(
         self, master: Master, side: Side, states: tuple[str, ...]
     ) -> None:
         """A robot creates its reply topic only when it sends the first reply."""

@@ -113,7 +113,7 @@ def test_invalid_inputs_are_reported_with_readable_messages():
 
 
 @pytest.mark.parametrize("wrong", [float("nan"), float("inf"), True, None, 10**400, [1]])
-def test_value_that_is_not_a_number_is_rejected(wrong):
+def test_input_that_is_not_a_finite_number_is_rejected(wrong):
     assert parse(model("pepper")).action("turn").check({"angle": wrong}) == ("turn: angle must be a number",)
 
 
@@ -316,7 +316,7 @@ def test_announced_description_is_parsed():
      b'{"title": "x"}', b'{"x": ' + b'{"a":' * 900 + b"1" + b"}" * 901],
     ids=["list", "object", "number", "half", "nothing", "no robot", "deep"],
 )  # fmt: skip
-def test_invalid_announcement_raises_an_error(data):
+def test_malformed_or_deeply_nested_announcement_raises_an_error(data):
     with pytest.raises((DescriptionError, NepError)):
         parse_announcement(message_of(data))
 

@@ -62,7 +62,7 @@ def page(qtbot: QtBot) -> Iterator[QWebEnginePage]:
     profile.deleteLater()
 
 
-def test_page_of_this_computer_connects_and_page_of_another_origin_is_rejected(
+def test_page_of_this_computer_connects_and_page_of_a_disallowed_origin_is_rejected(
     qtbot: QtBot, page: QWebEnginePage, node: nep.Node, master: Master, roslib: str
 ) -> None:
     heard = node.new_sub("/talker", "string")

@@ -225,7 +225,7 @@ def test_input_outside_action_schema_is_an_error_before_run():
         (block("variables_set", VALUE=number(1)), "needs a variable"),
     ],
 )
-def test_block_with_invalid_field_value_is_skipped(it, end):
+def test_block_with_invalid_field_value_is_an_error_with_its_reason(it, end):
     (problem,) = compile_behaviour(workspace(started(it)), [robot()]).problems
     assert problem.severity == "error"
     assert end in problem.message
@@ -288,7 +288,7 @@ def test_variable_names_are_kept_where_valid_in_python():
     assert not {"class", "wait"} & set(assigned)
 
 
-def test_scripts_share_variables():
+def test_variable_is_set_changed_and_read_in_a_script():
     run = play(
         workspace(
             started(
@@ -302,7 +302,7 @@ def test_scripts_share_variables():
     assert run.lines == ["7"]
 
 
-def test_long_script_and_deep_nesting_compile():
+def test_long_script_and_35_nested_blocks_compile_and_200_nested_blocks_are_an_error():
     long_ = compile_behaviour(workspace(started(*(say(f"{n}") for n in range(3000)))), [robot()])
     assert not long_.problems
     assert long_.source.count("'say'") == 3000

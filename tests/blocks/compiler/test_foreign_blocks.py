@@ -65,7 +65,7 @@ def test_variable_without_name_is_reported_with_rename_fix() -> None:
     assert "speed" in program.readings["t"]
 
 
-def test_rename_fix_finds_the_variable() -> None:
+def test_variable_without_name_is_parsed_with_a_substitute_name() -> None:
     saved = workspace(started(block("variables_set", "s") | {"fields": {"VAR": {"id": "gone"}}}))
     parsed = parse_workspace(saved)
     assert parsed.nameless_variables == {"gone"}

@@ -39,7 +39,7 @@ def test_publishing_on_robot_topic_counts_as_using_and_moving_that_robot(topic: 
     assert Program.from_json(program.to_json()).moves == ("Rover",)
 
 
-def test_publishing_on_other_topics_does_not_count_as_moving_a_robot() -> None:
+def test_publishing_on_topic_of_no_robot_does_not_count_as_moving_a_robot() -> None:
     program = compile_behaviour(workspace(started(publish("/weather"))), [ROVER])
     assert (program.robots, program.moves, program.problems) == ((), (), ())
 

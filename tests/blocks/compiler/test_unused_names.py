@@ -49,7 +49,7 @@ def test_list_never_set_is_reported_and_fix_sets_it_at_program_start():
     assert (first["type"], first["next"]["block"]["id"]) == ("variables_set", "add")
 
 
-def test_fixed_program_runs():
+def test_program_with_unset_list_runs_after_the_fix():
     saved = workspace(started(add(), write(block("lists_length", LIST=get("scores")))), variables=("scores",))
     assert play(saved).runtime.error is not None
     fixed = fix(saved, compile_behaviour(saved, []).problems[0].fix_action or "")

@@ -195,7 +195,7 @@ def test_script_that_waits_for_receivers_can_be_paused():
 
 
 @pytest.mark.parametrize("name", ["", "  ", "\n"])
-def test_broadcast_needs_a_name(name):
+def test_broadcast_without_a_name_is_skipped_with_an_error(name):
     (problem,) = [
         p
         for p in compile_behaviour(workspace(started(broadcast(name))), []).problems

@@ -182,7 +182,7 @@ def test_breakpoint_changed_during_run_takes_effect_at_once(running, master):
 
 
 @pytest.mark.parametrize("data", ['{"pause": false}', '{"pause": true', "[]", '["pause"]', "pause", 7, None])
-def test_other_block_data_is_not_a_breakpoint(data):
+def test_invalid_or_unrelated_block_data_is_not_a_breakpoint(data):
     made = compile_behaviour(workspace(started(write(text("one")) | {"data": data})), [])
     assert made.breakpoints == ()
     assert not made.problems
@@ -230,7 +230,7 @@ def test_network_event_starts_its_script(running, pepper, master):
     assert {"is": "print", "text": "ouch"} in running.said
 
 
-def test_output_is_bounded(running, master):
+def test_printed_output_of_a_program_is_bounded_in_lines_and_line_length(running, master):
     flood = block("control_repeat", TIMES=number(5000), BODY=[write(text("x" * 3000))])
     running.start(workspace(started(flood)), master=master.address)
     running.until("ended")

@@ -88,7 +88,7 @@ def test_recursion_depth_of_200_works_with_long_arithmetic() -> None:
     assert run.lines[1].startswith("3943")
 
 
-def test_error_in_function_names_its_block_and_later_error_names_caller() -> None:
+def test_error_in_function_names_its_block_and_returned_value_can_be_joined_to_text() -> None:
     bad = define("g", "bad", (), write(block("values_arithmetic", "sum", A=number(1), SIGN="/", B=number(0))))
     assert play(workspace(started(call("g")), bad)).runtime.error.block == "sum"
     five = define("g", "five", (), write(text("in")), result=number(5))

@@ -165,7 +165,7 @@ def test_value_of_any_type_can_be_asked_as_question(asked, shown):
         ("٣", "٣"),
     ],
 )
-def test_typed_number_is_converted_to_number(typed, value):
+def test_typed_decimal_number_is_converted_and_other_answers_stay_text(typed, value):
     assert (type(parse_answer(typed)), parse_answer(typed)) == (type(value), value)
 
 

@@ -108,7 +108,7 @@ def test_large_changes_are_reported_in_parts_without_loss() -> None:
     assert {each.id for each in (*first, *rest)} == {f"id v{each}" for each in range(60)}
 
 
-def test_list_modified_during_read_does_not_raise() -> None:
+def test_list_and_map_modified_during_read_do_not_raise() -> None:
     watched, names = watch(table={"0": 0}, row=[0])
     over = threading.Event()
 

@@ -129,7 +129,7 @@ def test_disarming_ends_repetition_without_polling(bench) -> None:
     assert kinds(bench) == ["began", "ended"]
 
 
-def test_repeated_message_that_raises_ends_and_others_continue(bench) -> None:
+def test_repeated_message_that_raises_ends_and_other_messages_continue(bench) -> None:
     heard = bench.node.new_sub("/good", "json")
     bench.arm("/good", "/bad")
     made = iter([1, 2])

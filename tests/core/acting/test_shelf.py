@@ -53,7 +53,7 @@ def test_copies_are_inserted_below_and_deleted_message_is_restored() -> None:
     assert shelf.remove("nobody") is None
 
 
-def test_shelf_is_bounded() -> None:
+def test_number_of_saved_messages_and_requests_of_the_shelf_is_limited() -> None:
     shelf = Shelf()
     kept = [shelf.set_message(SavedMessage(str(number), "", "/t")) for number in range(MAX_MESSAGES + 1)]
     assert kept == [True] * MAX_MESSAGES + [False]
@@ -71,7 +71,7 @@ def test_invalid_shelf_file_is_rejected(data) -> None:
         parse_shelf(data)
 
 
-def test_shelf_of_newer_version_raises_its_own_error() -> None:
+def test_shelf_of_newer_version_raises_newer_shelf_error() -> None:
     with pytest.raises(NewerShelfError):
         parse_shelf(json.dumps({"format": 2, "messages": []}).encode())
 

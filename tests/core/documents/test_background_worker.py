@@ -18,7 +18,7 @@ def beside() -> Iterator[BackgroundWorker[str]]:
     made.close()
 
 
-def test_result_is_returned_only_once(beside) -> None:
+def test_result_of_background_job_is_returned_only_once(beside) -> None:
     found: list[str | None] = []
     beside.submit("a", lambda: threading.current_thread().name)
     until(lambda: bool(found.append(beside.pop_result("a")) or found[-1]))

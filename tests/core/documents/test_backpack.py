@@ -122,7 +122,7 @@ def test_backpack_limits_reject_new_items_without_loss(
     assert len(backpack.items) == 1
 
 
-def test_unreadable_or_unwritable_backpack_is_left_unchanged(tmp_path: Path) -> None:
+def test_unreadable_or_unwritable_backpack_raises_with_the_reason(tmp_path: Path) -> None:
     (tmp_path / "backpack.json").mkdir()
     backpack = Backpack(tmp_path)
     backpack.reload_if_changed()

@@ -112,7 +112,7 @@ def test_work_discarded_during_journal_write_does_not_reappear(
     assert list(journals.glob("*")) == []
 
 
-def test_unresponsive_disk_is_reported_when_the_window_closes(
+def test_journal_retry_fails_while_the_disk_is_unresponsive_and_then_succeeds(
     on_a_slow_disk: Document, slow: SlowJournal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.core.documents.background_worker.JOIN_TIMEOUT_S", 0.01)
@@ -211,7 +211,7 @@ def test_invalid_file_is_rejected_with_reason_and_changes_nothing(
     assert document.workspace == STARTED
 
 
-def test_truncated_file_opens_completely_or_not_at_all(document: Document, tmp_path: Path) -> None:
+def test_file_truncated_at_any_length_is_rejected(document: Document, tmp_path: Path) -> None:
     document.apply_edit(STARTED)
     path = tmp_path / "a.nepb"
     document.save(path)

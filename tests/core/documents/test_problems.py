@@ -50,7 +50,7 @@ def test_missing_robot_problem_counts_nested_and_unstarted_blocks() -> None:
     assert line.problem.message == "Nao 3 isn't connected, so 3 blocks will be skipped."
 
 
-def test_problem_button_describes_its_action() -> None:
+def test_missing_robot_fix_says_whether_a_virtual_robot_starts() -> None:
     """The label must not suggest that a real robot is connected when a virtual one starts."""
     (line,) = lines(speaks("Nao 3"), [pepper("Nao 3")], [])
     assert line.fixes == (Fix("Start a virtual Nao 3", "robot.virtual:Nao 3"),)

@@ -26,7 +26,7 @@ def parsed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return seen
 
 
-def test_text_is_kept_unchanged_and_parsed_once(parsed: list[str]) -> None:
+def test_workspace_text_is_kept_unchanged_and_parsed_once(parsed: list[str]) -> None:
     text = json.dumps(ONE, separators=(",", ":"))
     told = WorkspaceJson(text)
     assert told.text is text

@@ -66,7 +66,7 @@ def test_internal_nep_messages_do_not_count_as_traffic() -> None:
     assert "1" in quiet.quiet_keys(QUIET_TIMEOUT_S)
 
 
-def test_departed_node_is_removed() -> None:
+def test_departed_node_is_removed_from_quiet_nodes() -> None:
     quiet = QuietNodes()
     quiet.update(facts(), 0.0)
     quiet.update(GraphInput(), 1.0)

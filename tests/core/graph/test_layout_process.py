@@ -27,7 +27,7 @@ def test_graph_size_decides_whether_layout_runs_in_a_process() -> None:
     assert not is_large(NodeGraph())
 
 
-def test_layout_process_returns_the_same_positions() -> None:
+def test_layout_process_returns_the_same_layout_as_the_calling_process() -> None:
     made = LayoutProcess().arrange(LARGE, None, LayoutSizes())
     assert made == arrange(LARGE)
 

@@ -19,7 +19,7 @@ def numbers(history: MessageHistory) -> list[int | None]:
     return [kept.seq for kept in history]
 
 
-def test_oldest_messages_are_evicted_and_message_numbers_are_stable() -> None:
+def test_oldest_messages_are_evicted_and_remaining_messages_keep_their_index() -> None:
     history = MessageHistory(most_messages=3)
     for number in range(5):
         history.add(message(number))

@@ -129,7 +129,7 @@ def test_only_newest_image_of_a_batch_is_decoded(images: Images, monkeypatch) ->
     assert decoded == [49]
 
 
-def test_other_topics_and_closed_streams_receive_nothing(images: Images, watched: list[str]) -> None:
+def test_stream_ignores_images_of_other_topics_and_images_after_close(images: Images, watched: list[str]) -> None:
     stream = images.stream("/camera")
     assert watched == ["/camera"]
     images.offer([jpeg((1, 2, 3), "/other")])
@@ -177,7 +177,7 @@ def test_two_panels_can_show_one_topic(images: Images) -> None:
     assert one.picture.seq == 1
 
 
-def test_grey_and_alpha_images_are_decoded() -> None:
+def test_grey_and_colour_images_are_decoded() -> None:
     for channels, encoding in ((1, "mono8"), (3, "bgr8"), (3, "rgb8")):
         shape = [4, 6, 3] if channels == 3 else [4, 6]
         data = bytes(range(4 * 6 * channels))
@@ -335,7 +335,7 @@ def test_frozen_image_of_suspended_stream_can_be_enlarged_after_resume(images: I
     assert (stream.picture.seq, stream.is_awaiting_image) == (1, True)
 
 
-def test_streams_are_not_silent_while_source_is_paused(images: Images) -> None:
+def test_silence_of_an_image_stream_can_be_restarted_while_its_age_continues(images: Images) -> None:
     now = [10.0]
     images.clock = lambda: now[0]
     stream = images.stream("/camera")

@@ -40,7 +40,7 @@ def test_lists_of_objects_are_found_at_any_depth_outer_first() -> None:
 
 
 @pytest.mark.parametrize("value", [None, 3, "words", b"bytes", [], [1, {}], [{}], {}, [[{"a": 1}]]])
-def test_other_values_are_not_lists_of_objects(value) -> None:
+def test_scalars_maps_and_empty_mixed_or_nested_lists_are_not_lists_of_objects(value) -> None:
     assert not is_list_of_objects(value)
     assert lists_of_objects(value) == []
     assert rows_of(value) == [] or value == [1, {}] or value == [{}]

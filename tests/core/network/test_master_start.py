@@ -52,7 +52,7 @@ def test_foreign_program_at_master_address_is_named_once_and_retried_with_backof
     assert not [each for each in psutil.Process().children() if "master" in each.cmdline()]
 
 
-def test_running_master_is_joined(master) -> None:
+def test_no_master_is_started_when_one_is_running(master) -> None:
     told: list[str] = []
     start = MasterStarter(master.address, told.append)
     start.ensure()
@@ -104,7 +104,7 @@ def view(epoch: int) -> GraphView:
     return GraphView(epoch, 1, {}, {})
 
 
-def test_first_and_unchanged_master_are_accepted_at_once() -> None:
+def test_graph_of_the_first_or_same_master_is_accepted_at_once() -> None:
     learning = MasterChangeDetector()
     assert not learning.is_incomplete(None, view(1), 0.0)
     assert not learning.is_incomplete(view(1), view(1), 1.0)

@@ -66,7 +66,7 @@ def test_nodes_added_after_the_first_graph_are_marked_new_until_seen() -> None:
     assert nodes.revision == before + 1
 
 
-def test_load_updates_without_new_graph_revision() -> None:
+def test_cpu_load_update_keeps_the_revision_of_the_node_list() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a")]), 0)
     before = nodes.revision

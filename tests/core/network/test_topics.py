@@ -119,7 +119,7 @@ def test_reappearing_topic_is_live_again() -> None:
     assert topics["/a"].rate_hz == 10.0
 
 
-def test_revision_increases_only_when_rows_change() -> None:
+def test_rate_change_increases_only_the_revision_of_values() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     revision, values = topics.revision, topics.values_revision
@@ -154,7 +154,7 @@ def test_total_rate_is_unknown_without_reported_rates() -> None:
     assert total_rate_hz([info("/a"), info("/b", rate_hz=None)]) == 10.0
 
 
-def test_unchanged_graph_updates_only_stats() -> None:
+def test_graph_of_the_same_revision_updates_only_stats() -> None:
     topics = Topics()
     topics.update(view(info("/a", rate_hz=10.0), revision=7), 0)
     before = topics.revision
@@ -235,7 +235,7 @@ def test_wrong_clock_does_not_mark_a_stream_as_silent() -> None:
     assert (round(topics["/a"].silent_s or 0, 3), topics["/a"].age_s) == (0.1, (10**18 - 10**9) / 1e9)
 
 
-def test_silence_of_topics_received_by_others_follows_last_master_report() -> None:
+def test_silence_of_topics_received_by_other_nodes_follows_last_master_report() -> None:
     topics = Topics()
     topics.update(view(heard()), 0)
     topics.update(view(heard(last_stamp_ns=2_000_000_000), revision=5), 10)

@@ -22,7 +22,7 @@ def told(done: subprocess.CompletedProcess[str]) -> dict[str, object]:
     return seen
 
 
-def test_ros_1_is_observed_received_and_its_loss_detected() -> None:
+def test_ros_1_is_observed_and_received_and_loss_of_its_master_is_detected() -> None:
     skip_without_ros()
     done = subprocess.run(
         [sys.executable, *PROGRAM, "ros"], capture_output=True, encoding="utf-8", timeout=120, check=False

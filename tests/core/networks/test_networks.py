@@ -205,7 +205,7 @@ def test_reason_for_undecodable_topic_is_available_while_watched(world: World) -
     assert world.networks.read_problem("ros2 /a") == ""
 
 
-def test_arrivals_are_counted_where_network_reports_no_rate() -> None:
+def test_rate_is_measured_from_arrivals_where_network_reports_no_rate() -> None:
     topics = Topics(("", 0), "ros")
     topics.update(graph("/a", "/b"), 0.0)
     topics["/a"].is_watched = True

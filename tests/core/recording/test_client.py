@@ -198,7 +198,7 @@ def test_flight_recorder_saves_last_seconds_and_is_restarted(made):
     assert not client.save_last(Path("c.mcap"), 60.0)
 
 
-def test_unresponsive_recorder_and_invalid_events_are_handled(made):
+def test_unresponsive_recorder_is_reported_and_invalid_events_are_ignored(made):
     made.client.set_ring(RingChoice(Path("ring")))
     made.lines[0].is_full = True
     assert made.client.record(Path("a.mcap"))

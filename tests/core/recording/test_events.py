@@ -86,7 +86,7 @@ def test_second_run_in_same_tick_is_a_separate_event(told):
     assert second["id"] != first["id"]
 
 
-def test_tried_stack_is_recorded_with_text_of_its_block(told):
+def test_trial_of_stack_is_recorded_with_text_of_its_block(told):
     (said,) = told.follow(replace(RUNNING, tried_label="wave"))
     assert said["name"] == "wave"
 
@@ -108,7 +108,7 @@ def test_alarm_about_node_has_no_topic(told):
     assert told.said[0][1]["topic"] == ""
 
 
-def test_only_ongoing_events_are_repeated(told):
+def test_only_ongoing_events_are_resent_to_the_flight_recorder(told):
     told.events.on_alarm(event("on", "/a"))
     told.events.on_alarm(event("on", "/b"))
     told.events.update_run(RUNNING)

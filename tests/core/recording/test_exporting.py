@@ -63,7 +63,7 @@ def test_canceled_export_leaves_no_partial_file(tmp_path, monkeypatch):
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_recording_without_images_has_no_thumbnail(tmp_path):
+def test_recording_without_images_and_unreadable_file_have_no_thumbnail(tmp_path):
     record(tmp_path / "a.mcap", [[json_message(1, topic="/odom")]])
     assert read_picture(tmp_path / "a.mcap", (128, 96), LocalOpener()) is None
     assert read_picture(tmp_path / "gone.mcap", (128, 96), LocalOpener()) is None

@@ -70,7 +70,7 @@ def test_active_recording_is_not_opened_and_files_are_read_incrementally(folder,
     assert (len(found.files), found.omitted_count) == (2, 1)
 
 
-def test_missing_folder_is_reported(tmp_path):
+def test_missing_recordings_folder_is_reported(tmp_path):
     folder = RecordingFolder(tmp_path / "nowhere")
     assert "no such file" in look(folder).problem or look(folder).problem
     folder.close()

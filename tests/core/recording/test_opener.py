@@ -67,7 +67,7 @@ def test_file_too_expensive_to_read_is_listed_as_not_scanned(path: Path) -> None
 
 
 @pytest.mark.parametrize("opened", [0, 1])
-def test_dead_reader_is_an_alert_and_window_continues(tmp_path: Path, path: Path, opened: int) -> None:
+def test_dead_reader_process_is_an_alert_and_ends_the_replay(tmp_path: Path, path: Path, opened: int) -> None:
     alerts, opener = Alerts(), Failing(RecordingError(str(path), "the process has ended"), opened)
     replay = Replay(path, Settings(tmp_path / "home"), alerts, opener=opener)
     replay.start()

@@ -94,7 +94,7 @@ def test_new_recording_includes_ongoing_events(made):
     assert said() == [("/camera", "recording"), ("/camera", "ring")]
 
 
-def test_one_time_choice_is_not_saved(made):
+def test_one_time_recording_choice_is_not_saved(made):
     only = RecordingChoice("chosen", ("/odom",))
     assert made.recordings.record(choice=only) == ""
     assert made.recordings.recorded == only

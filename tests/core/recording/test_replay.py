@@ -196,7 +196,7 @@ def test_loop_start_and_end_are_set_at_the_playhead(shown, whole):
 @pytest.mark.parametrize(
     ("asked", "given"), [(0.0, 0.1), (-1.0, 0.1), (1e9, 10.0), (float("nan"), 1.0), (2.5, 2.5)]
 )
-def test_unsupported_speed_becomes_the_nearest(shown, asked, given):
+def test_replay_speed_is_clamped_to_its_range(shown, asked, given):
     shown.replay.set_speed(asked)
     shown.tick()
     assert shown.replay.player.speed == given

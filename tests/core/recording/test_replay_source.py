@@ -283,7 +283,7 @@ def test_truncated_recording_is_played_without_modifying_it(tmp_path, path, whol
 
 
 @pytest.mark.parametrize("content", [b"", b"no recording", bytes(5000)])
-def test_invalid_recording_raises(tmp_path, content):
+def test_opening_an_invalid_recording_raises_and_creates_no_file(tmp_path, content):
     path = tmp_path / "broken.mcap"
     path.write_bytes(content)
     source = ReplaySource(path, Pictures(), clock=Clock())
@@ -292,7 +292,7 @@ def test_invalid_recording_raises(tmp_path, content):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_empty_recording_raises(tmp_path):
+def test_opening_an_empty_recording_raises(tmp_path):
     path = tmp_path / "empty.mcap"
     record(path, [])
     source = ReplaySource(path, Pictures(), clock=Clock())

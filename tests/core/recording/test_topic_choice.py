@@ -53,7 +53,7 @@ def test_invalid_recording_choice_returns_the_reason():
     [None, 3, "x", [], {}, {"mode": 7, "topics": "abc"}, {"mode": "some", "patterns": [1, None]},
      {"ends_min": 0, "ends_gb": float("nan")}, {"ends_min": "30", "ends_gb": -1}, {"ends_min": True}],
 )  # fmt: skip
-def test_any_recording_settings_are_readable(told):
+def test_invalid_recording_choice_settings_become_defaults(told):
     assert parse_choice(told) == RecordingChoice()
 
 
@@ -76,7 +76,7 @@ def test_recording_choice_and_flight_recorder_settings_round_trip():
         ((0.1, None), (10.0, 100.0, 10.0), (10.0, 100.0)),  # it is about to end
     ],
 )
-def test_final_recording_size_is_estimated(ends, so_far, end):
+def test_final_recording_duration_and_size_are_estimated(ends, so_far, end):
     assert RecordingChoice("all", max_minutes=ends[0], max_gb=ends[1]).expected_end(*so_far) == end
 
 

@@ -63,7 +63,7 @@ def test_crashed_program_process_is_reported_with_its_location(crashes, master) 
 @pytest.mark.parametrize(
     "code", ["raise SystemExit('no room left')", "import os, signal; os.kill(os.getpid(), 15)"]
 )
-def test_other_program_exit_is_not_a_crash(crashes, code: str) -> None:
+def test_program_exit_by_system_exit_or_sigterm_is_not_a_crash(crashes, code: str) -> None:
     heard = Heard()
     runner = Runner(heard, command=(sys.executable, "-c", code))
     runner.start(waits(), [], None)

@@ -22,13 +22,13 @@ from app.core.reports.crash import exit_text, fatal_line, is_crash, split_trace
     ],
 )
 @pytest.mark.skipif(sys.platform == "win32", reason="its signals have other numbers")
-def test_crash_exit_codes(code: int, words: str) -> None:
+def test_crash_exit_codes_are_recognised_and_described(code: int, words: str) -> None:
     assert is_crash(code)
     assert exit_text(code) == words
 
 
 @pytest.mark.parametrize("code", [0, 1, 2, 3, 255, -signal.SIGINT, -signal.SIGTERM, 0xC000013A])
-def test_exit_codes_that_are_not_a_crash(code: int) -> None:
+def test_normal_exit_codes_and_termination_signals_are_not_a_crash(code: int) -> None:
     assert not is_crash(code)
 
 

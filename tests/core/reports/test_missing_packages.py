@@ -48,7 +48,7 @@ def test_all_missing_packages_are_named() -> None:
     assert "(PySide6 and platformdirs)" in words
 
 
-def test_other_import_errors_are_not_explained() -> None:
+def test_import_errors_not_caused_by_missing_packages_are_not_explained() -> None:
     assert import_problem(ModuleNotFoundError("No module named 'app.odd'", name="app.odd")) == ""
     assert import_problem(ImportError("cannot import name 'x'", name="PySide6")) == ""
 

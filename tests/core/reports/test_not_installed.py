@@ -37,7 +37,7 @@ def found(*names: str, release=dict, also: str = "") -> MissingLibraries | None:
     return missing_libraries(error, lacking(*names, also=also), release)
 
 
-def test_other_import_errors_are_not_missing_libraries() -> None:
+def test_import_error_of_a_missing_name_is_not_a_missing_library() -> None:
     assert missing_libraries(ImportError("cannot import name 'x'"), lacking("libnss3.so"), dict) is None
 
 

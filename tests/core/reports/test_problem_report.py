@@ -53,7 +53,7 @@ def opened(data: bytes) -> dict[str, str]:
         return {name: archive.read(name).decode("utf-8") for name in archive.namelist()}
 
 
-def test_report_contains_description_doctor_findings_logs_and_settings(parts: ReportParts) -> None:
+def test_report_contains_description_versions_settings_findings_logs_and_crash_reports(parts: ReportParts) -> None:
     parts.crashes.add(Crash("robot", "by signal 11", "where it was"))
     found = opened(create_report(parts, "  It stood still.\nThen it fell. ñ "))
     assert found["what-happened.txt"] == "It stood still.\nThen it fell. ñ"
@@ -119,7 +119,7 @@ def test_report_file_name_has_the_date() -> None:
     }
 
 
-def test_report_is_written_atomically(parts: ReportParts, tmp_path: Path) -> None:
+def test_written_report_is_complete_and_leaves_no_temporary_file(parts: ReportParts, tmp_path: Path) -> None:
     writer = ReportWriter(tmp_path / "report.zip", lambda: create_report(parts, "words"))
     assert writer.wait(60)
     assert writer.problem == ""

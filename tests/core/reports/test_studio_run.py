@@ -98,7 +98,7 @@ def test_expected_exit_is_reported_only_if_it_crashed(place: Place) -> None:
     assert len(place.run().left()) == 1
 
 
-def test_running_window_is_not_a_crash(place: Place) -> None:
+def test_running_studio_is_not_reported_as_crash_until_it_is_killed(place: Place) -> None:
     own = place.run()
     own.start()
     with place.process("sys.stdin.read()") as other:

@@ -41,7 +41,7 @@ def test_versions_without_history_are_listed_as_earlier() -> None:
     assert add_this_version({SETTING_KEY: kept}, 1_800_000_000.0, is_first=False, version="0.1.0") is None
 
 
-def test_only_newest_versions_are_kept() -> None:
+def test_only_newest_entries_of_the_version_history_are_kept() -> None:
     values: dict[str, object] = {}
     for number in range(MAX_VERSIONS + 5):
         values[SETTING_KEY] = add_this_version(values, float(number), is_first=True, version=f"1.{number}")

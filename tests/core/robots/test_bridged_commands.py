@@ -37,7 +37,7 @@ def test_robot_commanded_by_a_bridge_is_reported_once_per_graph_with_new_command
     assert reported == [(("Arm",), "bridge")] * 2
 
 
-def test_commands_of_other_programs_are_not_reported() -> None:
+def test_commands_of_programs_other_than_bridges_are_not_reported() -> None:
     reported: list[str] = []
     commands = BridgedCommands(lambda _names, by: reported.append(by))
     commands.update(view(bridge=0, script=5), [ROBOT])

@@ -160,7 +160,7 @@ def _subscribers(session: Session, topic: str) -> int:
     return len(info.subscribers) if info is not None else 0
 
 
-def test_stop_reaches_robot_despite_a_second_description(
+def test_stop_reaches_robot_despite_a_description_by_another_program(
     session: Session, pepper: WireRobot, evil: nep.Node
 ) -> None:
     the_link(session)

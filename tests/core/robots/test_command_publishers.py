@@ -10,7 +10,7 @@ from app.core.robots.command_publishers import CommandPublishers
 
 
 @pytest.mark.parametrize("name", ["Pepper", "{0}", "a {error} b", "}{"])
-def test_failed_publisher_is_reported_with_robot_and_reason(name: str) -> None:
+def test_failure_to_open_or_close_a_publisher_is_reported_with_robot_and_reason(name: str) -> None:
     reports: list[str] = []
     publishers = CommandPublishers(lambda what, _job: reports.append(what))
     link = SimpleNamespace(

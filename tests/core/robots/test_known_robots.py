@@ -48,7 +48,7 @@ def test_removed_known_robot_is_added_again_when_it_returns(settings) -> None:
     assert {one.name for one in known.robots} == {"NAO", "Rover"}
 
 
-def test_invalid_entries_are_ignored(settings) -> None:
+def test_invalid_entries_of_known_robots_are_ignored(settings) -> None:
     settings.set(
         SETTING_KEY,
         ["NAO", {"name": 3, "seen_s": 1}, {"name": "A", "seen_s": True}, {"name": "B", "seen_s": 2}],

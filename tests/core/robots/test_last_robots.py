@@ -61,7 +61,7 @@ def test_robots_are_not_restored_when_disabled(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "kept", [None, [], {"": "pepper"}, {"Pepper": "toaster"}, {"Pepper": 3}, {"Pepper": ["pepper"]}]
 )
-def test_damaged_settings_start_no_robot(tmp_path: Path, kept: object) -> None:
+def test_damaged_list_of_last_robots_starts_no_robot(tmp_path: Path, kept: object) -> None:
     Settings(tmp_path).set(KEPT, kept)
     assert next_start(tmp_path) == {}
 

@@ -141,7 +141,7 @@ def test_second_program_with_a_confirmed_stop_is_not_recorded_as_new(ledger: Led
     assert "Pepper" not in ledger
 
 
-def test_user_confirmation_includes_newly_appeared_programs(ledger: Ledger) -> None:
+def test_user_confirmation_clears_the_recently_commanded_robots(ledger: Ledger) -> None:
     ledger.record_command(["Pepper"], "key")
     ledger.confirm(["Pepper"])
     assert ledger.recently_commanded == ()

@@ -99,7 +99,7 @@ def strangers() -> Strangers:
     return Strangers()
 
 
-def test_fake_robots_are_evicted_and_their_resources_closed(
+def test_disconnected_robots_beyond_the_limit_are_evicted_and_their_resources_closed(
     strangers: Strangers,
 ) -> None:
     strangers.pass_by(1000)
@@ -111,7 +111,7 @@ def test_fake_robots_are_evicted_and_their_resources_closed(
     assert len(strangers.fleet.links) == MAX_DISCONNECTED
 
 
-def test_publishers_still_being_opened_are_closed(strangers: Strangers) -> None:
+def test_publishers_still_opening_for_evicted_robots_are_closed(strangers: Strangers) -> None:
     strangers.pass_by(400, runs_jobs=False)
     assert strangers.open_publishers == sorted(topic_of(name, "command") for name in strangers.names)
 

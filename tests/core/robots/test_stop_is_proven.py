@@ -109,7 +109,7 @@ def test_two_robots_of_the_same_name_must_both_reply(master, stopper, pepper) ->
         twin.close()
 
 
-def test_other_subscriber_of_the_commands_is_named(master, stopper) -> None:
+def test_additional_subscriber_of_robot_commands_is_named_in_the_stop_report(master, stopper) -> None:
     with nep.node("motor box", master=master.address) as node:
         node.new_sub("/Pepper/command", "robot/command")
         stopper.update_graph(stopper._node.graph())
@@ -119,7 +119,7 @@ def test_other_subscriber_of_the_commands_is_named(master, stopper) -> None:
     assert [robot.message for robot in report.robots][1:] == [said]
 
 
-def test_many_other_subscribers_are_summarized_in_one_line(master, stopper) -> None:
+def test_many_additional_subscribers_of_robot_commands_are_summarized_in_one_line(master, stopper) -> None:
     nodes = [nep.node(f"listener {number}", master=master.address) for number in range(6)]
     for node in nodes:
         node.new_sub("/Pepper/command", "robot/command")

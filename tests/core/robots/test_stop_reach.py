@@ -119,7 +119,7 @@ def test_robots_unknown_to_a_new_master_stay_connected_during_discovery(session:
         assert not session.fleet.connected
 
 
-def test_session_close_ends_the_program_at_once(session: Session) -> None:
+def test_session_close_ends_the_program(session: Session) -> None:
     with nep.node("lamps") as node, used_by_a_program(session, node):
         runner = session.runs._runner
         assert runner is not None

@@ -142,7 +142,7 @@ def test_run_with_a_problem_shows_reason_until_fixed(session: Session) -> None:
     until(lambda: title_at_next_tick(session) == "Ready")
 
 
-def test_view_is_cached_per_tick_and_updated_after_actions(session: Session) -> None:
+def test_run_view_is_cached_per_tick_and_updated_after_actions(session: Session) -> None:
     runs = session.runs
     before = runs.view()
     assert runs.view() is before

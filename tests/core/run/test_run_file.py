@@ -146,7 +146,7 @@ def test_robot_without_description_in_the_file_is_awaited(master, saved):
     assert "Pepper not found" in out
 
 
-def test_file_with_errors_or_without_start_block_is_rejected(master, saved, tmp_path):
+def test_file_that_cannot_be_run_and_missing_master_are_reported_as_unusable(master, saved, tmp_path):
     code, out = run(saved(workspace(started(block("control_wait")))))
     assert (code, "error: wait needs a number." in out) == (UNUSABLE, True)
     assert run(saved(workspace()))[0] == UNUSABLE
@@ -230,7 +230,7 @@ def test_virtual_robot_starts_at_its_start_position_or_keeps_its_current_one(mas
         until(lambda: x() == first)
 
 
-def test_second_program_with_robot_name_is_reported_and_changes_nothing(master, pepper, saved):
+def test_second_program_with_robot_name_is_reported_and_receives_no_commands(master, pepper, saved):
     with nep.node("evil", master=master.address) as evil:
         described = dict(robot().source)
         announcement = evil.new_pub("/Pepper/description", "robot/description", latched=True)
@@ -317,7 +317,7 @@ def test_examples_run_on_the_virtual_robot():
 
 
 @pytest.mark.timeout(240)
-def test_generated_program_runs_as_a_file(master, pepper, tmp_path):
+def test_generated_program_runs_as_a_python_file(master, pepper, tmp_path):
     from app.blocks import compile_behaviour
 
     saved = workspace(started(say("Hi"), write(text("done"))))
@@ -369,7 +369,7 @@ def test_control_characters_in_output_are_escaped(pepper, saved):
 
 
 @pytest.mark.parametrize("page", ["cp437", "ascii"])
-def test_output_works_in_every_encoding(master, saved, page):
+def test_characters_missing_in_the_output_encoding_are_replaced(master, saved, page):
     path = saved(workspace(started(write(text("\u2013 “😀”")))))
     done = subprocess.run(
         [sys.executable, "-m", "app", "run", str(path)],
@@ -411,7 +411,7 @@ run("greeting")
 """
 
 
-def test_program_file_writes_to_ascii_pipe(master, tmp_path):
+def test_character_missing_in_ascii_output_of_a_program_file_is_replaced(master, tmp_path):
     file = tmp_path / "greeting.py"
     file.write_text(PROGRAM, encoding="utf-8")
     done = subprocess.run(

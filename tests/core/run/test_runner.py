@@ -274,7 +274,7 @@ def test_child_ignores_ctrl_c_of_the_terminal(runner, heard, master):
     assert heard.until("ended").is_ok
 
 
-def test_invalid_events_are_skipped(runner, heard):
+def test_invalid_events_of_the_program_are_skipped_and_their_size_is_reported(runner, heard):
     made = runner(TALKS)
     made.start(program(), [], None)
     assert heard.until("ended").elapsed_s == 1.5

@@ -36,7 +36,7 @@ def stopper(master, robots):
         made.close()
 
 
-def test_all_robots_reply_to_stop(stopper, robots):
+def test_stop_is_confirmed_when_all_robots_reply(stopper, robots):
     answered: list[RobotStop] = []
     report = stopper.stop_all(timeout_s=LONG_S, on_answer=answered.append)
     assert report.is_confirmed
@@ -47,7 +47,7 @@ def test_all_robots_reply_to_stop(stopper, robots):
     assert [len(robot.heard("stop")) for robot in robots] == [1, 1]
 
 
-def test_silent_robot_is_named(stopper, robots):
+def test_robot_that_does_not_reply_to_stop_is_named(stopper, robots):
     robots[1].silent = {"stop"}
     answered: list[RobotStop] = []
     report = stopper.stop_all(timeout_s=SILENT_S, on_answer=answered.append)

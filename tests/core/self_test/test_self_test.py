@@ -58,7 +58,7 @@ def told(folder: Path) -> dict:
     return json.loads((folder / "report.json").read_text("utf-8"))
 
 
-def test_report_is_valid_at_any_moment(tmp_path: Path) -> None:
+def test_self_test_report_is_readable_during_and_after_its_steps(tmp_path: Path) -> None:
     path = tmp_path / "report.json"
     report = Report(path, {"web": True})
     report.start_step("window", "the window", 5.0)
@@ -92,7 +92,7 @@ def test_first_failure_is_the_reported_reason(tmp_path: Path) -> None:
     assert (whole["steps"][0]["ok"], whole["steps"][0]["said"]) == (False, "The robot doesn't exist.")
 
 
-def test_unwritable_report_is_a_failure(tmp_path: Path) -> None:
+def test_unwritable_self_test_report_is_a_failure(tmp_path: Path) -> None:
     folder = tmp_path / "gone"
     folder.mkdir()
     report = Report(folder / "report.json", {})

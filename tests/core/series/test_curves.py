@@ -97,7 +97,7 @@ def test_lost_messages_are_a_gap_and_counted(how) -> None:
 @pytest.mark.parametrize(
     "missing", [b"{", {"y": 1}, {"x": None}, {"x": [1]}, b'{"x": NaN}', {"x": {"deep": 1}}]
 )
-def test_message_without_the_number_is_a_gap(missing) -> None:
+def test_message_without_the_plotted_number_is_a_gap(missing) -> None:
     case = Case()
     x = case.curve("/a.x")
     case.send("/a", (0.0, {"x": 1}), (0.1, missing), (0.2, {"x": 3}))
@@ -140,7 +140,7 @@ def test_losses_after_message_with_invalid_time_are_counted() -> None:
     assert (case.curves.lost, case.curves.unread_count) == (2 + 3, 1)
 
 
-def test_value_can_change_its_type() -> None:
+def test_plotted_value_can_change_between_number_and_state() -> None:
     case = Case()
     x = case.curve("/a.x")
     case.send(
@@ -264,7 +264,7 @@ def batch_wise(
 
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=60), st.lists(st.integers(0, 60), max_size=6))
-def test_batch_boundaries_do_not_change_results(values, cuts) -> None:
+def test_batch_boundaries_do_not_change_calculated_curves(values, cuts) -> None:
     cuts = sorted(min(each, len(values)) for each in cuts)
     batch_wise(lambda v: list(np.diff(v)), "difference(/a.x)", values, cuts)
     batch_wise(
@@ -382,7 +382,7 @@ def test_csv_has_a_row_per_time_and_escapes_formulas() -> None:
 
 
 @pytest.mark.parametrize("rows_at_once", [1, 3, 5000])
-def test_csv_written_in_parts_is_identical(monkeypatch, rows_at_once) -> None:
+def test_csv_written_in_parts_equals_csv_written_at_once(monkeypatch, rows_at_once) -> None:
     case = Case()
     made = [case.curve(text) for text in ("/a.x", "/a.word", "/b.y")]
     case.send("/a", *((n / 10, {"x": n, "word": "up" if n % 4 < 2 else "down"}) for n in range(20)))

@@ -45,7 +45,7 @@ MESSAGE = {
         ("joints.position", MISSING),
     ],
 )
-def test_path_finds_its_value(text, value) -> None:
+def test_field_path_returns_its_value_or_missing(text, value) -> None:
     path = FieldPath.parse(text)
     assert path.value_in(MESSAGE) == value
     assert str(path) == text
@@ -54,7 +54,7 @@ def test_path_finds_its_value(text, value) -> None:
 @pytest.mark.parametrize(
     "text", ["", ".", "a..b", "a.", "a[", "a[x]", "a]b", "a b", "a[0]b", 'a["b]', "a" * 500, "[[0]]"]
 )
-def test_invalid_path_is_rejected(text) -> None:
+def test_invalid_field_path_is_rejected(text) -> None:
     with pytest.raises(CurveError):
         FieldPath.parse(text)
 
@@ -67,7 +67,7 @@ def test_invalid_path_is_rejected(text) -> None:
         max_size=8,
     )
 )
-def test_path_text_round_trips(steps) -> None:
+def test_field_path_text_round_trips(steps) -> None:
     path = FieldPath(tuple(steps))
     assert FieldPath.parse(str(path)) == path
 
@@ -117,7 +117,7 @@ def test_non_text_keys_are_not_suggested() -> None:
     assert list(fields_of({1: 2, b"x": 3, None: 4})) == []
 
 
-def test_suggested_fields_of_a_message() -> None:
+def test_fields_of_a_message_are_suggested_with_their_kind() -> None:
     offered = {str(each.path): each.kind for each in fields_of(MESSAGE)}
     assert offered["pose.x[*]"] == "list"
     assert offered["joints[0].position"] == "number"

@@ -31,7 +31,7 @@ def value(text: str, *numbers: float) -> float:
         ("  /a.b ", "/a", "b"),
     ],
 )
-def test_field_is_parsed(text, topic, path) -> None:
+def test_topic_and_field_path_are_parsed_from_text(text, topic, path) -> None:
     found = parse(text, TOPICS)
     assert isinstance(found, FieldSource)
     assert (found.topic, str(found.path)) == (topic, path)
@@ -116,7 +116,7 @@ def test_invalid_formula_is_rejected_with_reason(text, said) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(st.text(alphabet="/odomax.[]*(),+-^%0123456789 s_'\"=:lambdaimport\n\\", max_size=60))
-def test_any_text_is_parsed_or_rejected(text) -> None:
+def test_any_formula_text_is_parsed_or_rejected(text) -> None:
     try:
         source = parse(text, TOPICS)
     except CurveError:

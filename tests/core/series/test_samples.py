@@ -63,7 +63,7 @@ batches = st.lists(st.lists(st.tuples(steps, numbers, st.booleans()), max_size=1
 
 @settings(max_examples=30, deadline=None)
 @given(batches)
-def test_batches_in_any_order_equal_single_insertion(given_batches) -> None:
+def test_batches_at_any_times_stay_sorted_and_every_sample_is_kept_or_counted(given_batches) -> None:
     samples, time_s = Samples(), 10.0
     wanted: list[float] = []
     for batch in given_batches:
@@ -105,7 +105,7 @@ def test_slightly_late_sample_is_inserted_in_order() -> None:
     assert samples.earliest_change_s(0) == 2.5
 
 
-def test_clock_set_back_restarts_from_that_time() -> None:
+def test_clock_set_back_discards_the_samples_after_that_time() -> None:
     samples = filled([(float(n), n, False) for n in range(100)])
     samples.add(50.5, 7.0)
     assert len(samples) == 52
@@ -113,7 +113,7 @@ def test_clock_set_back_restarts_from_that_time() -> None:
     assert samples.undone == 49
 
 
-def test_future_time_stamp_is_removed_by_next_valid_one() -> None:
+def test_sample_with_future_time_stamp_is_removed_by_the_next_valid_sample() -> None:
     samples = filled([(1.0, 1, False), (1e10, 2, False), (2.0, 3, False)])
     assert [row[:2] for row in rows_of(samples)] == [(1.0, 1.0), (2.0, 3.0)]
 
@@ -219,7 +219,7 @@ def test_memory_is_released_when_the_limit_is_lowered() -> None:
     assert samples.begun + len(samples) == 400_001
 
 
-def test_columns_are_stable_while_the_plot_scrolls() -> None:
+def test_drawn_points_are_stable_while_the_plot_scrolls() -> None:
     samples = Samples()
     times = np.arange(0, 100, 0.001)
     samples.extend(times, np.sin(times * 300), np.zeros(len(times), dtype=bool))

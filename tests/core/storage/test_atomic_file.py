@@ -62,7 +62,7 @@ def test_streamed_write_is_complete_or_absent(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["a.csv"]
 
 
-def test_failed_write_keeps_the_old_file_and_leaves_no_temporary_file(tmp_path: Path) -> None:
+def test_failed_write_over_a_folder_keeps_its_content_and_leaves_no_temporary_file(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.mkdir()
     (path / "inside").write_text("kept")
@@ -259,7 +259,7 @@ def test_file_that_stays_in_use_is_reported(tmp_path: Path) -> None:
     assert 0 < sum(waited) <= 1
 
 
-def test_other_permission_errors_are_not_retried(tmp_path: Path) -> None:
+def test_permission_error_of_a_file_not_in_use_is_not_retried(tmp_path: Path) -> None:
     def replace(new: Path, old: Path) -> None:
         raise PermissionError(13, "read only")
 

@@ -31,7 +31,7 @@ def test_invalid_json_raises_value_error_and_excessive_depth_raises_recursion_er
         deep_json.loads("[" * 100_000)
 
 
-def test_recursion_limit_and_thread_stack_size_are_restored() -> None:
+def test_recursion_limit_and_stack_size_are_restored_after_encoding_deep_json() -> None:
     limit, size = sys.getrecursionlimit(), threading.stack_size()
     deep_json.dumps(stack(2000))
     assert (sys.getrecursionlimit(), threading.stack_size()) == (limit, size)

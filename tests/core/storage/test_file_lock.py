@@ -42,7 +42,7 @@ def holder(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     process.communicate()
 
 
-def test_lock_is_exclusive_and_released_afterwards(tmp_path: Path) -> None:
+def test_lock_is_released_after_use_and_can_be_acquired_again(tmp_path: Path) -> None:
     for _ in range(2):
         with locked(tmp_path / "file") as held:
             assert held

@@ -10,7 +10,7 @@ from app.core.storage.settings import MAX_RECENT_FILES, Settings, home, saved_la
 from app.errors import SettingsError
 
 
-def test_value_persists_after_a_restart(tmp_path: Path) -> None:
+def test_setting_persists_after_a_restart(tmp_path: Path) -> None:
     Settings(tmp_path).set("theme", "dark")
     assert Settings(tmp_path).get("theme", "light") == "dark"
 
@@ -33,7 +33,7 @@ def test_value_of_wrong_type_falls_back_to_the_default(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", [b"", b"{", b"[1]", b"\xff\xfe", b'{"theme": "da'])
-def test_damaged_file_is_backed_up(tmp_path: Path, damage: bytes) -> None:
+def test_damaged_settings_file_is_backed_up(tmp_path: Path, damage: bytes) -> None:
     (tmp_path / "settings.json").write_bytes(damage)
     settings = Settings(tmp_path)
     assert settings.get("theme", "light") == "light"
@@ -90,7 +90,7 @@ def test_recent_files_are_newest_first_without_duplicates_or_missing_files(tmp_p
     assert len({item.path for item in recent}) == len(recent) <= MAX_RECENT_FILES
 
 
-def test_unwritable_folder_raises_settings_error(tmp_path: Path) -> None:
+def test_unwritable_settings_folder_raises_settings_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder")
     with pytest.raises(SettingsError, match="can't save settings"):
         Settings(tmp_path / "file").set("theme", "dark")

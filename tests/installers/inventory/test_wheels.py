@@ -57,7 +57,7 @@ def test_components_compiled_into_a_wheel_are_listed_with_their_licence(wheel: s
 @pytest.mark.parametrize(
     ("wheel", "name"), [("pynng", "nng"), ("pynng", "mbedtls"), ("pyzmq", "libzmq"), ("numpy", "openblas")]
 )
-def test_component_versions_match_the_installed_wheel(wheel: str, name: str) -> None:
+def test_components_compiled_into_a_wheel_have_a_version_number(wheel: str, name: str) -> None:
     assert re.fullmatch(r"\d+\.\d+(\.\d+)+", parts_of_wheel(wheel)[name].version)
 
 
@@ -86,7 +86,7 @@ def test_licence_text_is_found_in_old_and_new_wheels_and_the_topmost_wins(
         wheels._file(found, "COPYING")
 
 
-def test_system_and_editor_packages_are_not_treated_as_wheels() -> None:
+def test_system_package_is_not_treated_as_a_wheel() -> None:
     assert list(parts_in_wheels([Part("libssl3", "3", "Apache-2.0", (), "deb/debian")])) == []
 
 

@@ -49,7 +49,7 @@ def test_missing_hdiutil_is_reported(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not TOOLS, reason="needs xorriso and p7zip")
-def test_image_contains_the_application_with_its_links_and_the_window(tmp_path: Path) -> None:
+def test_image_contains_the_application_with_its_symlinks_and_the_finder_layout(tmp_path: Path) -> None:
     store = pytest.importorskip("ds_store").DSStore
     app = made_up_app(tmp_path)
     icon, ground = put(tmp_path / "nep-studio.icns", ICON), put(tmp_path / "background.png", b"picture")

@@ -91,7 +91,7 @@ def test_application_is_in_the_foreground_and_supports_high_resolution() -> None
 
 
 @pytest.mark.parametrize(("machine", "oldest"), [("arm64", "13.0"), ("x86_64", "13.0")])
-def test_minimum_macos_version_depends_on_the_processor(machine: str, oldest: str) -> None:
+def test_minimum_macos_version_is_declared_for_each_processor(machine: str, oldest: str) -> None:
     assert information(__version__, machine)["LSMinimumSystemVersion"] == oldest
 
 

@@ -67,7 +67,7 @@ def test_video_libraries_are_removed_and_image_libraries_kept(tmp_path: Path) ->
     assert check(app, VERSION, "arm64") == []
 
 
-def test_application_without_video_libraries_is_unchanged(tmp_path: Path) -> None:
+def test_application_without_video_libraries_saves_no_space(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
     put(app / CV2 / "cv2.abi3.so", header())
     assert leave_out_films(context(tmp_path), app) == 0

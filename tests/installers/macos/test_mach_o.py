@@ -36,7 +36,7 @@ def test_universal_library_is_recognised(tmp_path: Path) -> None:
         fat(header())[:4100],
     ],
 )
-def test_other_files_are_not_recognised(tmp_path: Path, content: bytes) -> None:
+def test_non_mach_o_and_truncated_files_are_not_recognised(tmp_path: Path, content: bytes) -> None:
     assert read(put(tmp_path / "a", content)) == ()
 
 

@@ -104,7 +104,7 @@ def test_invalid_frames_are_counted_and_named_and_valid_ones_between_arrive(gate
 
 @quick
 @given(filters=st.lists(st.binary(max_size=80), min_size=1, max_size=8))
-def test_malformed_subscription_filters_do_not_affect_others(gateway, original, native, filters):
+def test_malformed_subscription_filters_do_not_affect_other_subscribers(gateway, original, native, filters):
     port = original.ask("t", "subscriber")["port"]
     with original.socket(zmq.XSUB) as odd, original.subscriber(port + 1, b"t") as subscriber:
         odd.connect(f"tcp://127.0.0.1:{port + 1}")

@@ -18,7 +18,7 @@ def is_open(port: int) -> bool:
         return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
-def test_second_node_of_the_same_name_does_not_affect_others(gateway, original, native):
+def test_second_node_of_the_same_name_is_listed_next_to_the_first(gateway, original, native):
     original.ask("t", node="twin", pid=os.getpid())
     assert original.ask("t", node="twin", pid=os.getppid())["state"] == "success"
     native.wait(lambda: len(native.programs) == 2)
@@ -50,7 +50,7 @@ def test_restarted_gateway_serves_programs_without_a_new_request(gateway_at, ori
         assert original.ask("t", "subscriber")["port"] == port
 
 
-def test_non_zeromq_connection_does_not_affect_others(gateway, original, native):
+def test_http_request_to_gateway_ports_does_not_affect_connected_programs(gateway, original, native):
     port = original.ask("t", "subscriber")["port"]
     with original.subscriber(port + 1, b"t") as subscriber, original.publisher(port) as publisher:
         original.publish_until(publisher, b't {"n":1}', lambda: subscriber.poll(0))

@@ -99,7 +99,7 @@ def test_action_that_raises_does_not_block_the_next_one() -> None:
     assert [deed.text for deed in scene.alarms.history.records[0].action_results] == ["no arm", "answered"]
 
 
-def test_snoozed_alarm_runs_no_action_but_is_recorded_in_the_history() -> None:
+def test_snoozed_alarm_is_recorded_and_runs_its_actions_once_the_snooze_ends() -> None:
     hands = Hands()
     scene = scene_with(AlarmAction("banner"), hands=hands, snoozed_until_s=MIDNIGHT_S + 110)
     near(scene)

@@ -436,7 +436,7 @@ def test_node_joins_only_its_own_domain(make: Make) -> None:
     assert {each.name for each in here.graph().nodes.values()} == {"here"}
 
 
-def test_invalid_fields_are_named(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+def test_invalid_payload_field_is_named_in_log_error_and_alert(make: Make, caplog: pytest.LogCaptureFixture) -> None:
     node = make("a")
     pub = node.new_pub("t", "geometry_msgs/Twist")
     sub = make("b").new_sub("t", "geometry_msgs/Twist")
@@ -565,7 +565,7 @@ def test_node_closed_while_other_threads_open_endpoints_raises_closed_error(make
         assert ended == [node] * 3
 
 
-def test_close_in_any_order_and_twice(make: Make) -> None:
+def test_nodes_publishers_and_subscribers_close_in_any_order_and_twice(make: Make) -> None:
     first, second = make("a"), make("b")
     pub, sub = first.new_pub("t"), second.new_sub("t")
     first.close()

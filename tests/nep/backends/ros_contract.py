@@ -48,7 +48,7 @@ for _name in (
     "test_spin_ends_at_its_timeout_and_on_stop_spin",
     "test_sink_receives_batches_in_a_thread_of_the_node",
     "test_sink_that_raises_receives_the_next_batch",
-    "test_undecodable_messages_are_skipped_by_listen_and_raise_an_alert",
+    "test_undecodable_message_raises_on_payload_access_and_is_skipped_by_listen",
     "test_full_inbox_drops_the_oldest_and_counts",
     "test_full_callback_inbox_drops_the_oldest_and_counts",
     "test_mutable_payloads_are_copied_on_publish",
@@ -67,7 +67,7 @@ for _name in (
     "test_timers_and_other_coroutines_run_during_an_async_spin",
     "test_callbacks_added_and_stop_requested_from_other_threads_wake_an_async_spin",
     "test_exception_in_a_callback_propagates_from_async_spin",
-    "test_cancelled_async_spin_releases_all_resources",
+    "test_cancelled_async_spin_releases_its_watchers_and_loses_no_message",
     "test_two_loops_in_two_threads_share_a_subscriber",
 ):
     globals()[_name] = getattr(contract_async, _name)

@@ -22,7 +22,7 @@ pytestmark = [  # rospy's own ways
 ]
 LEFT_OUT = {
     "test_cancelled_awaited_call_discards_its_reply",
-    "test_slow_server_raises_service_timeout_and_its_late_reply_is_dropped",
+    "test_slow_server_raises_service_timeout_and_its_late_reply_is_discarded",
     "test_closing_server_finishes_its_running_call",
     "test_second_server_raises_an_alert_and_takes_over",
     "test_services_are_listed_in_the_graph_apart_from_topics",

@@ -194,7 +194,7 @@ def test_large_and_annotated_messages_keep_their_order_among_batches(node: nep.N
     assert sub.lost == 0
 
 
-def test_subscriber_that_joins_during_a_burst_counts_correctly(node: nep.Node) -> None:
+def test_subscriber_that_joins_during_a_burst_counts_no_loss(node: nep.Node) -> None:
     pub, sub = node.new_pub("t"), node.new_sub("t")
     burst(pub, 50)
     late = node.new_sub("t")
@@ -309,7 +309,7 @@ def test_batch_round_trips(messages: list[tuple[int, bytes]], seq: int) -> None:
 
 
 @given(st.binary(max_size=200))
-def test_invalid_batch_is_rejected_with_a_reason(body: bytes) -> None:
+def test_any_batch_bytes_are_parsed_or_rejected_with_a_reason(body: bytes) -> None:
     try:
         read = parse_entries(body)
     except WireError as error:

@@ -116,7 +116,7 @@ def test_busy_sink_does_not_grow_the_memory_of_its_program(publisher: nep.Publis
         assert rss(busy.process.pid) - before < MAX_COUNT
 
 
-def test_stopped_subscriber_does_not_affect_others(publisher: nep.Publisher, master: Master) -> None:
+def test_stopped_subscriber_does_not_affect_other_subscribers(publisher: nep.Publisher, master: Master) -> None:
     with (
         running(SUBSCRIBER, master.address, "idle") as stopped,
         running(SUBSCRIBER, master.address, "quick") as quick,
@@ -152,7 +152,7 @@ def test_burst_of_thirty_images_is_not_lost_with_a_late_reader(
         assert late.line() == "31 0"
 
 
-def test_subscriber_without_hello_that_reads_nothing_does_not_affect_others(
+def test_subscriber_without_hello_that_reads_nothing_does_not_affect_other_subscribers(
     node: nep.Node, publisher: nep.Publisher, master: Master
 ) -> None:
     """This subscriber can't acknowledge; the publisher counts what libzmq holds for it."""

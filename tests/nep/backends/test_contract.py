@@ -486,7 +486,7 @@ def test_sink_that_raises_receives_the_next_batch(
     eventually(lambda: caplog.text.count("the sink of 'topic' failed") == 2)
 
 
-def test_undecodable_messages_are_skipped_by_listen_and_raise_an_alert(make: Make) -> None:
+def test_undecodable_message_raises_on_payload_access_and_is_skipped_by_listen(make: Make) -> None:
     sub, node = make("b").new_sub("topic"), make("a")
     pub = node.new_pub("topic")
     pub.publish_bytes(b"{no json")

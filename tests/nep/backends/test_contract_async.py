@@ -335,7 +335,7 @@ def test_exception_in_a_callback_propagates_from_async_spin(make: Make, is_corou
     run(main())
 
 
-def test_cancelled_async_spin_releases_all_resources(make: Make) -> None:
+def test_cancelled_async_spin_releases_its_watchers_and_loses_no_message(make: Make) -> None:
     node, pub = make("b"), make("a").new_pub("example")
 
     async def main() -> None:
@@ -354,7 +354,7 @@ def test_cancelled_async_spin_releases_all_resources(make: Make) -> None:
     assert node._work._watchers == ()
 
 
-def test_loop_is_woken_once_per_batch_of_messages(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_loop_is_woken_at_most_once_per_two_messages_of_a_burst(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first message of a burst wakes the loop; the others are read without another wake."""
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")

@@ -412,7 +412,7 @@ def _pattern(number: int, each: int) -> AddSubscriber:
     return AddSubscriber(node, SubscriberRecord(derive_id(node.key, each), f"t{each}/*", "json", each, True))
 
 
-def test_registrations_beyond_the_limit_are_rejected() -> None:
+def test_pattern_registrations_beyond_the_limit_are_rejected() -> None:
     graph = Graph(1, 0.0, learn_s=0.0)
 
     def ask(request: AddSubscriber | AddPublisher, number: int) -> object:

@@ -146,7 +146,7 @@ def test_messages_in_one_process_share_a_clock() -> None:
         assert message.latency_uncertainty_s == 0.0
 
 
-def test_typed_messages_have_the_same_latency() -> None:
+def test_typed_messages_have_latency_without_uncertainty_within_a_process() -> None:
     with nep.node("memory", transport="memory") as node:
         sub, pub = node.new_sub("m", Place), node.new_pub("m", Place)
         pub.publish(Place(1.0))

@@ -273,7 +273,7 @@ print(logging.getLoggerClass().__name__, logging.getLogger().handlers, logging.g
 """
 
 
-def test_default_is_loopback_and_logging_is_left_unchanged(ros: str) -> None:
+def test_ros_node_binds_to_loopback_by_default_and_keeps_the_logging_configuration(ros: str) -> None:
     with running(LISTENS, ADDRESS=ros) as program:
         assert program.line() == "['127.0.0.1']"
         assert program.line() == "Logger [] 30"

@@ -486,11 +486,11 @@ def test_unknown_ros_distribution_is_rejected() -> None:
         b"\0\1\0\0\2\0\0\0ab", b"\0\1\0\0\0\0\0\0\0\0\0\0\xff\xff\xff\xff",
     ],
 )  # fmt: skip
-def test_invalid_message_is_rejected(msg_type: str, cdr: bytes) -> None:
+def test_invalid_cdr_bytes_of_plain_message_types_are_rejected(msg_type: str, cdr: bytes) -> None:
     pytest.importorskip("rosbags", reason=NEEDS)
     with pytest.raises(WireError):
         mapping_for(msg_type).unpack(cdr)
 
 
-def test_strings_in_the_other_byte_order_are_decoded() -> None:
+def test_strings_in_big_endian_byte_order_are_decoded() -> None:
     assert bytes(mapping_for("string").unpack(b"\0\0\0\0\0\0\0\3ab\0")) == b"ab"

@@ -68,7 +68,7 @@ PAYLOAD: dict[str, object] = {
 }  # fmt: skip
 
 
-def test_dict_round_trips() -> None:
+def test_dict_round_trips_through_ros_encoding() -> None:
     assert ALL.decode(ALL.encode(PAYLOAD)) == PAYLOAD
     assert not ALL.has_header
 

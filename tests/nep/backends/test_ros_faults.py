@@ -163,7 +163,7 @@ def test_hung_subscriber_uses_bounded_memory_and_drops_are_counted(ros: str) -> 
             speaker.end()
 
 
-def test_killed_subscriber_does_not_affect_the_others(ros: str) -> None:
+def test_killed_ros_subscriber_does_not_affect_other_subscribers(ros: str) -> None:
     with running(SPEAKS, **told(ros)) as speaker:
         assert speaker.line() == "ready"
         with running(HEARS, **told(ros)) as other:

@@ -128,7 +128,7 @@ def test_burst_of_thirty_images_arrives_completely(master: Master, node: nep.Nod
         assert listener.line() == f"lost 0 received {begun + 31}"
 
 
-def test_subscriber_without_shared_memory_receives_the_same_through_the_socket(
+def test_subscriber_without_shared_memory_receives_the_payload_through_the_socket(
     master: Master, node: nep.Node
 ) -> None:
     sub, pub = node.new_sub("frames", "bytes"), node.new_pub("frames", "bytes")
@@ -150,7 +150,7 @@ def test_subscriber_without_shared_memory_receives_the_same_through_the_socket(
     assert message.payload == data
 
 
-def test_subscriber_without_hello_and_other_subscribers_receive_payloads(
+def test_all_subscribers_receive_through_the_socket_if_one_sends_no_hello(
     master: Master, node: nep.Node
 ) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
@@ -493,7 +493,7 @@ def test_invalid_runtime_folder_is_rejected(monkeypatch: pytest.MonkeyPatch, tmp
 
 
 @pytest.mark.parametrize("part", [b"", b"\0" * 7, struct.pack("<Q", 2**64 - 1), struct.pack("<Q", 1)])
-def test_reference_to_a_missing_payload_is_counted(node: nep.Node, part: bytes) -> None:
+def test_invalid_reference_is_rejected_and_missing_payload_is_counted_as_lost(node: nep.Node, part: bytes) -> None:
     """The reference is rejected or counted as lost, and the next message is received."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     stranger = context.socket(zmq.PUB)

@@ -61,7 +61,7 @@ def test_no_message_is_lost_if_the_first_one_arrives() -> None:
     assert (sources.received, sources.lost) == (1, 0)
 
 
-def test_message_without_a_valid_number_does_not_make_losses_negative() -> None:
+def test_message_without_a_valid_sequence_number_does_not_make_losses_negative() -> None:
     sources = new_publisher()
     sources.count_message(5, 0, is_alone=False)
     assert sources.lost == 0
@@ -137,7 +137,7 @@ def test_existing_publisher_is_counted_from_its_first_received_message() -> None
     assert (sources.received, sources.lost) == (1, 0)
 
 
-def test_impossible_first_number_is_rejected_and_not_counted() -> None:
+def test_impossible_first_sequence_number_is_rejected_and_not_counted() -> None:
     sources = new_publisher()
     assert not sources.advance_to(5, MAX_GAP + 1)
     assert sources.lost == 0

@@ -108,7 +108,7 @@ def test_nan_is_stored_and_repeated_nan_is_not_a_change(board: nep.Blackboard) -
     assert [str(each.value) for each in seen] == ["nan", "inf", "-inf"]
 
 
-def test_values_are_copies(board: nep.Blackboard) -> None:
+def test_stored_and_returned_values_are_copies(board: nep.Blackboard) -> None:
     given = [1, {"a": [2]}]
     board.put("x", given)
     given.append(3)

@@ -66,7 +66,7 @@ def test_rize_perceptions_are_parsed(payload: object, values: object, robot: str
         {"data": 5},
     ],
 )
-def test_other_payloads_are_not_perceptions(payload: object) -> None:
+def test_commands_and_invalid_payloads_are_not_perceptions(payload: object) -> None:
     assert parse_perception(payload) is None
 
 

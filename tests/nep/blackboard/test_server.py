@@ -117,7 +117,7 @@ def test_values_without_json_equivalent_are_converted(ask: Ask, board: nep.Black
     assert ask("get", key="half")["value"] == r"'\ud800'"
 
 
-def test_reply_is_bounded(ask: Ask, board: nep.Blackboard) -> None:
+def test_reply_is_bounded_in_entries_and_bytes(ask: Ask, board: nep.Blackboard) -> None:
     board.put("x", {str(number): number for number in range(12_000)})
     answer = ask("get")
     assert (len(answer["entries"]), answer["more"]) == (10_000, 2_000)
@@ -130,7 +130,7 @@ def test_reply_is_bounded(ask: Ask, board: nep.Blackboard) -> None:
     assert 1 <= len(answer["entries"]) < 6
 
 
-def test_changes_are_published(ask: Ask, board: nep.Blackboard, other: nep.Node) -> None:
+def test_each_change_of_a_value_is_published_with_its_cause(ask: Ask, board: nep.Blackboard, other: nep.Node) -> None:
     sub = other.new_sub("/blackboard/changes")
     ask("set", key="a", value=1)
     ask("set", key="a", value=1)

@@ -181,7 +181,7 @@ def test_typed_back_end_is_subscribed_with_the_published_type(twist_side):
             )
 
 
-def test_image_of_a_back_end_specific_type_is_forwarded_as_a_image(twist_side):
+def test_image_of_a_back_end_specific_type_is_forwarded_as_an_image(twist_side):
     import nep
 
     with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
@@ -370,7 +370,7 @@ def test_latched_message_of_each_publisher_is_kept_until_the_publisher_ends(monk
         assert sorted(taken(b.node("later").new_sub("/robots"), 2)) == [0, 2]
 
 
-def test_latched_and_other_messages_of_one_topic_are_both_forwarded():
+def test_latched_and_unlatched_messages_of_one_topic_are_both_forwarded():
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")):
         sub, node = b.node("b").new_sub("/t"), a.node("a")
         node.new_pub("/t", latched=True).publish("kept")
@@ -515,7 +515,7 @@ def test_messages_beyond_the_backlog_limit_are_dropped_and_counted(monkeypatch):
             assert (counts.waiting, counts.dropped, counts.sent) == (10, 15, 0)
 
 
-def test_failed_route_does_not_stop_the_others(caplog):
+def test_failed_route_does_not_stop_other_routes(caplog):
     class Bad:
         """Node that raises for one topic."""
 

@@ -258,7 +258,7 @@ def test_terminal_table_updates_in_place_with_warnings_above(file, nodes):
         (("missing.toml", "--rate", "3"), "--direction and --rate can't be used with a file"),
     ],
 )  # fmt: skip
-def test_invalid_endpoints_are_reported_in_one_sentence(words, said):
+def test_invalid_bridge_arguments_are_reported_in_one_sentence(words, said):
     with running(COMMAND, "bridge", *words) as program:
         out, err = program.end()
         assert (program.process.returncode, out) == (1, "")

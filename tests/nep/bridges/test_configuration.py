@@ -238,14 +238,14 @@ def test_any_topics_and_sides_are_parsed_or_rejected_with_a_message(topics, side
 
 @settings(max_examples=300, deadline=None)
 @given(st.text(max_size=200))
-def test_any_text_is_parsed_or_rejected_with_a_message(text):
+def test_any_configuration_text_is_parsed_or_rejected_with_a_message(text):
     reads_or_says(text)
     reads_or_says(SIDES + ONE + text)
 
 
 @settings(max_examples=300, deadline=None)
 @given(st.text(max_size=30), st.text(max_size=30))
-def test_any_two_endpoints_are_parsed_or_rejected_with_a_message(a, b):
+def test_any_two_side_arguments_are_parsed_or_rejected_with_a_message(a, b):
     for pair in ((a, b), (f"zeromq:{a}", f"zenoh:{b}"), (f"zeromq@{a}:/t", f"zenoh@{b}:/t")):
         with suppress(NepError):
             assert isinstance(configuration_from_arguments(*pair, name="1"), BridgeConfiguration)
@@ -287,7 +287,7 @@ def test_wildcard_substitution_round_trips(pattern, part):
         ("memory:/a@b", "zenoh:/a:b", ("memory", "/a@b", "local", "/a:b")),
     ],
 )  # fmt: skip
-def test_endpoint_argument_is_parsed_into_master_and_topic(monkeypatch, a, b, found):
+def test_side_argument_is_parsed_into_master_and_topic(monkeypatch, a, b, found):
     monkeypatch.delenv("NEP_MASTER", raising=False)
     told = configuration_from_arguments(a, b, name="1")
     assert (told.a.master, told.topics[0].a.name, told.b.master, told.topics[0].b.name) == found

@@ -292,7 +292,7 @@ def test_second_bridge_between_the_same_networks_is_reported_once(caplog):
         assert "'/t' and" not in caplog.text
 
 
-def test_bridges_of_other_topics_or_networks_do_not_conflict(caplog):
+def test_bridges_with_different_topics_or_networks_do_not_conflict(caplog):
     with (
         nets("zeromq", "memory", "memory") as (a, b, c),
         bridged(a, b, topic("/t"), name="one") as one,
@@ -392,7 +392,7 @@ def test_trail_length_is_limited():
         {"networks": ["x" * 10**6], "bridges": [b"x"]}, {"networks": ["n"] * 10**5, "bridges": ["b"] * 10**5},
     ],
 )  # fmt: skip
-def test_foreign_trail_data_is_parsed_safely(found):
+def test_invalid_trail_data_is_parsed_into_a_bounded_trail(found):
     trail = read_trail({TRAIL_KEY: found})
     assert len(trail.networks) <= MAX_HOPS + 2
     assert len(trail.bridges) <= MAX_HOPS + 2

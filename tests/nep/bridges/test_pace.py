@@ -29,7 +29,7 @@ def test_rate_limit_forwards_first_and_newest_message_of_a_burst(pair):
         assert silent(sub)
 
 
-def test_topic_below_the_rate_limit_is_forwarded_completely():
+def test_every_message_of_a_rate_limited_topic_is_sent_or_counted_as_replaced():
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/t", max_rate_hz=1e6)) as bridge:
         sub, pub, never = b.node("b").new_sub("/t"), a.node("a").new_pub("/t"), threading.Event()
         for number in range(50):

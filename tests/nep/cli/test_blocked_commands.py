@@ -112,7 +112,7 @@ def talking(node: nep.Node) -> Iterator[None]:
 @pytest.mark.parametrize(
     "words", [("topic", "echo", "flood"), ("topic", "echo", "flood", "--json"), ("log",)], ids="-".join
 )
-def test_paused_terminal_output_does_not_affect_other_topics(
+def test_command_with_paused_output_does_not_affect_unrelated_topics(
     master: nep.Master, words: tuple[str, ...]
 ) -> None:
     with nep.node("talker") as node, shown(*words, master=master.address) as command, talking(node):

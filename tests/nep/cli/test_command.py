@@ -100,7 +100,7 @@ def running_master(address):
         yield master
 
 
-def test_help_lists_all_commands():
+def test_help_lists_commands_and_subcommands():
     shown = run("--help").stdout
     assert all(word in shown for word in ("master", "node", "topic"))
     assert all(word in run("topic", "--help").stdout for word in ("list", "echo", "pub"))
@@ -224,7 +224,7 @@ def test_topic_pub_uses_the_type_of_the_topic(running_master, type_in):
         assert sub.listen(timeout_s=LONG_S) == (True, "no JSON at all")
 
 
-def test_invalid_input_exits_with_code_1(running_master, type_in):
+def test_invalid_payload_or_topic_exits_with_code_1_and_invalid_rate_with_code_2(running_master, type_in):
     done = type_in("topic", "pub", "t", "no JSON at all")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("nep: 'no JSON at all' isn't valid JSON; ")
@@ -247,7 +247,7 @@ def test_echo_exits_when_its_timeout_expires(running_master, type_in):
     assert "timed out after 0.2 s while waiting for a message on 't'" in done.stderr
 
 
-def test_ctrl_c_ends_every_command_with_130_and_no_traceback(running_master, start):
+def test_ctrl_c_ends_echo_and_latched_publishing_with_130_and_no_traceback(running_master, start):
     with nep.node("talker") as node:
         pub = node.new_pub("t")
         echo = start("topic", "echo", "t", "--json")
@@ -270,7 +270,7 @@ def test_latched_message_reaches_a_late_subscriber(running_master, start):
         assert sub.listen(timeout_s=LONG_S) == (True, {"n": 1})
 
 
-def test_closed_output_pipe_is_not_an_error(running_master, start):
+def test_closed_output_pipe_ends_echo_with_exit_code_1_without_traceback(running_master, start):
     with nep.node("talker") as node:
         pub = node.new_pub("t")
         echo = start("topic", "echo", "t", "--json")
@@ -308,7 +308,7 @@ def test_master_exits_when_its_owner_has_ended_and_no_node_remains(address, star
     assert master.process.wait(LONG_S) == 0
 
 
-def test_master_listens_on_other_addresses_only_with_the_listen_option(monkeypatch, type_in):
+def test_master_at_a_network_address_without_the_listen_option_is_rejected_with_advice(monkeypatch, type_in):
     monkeypatch.setenv("NEP_MASTER", "192.168.1.7:7780")
     done = type_in("master", "--no-gateway")
     assert done.returncode == 1
@@ -316,7 +316,7 @@ def test_master_listens_on_other_addresses_only_with_the_listen_option(monkeypat
 
 
 @pytest.mark.skipif(sys.platform == "darwin", reason="macOS answers at one loopback address only")
-def test_master_with_listen_option_prints_the_address_for_others_and_warns(address, start):
+def test_master_with_listen_option_prints_its_address_for_other_computers_and_warns(address, start):
     port = address.rpartition(":")[2]
     master = start("master", "--port", port, "--no-gateway", "--listen", "127.0.0.2")
     assert address in master.wait_says("master at")

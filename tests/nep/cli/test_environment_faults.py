@@ -64,7 +64,7 @@ def test_commands_work_with_only_the_loopback_interface():
     assert "Traceback" not in done.stdout + done.stderr
 
 
-def test_disabled_loopback_is_reported_by_the_doctor_and_nothing_crashes():
+def test_disabled_loopback_is_reported_by_the_doctor_and_commands_print_no_traceback():
     done = alone(
         """
         NEP doctor --json

@@ -105,7 +105,7 @@ def test_call_prints_the_reply(arm, type_in, tmp_path):
     assert json.loads(type_in("service", "call", SERVICE, f"@{file}")[1]) == {"asked": "grüß"}
 
 
-def test_errors_are_reported_in_one_sentence(arm, type_in, tmp_path):
+def test_service_command_errors_are_reported_in_one_sentence(arm, type_in, tmp_path):
     for words, sentence in (
         ((SERVICE, '"bad"'), f"the server of '{SERVICE}' failed: LookupError: no such joint"),
         (

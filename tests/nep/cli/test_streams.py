@@ -158,7 +158,7 @@ OUT = "nep: can't write the output: it is closed\n"
         ("2>&-", "topic echo nobody --timeout 0.1", 1, ""), ("2>&-", "topic pub new 1", 0, ""),
     ],
 )  # fmt: skip
-def test_closed_standard_streams_are_handled(talkers, closed, words, code, said):
+def test_closed_standard_stream_is_an_error_only_if_it_is_needed(talkers, closed, words, code, said):
     big = talkers.new_pub("big", latched=True)
     big.publish({"long": "x" * 100_000})
     done = subprocess.run(

@@ -87,7 +87,7 @@ def test_output_is_a_table_for_a_file_and_a_json_line_with_the_json_option(
     node.close()
 
 
-def test_unreachable_address_is_reported(type_in: TypeIn) -> None:
+def test_unreachable_master_address_is_reported(type_in: TypeIn) -> None:
     done = type_in("top", "--count", "1", "--master", "127.0.0.1:1")
     assert done.returncode == 1
     assert "127.0.0.1:1" in done.stderr

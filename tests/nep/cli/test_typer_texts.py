@@ -32,7 +32,7 @@ def test_command_line_errors_are_translated(line: str) -> None:
     assert untranslated(said, *OURS, "ecko", "xyz", "abc", "extra", "x", "n", "master", "TOPIC") == []
 
 
-def test_unknown_message_is_not_translated() -> None:
+def test_unknown_typer_text_stays_in_english() -> None:
     assert translated("Something else entirely.") == "Something else entirely."
     assert translated("Missing argument '{x}'.") == "Missing argument '{x}'."
 

@@ -201,7 +201,7 @@ def test_watch_command_waits_for_a_lost_master(type_in, file, monkeypatch) -> No
         (("BAD",), 1, "line 1 of"),
     ],
 )
-def test_command_exits_with_an_error_without_network_or_valid_rules(
+def test_alarm_file_is_validated_before_connecting(
     type_in, file, words, code: int, said: str
 ) -> None:
     made = {
@@ -214,7 +214,7 @@ def test_command_exits_with_an_error_without_network_or_valid_rules(
     assert said in done.stderr
 
 
-def test_example_is_printed(type_in) -> None:
+def test_example_alarm_file_is_printed(type_in) -> None:
     assert type_in("watch", "--example").stdout == EXAMPLE
 
 

@@ -224,7 +224,7 @@ def test_airplay_is_named_on_macos(holder):
     assert "AirDrop & Handoff" in made["ports:airplay"].fix
 
 
-def test_other_program_on_port_7000_of_a_mac_is_not_identified_as_airplay():
+def test_program_other_than_airplay_on_port_7000_of_a_mac_is_named():
     made = found(platform="darwin", ports=(PortFact(7000, "", True, OTHER),))
     assert "python3 server.py" in made["ports:taken"].sentence
 
@@ -264,7 +264,7 @@ OTHER_JS = PackageFact("nep-js", "0.1.1", "/home/me/robot/node_modules/nep-js", 
         ((OTHER_JS, OUR_JS), "warning", f'npm uninstall --prefix "{Path("/home/me/robot")}" nep-js'),
     ],
 )
-def test_foreign_nep_js_package_that_shadows_nep_js_is_a_warning(packages, severity, command):
+def test_foreign_nep_js_package_is_a_warning_only_if_it_shadows_nep_js(packages, severity, command):
     one = found(node_packages=packages)["package:nep-js"]
     assert (one.severity, one.command) == (severity, command)
     assert packages[0].location in one.sentence
@@ -308,7 +308,7 @@ def test_originals_are_named_and_unsupported_versions_are_errors():
     assert "0.5.4.8 or 0.5.4.5" in made["original:bad"].fix
 
 
-def test_alerts_of_the_master_are_reported_once():
+def test_alerts_of_the_master_are_findings_except_those_the_doctor_checks_itself():
     alerts = [
         Alert("name:x", "2 programs are named “x”", "Give each a name."),
         Alert("port:7000", "taken"),

@@ -74,7 +74,7 @@ def test_intended_topic_name_is_found(missed, meant):
     assert closest_topic(missed, ["/camera", "/robot/depth"]) == meant
 
 
-def test_topic_with_the_same_ending_is_suggested_only_if_unique():
+def test_closest_topic_is_another_existing_topic_or_none():
     assert closest_topic("/pose", ["/left/pose", "/right/pose"]) in {"/left/pose", "/right/pose", None}
     assert closest_topic("/pose", []) is None
     assert closest_topic("/pose", ["/pose"]) is None

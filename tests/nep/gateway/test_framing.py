@@ -153,19 +153,19 @@ def test_subscription_filter_matches_only_possible_frame_prefixes():
 
 
 @given(JSON_VALUES, st.text(alphabet="abe1n ü日", min_size=1, max_size=3))
-def test_shielding_never_changes_the_value(value, topic):
+def test_escaping_for_javascript_and_csharp_never_changes_the_value(value, topic):
     data = json.dumps(value, ensure_ascii=False).encode()
     assert json.loads(escape_for_javascript(data, topic)) == value
     assert json.loads(escape_for_csharp(data)) == value
 
 
 @given(st.text(), st.sampled_from(["camera", "日本", "robot_action", "aa"]))
-def test_shielded_json_for_javascript_contains_no_topic_name(text, topic):
+def test_json_escaped_for_javascript_contains_no_topic_name(text, topic):
     data = json.dumps(
         {"message": f"{text}{topic}{text}{topic[0]}{topic}", topic: 1}, ensure_ascii=False
     ).encode()
     assert topic.encode() not in escape_for_javascript(data, topic)
 
 
-def test_shielded_json_for_csharp_contains_no_space():
+def test_json_escaped_for_csharp_contains_no_space():
     assert b" " not in escape_for_csharp(b'{"a b": "c  d", "e": [1, 2]}')

@@ -110,7 +110,7 @@ def test_cpu_load_of_an_original_is_read_from_the_system(desk):
     assert {node.name: node.cpu_ratio for node in desk.view().nodes.values()} == {"a": 0.5, "b": None}
 
 
-def test_missing_process_has_no_load():
+def test_missing_process_and_first_reading_have_no_cpu_load():
     assert cpu_load_of(2**22 + 1).ratio() is None
     assert cpu_load_of(os.getpid()).ratio() is None  # one reading tells nothing
 

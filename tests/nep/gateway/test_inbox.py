@@ -20,7 +20,7 @@ def message(data=b"1"):
     return Message("t", data, "json", "json")
 
 
-def test_posted_messages_are_taken_in_order_and_wake_the_reader(inbox):
+def test_posted_messages_are_returned_in_order_and_wake_the_reader(inbox):
     assert not select.select([inbox], [], [], 0)[0]
     first, second = message(), message()
     poster = threading.Thread(target=lambda: (inbox.post(first), inbox.post(second)))

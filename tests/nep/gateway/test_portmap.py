@@ -28,7 +28,7 @@ def test_port_map_persists_after_a_restart(tmp_path):
     "text",
     ["", "{", "[]", '{"version":99}', '{"version":1,"lines":[{}],"programs":[]}', '{"version":1,"lines":7}'],
 )
-def test_damaged_file_gives_an_empty_map(tmp_path, text):
+def test_damaged_port_map_file_gives_an_empty_map(tmp_path, text):
     file = tmp_path / "map.json"
     file.write_text(text)
     assert not PortMap(file).lines
@@ -44,7 +44,7 @@ def test_repeated_registration_is_stored_once_and_other_programs_separately():
     assert known.registrations == (registration(),)
 
 
-def test_registrations_are_discarded_after_a_reboot(tmp_path):
+def test_registrations_are_discarded_and_ports_kept_after_a_reboot(tmp_path):
     before = PortMap(tmp_path / "map.json", boot=1000.0)
     before.assign(JSON_A, 9000)
     before.add(registration())
@@ -77,7 +77,7 @@ def test_nodes_of_the_same_name_have_different_ids():
     assert registration(pid=None).node_id == registration(pid=None).node_id
 
 
-def test_each_master_has_its_own_file(tmp_path, monkeypatch):
+def test_each_master_port_has_its_own_port_map_file(tmp_path, monkeypatch):
     monkeypatch.setenv("NEP_STATE_DIR", str(tmp_path))
     assert default_file(7780) != default_file(7781)
     assert default_file(7780).parent == tmp_path

@@ -418,7 +418,7 @@ def test_eviction_of_a_squatter_is_announced_to_subscribers_before_the_owner(mas
         assert [each.publisher.node_name for each in (came, again)] == ["Mallory", "Owner"]
 
 
-def test_invalid_subscriber_counts_are_handled_safely(master: Master) -> None:
+def test_invalid_loss_counts_of_a_subscriber_are_clamped(master: Master) -> None:
     with attacker_at(master) as attacker, nep.node("honest", master=master.address) as honest:
         record = SubscriberRecord(5, "/t", "json")
         assert isinstance(attacker.ask(AddSubscriber(node(), record)), FoundReply)

@@ -146,7 +146,7 @@ def test_malformed_clock_is_rejected_and_named(clock: object) -> None:
 
 
 @pytest.mark.parametrize("clock", [None, (), (S, 300)])
-def test_fast_path_returns_the_same_clock_reply(clock: tuple[int, ...] | None) -> None:
+def test_fast_path_returns_the_same_clock_reply_as_the_normal_path(clock: tuple[int, ...] | None) -> None:
     quick, long = graph_of("c1", "c2"), graph_of("c1", "c2")
     for graph in (quick, long):
         renewed(graph, 1, (3 * S, 400))
@@ -164,7 +164,7 @@ def quick_answer(graph: Graph, said: RawRenewal, **more: Any) -> bytes:
     return encode_renewed(7, EPOCH, graph.revision, last_seqs, (), clocks=clocks, **more)
 
 
-def test_messages_of_older_nodes_and_masters_are_unchanged() -> None:
+def test_messages_of_older_nodes_and_masters_contain_no_clock_fields() -> None:
     graph = graph_of("", "")
     said = parse_renewal(encoding.encode_request(renewal(graph, 0, None), 7))
     assert said is not None

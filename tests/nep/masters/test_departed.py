@@ -58,7 +58,7 @@ def renewed(graph: Graph, who: NodeRecord, now: float, *counts: PublisherCount) 
     return dict(answer.last_seqs)
 
 
-def test_renewal_reply_has_the_last_message_number_of_a_departed_publisher() -> None:
+def test_renewal_reply_has_the_last_sequence_number_of_a_departed_publisher() -> None:
     graph = Graph(1, 0.0, learn_s=0.0)
     sends, hears = node("a"), node("b")
     record = PublisherRecord(1, "/robot/t", "json", "json", ("tcp://10.0.0.1:5000",))

@@ -130,7 +130,7 @@ def test_invalid_topic_is_rejected(graph: Graph) -> None:
     assert graph.nodes == ()
 
 
-def test_orderly_leave_carries_the_last_message_number(graph: Graph) -> None:
+def test_removed_publisher_is_announced_with_its_last_sequence_number(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("p"), publisher(2)))
     push, reply = ask(graph, RemovePublisher("p", 2, last_seq=5))
@@ -243,7 +243,7 @@ def test_unresponsive_node_is_an_alert_until_it_renews(graph: Graph) -> None:
     assert graph.view().alerts == ()
 
 
-def test_name_type_and_message_conflicts_raise_alerts(graph: Graph) -> None:
+def test_duplicate_names_conflicting_types_and_unreadable_messages_raise_alerts(graph: Graph) -> None:
     ask(graph, AddPublisher(node("a", name="N"), publisher(1, msg_type="json")))
     ask(graph, AddPublisher(node("b", name="N"), publisher(2, msg_type="string")))
     ask(graph, AddSubscriber(node("c"), subscriber(3)))
@@ -322,7 +322,7 @@ def test_any_map_decodes_to_a_request_or_a_wire_error(do: object, what: object) 
         assert asked.request.reason
 
 
-def test_invalid_field_is_named() -> None:
+def test_invalid_or_missing_request_field_is_named() -> None:
     body = pack({"do": "renew", "call": 1, "what": {"node_id": "a", "epoch": "x", "revision": 1}})
     refused = encoding.decode_request(body).request
     assert isinstance(refused, WireError)

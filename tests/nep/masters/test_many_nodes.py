@@ -181,7 +181,7 @@ def test_unchanged_topics_are_reused_in_the_next_view() -> None:
     assert after.topics["t0"] != before.topics["t0"]
 
 
-def test_slow_listener_receives_the_last_change_but_skips_others() -> None:
+def test_attachment_receives_the_last_of_many_quick_changes() -> None:
     class Slow:
         def __init__(self) -> None:
             self.views: list[GraphView] = []

@@ -116,7 +116,7 @@ def test_is_running_is_false_without_a_master() -> None:
     assert not is_running(address, 0.1)
 
 
-def test_attachment_starts_before_the_first_reply_and_receives_changes() -> None:
+def test_attachment_is_started_receives_graph_changes_and_is_closed() -> None:
     attached = Attached()
     with Master("127.0.0.1:0", attachments=[attached], learn_s=0.0) as master:
         with nep.node("n", master=master.address) as node:
@@ -146,7 +146,7 @@ def test_attachment_that_raises_does_not_stop_the_master(caplog: pytest.LogCaptu
     assert "an attachment of the master failed" in caplog.text
 
 
-def test_foreign_nodes_can_be_registered_in_process(master: Master) -> None:
+def test_original_nodes_can_be_registered_in_process(master: Master) -> None:
     record = PublisherRecord(5, "old/topic", "json", "json")
     assert not isinstance(master.submit(Join(ORIGINAL, 0, (record,), managed=True)), RejectedReply)
     renew = Renew(ORIGINAL.id, master.epoch, 0, (PublisherCount(5, 3, 30, 0),))

@@ -110,7 +110,7 @@ def advertised(computers: Computers) -> str:
 
 
 @pytest.mark.timeout(240)
-def test_two_computers_communicate_after_address_change_and_cable_unplug(
+def test_two_computers_communicate_after_an_address_change_and_a_cable_reconnection(
     computers: Computers,
 ) -> None:
     near = {"before": computers.inside("a"), "NEP_MASTER": "127.0.0.1:7780"}

@@ -311,7 +311,7 @@ def test_corrupt_images_raise_decode_error(data: bytes, extension: dict[str, obj
         codec("image").decode(memoryview(data), extension)
 
 
-def test_encoding_an_unknown_value_does_not_import_numpy():
+def test_json_encoding_of_unsupported_or_encoded_payloads_does_not_import_numpy():
     """orjson imports numpy inside `publish`, which stalled a publisher for 0.1 s at its first subscriber."""
     code = (
         "import sys\n"

@@ -53,7 +53,7 @@ def test_formatted_field_path_parses_back_to_the_same_path(steps):
 
 
 @pytest.mark.parametrize("text", ["", "joints[x]", "joints[", "a..b", "a.", "]", 'a["b'])
-def test_invalid_field_path_is_rejected(text):
+def test_malformed_field_path_is_rejected(text):
     with pytest.raises(NepError, match="field"):
         parse_path(text)
 

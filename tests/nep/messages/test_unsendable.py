@@ -62,7 +62,7 @@ def test_unencodable_unsubscribed_payload_is_reported_until_one_can_be_encoded()
     assert told.problems == ["can't encode a 'object' as 'json': 'object' can't be encoded as JSON", ""]
 
 
-def test_alternating_valid_and_invalid_payloads_are_logged_at_growing_intervals(
+def test_alternating_valid_and_unencodable_payloads_are_logged_at_growing_intervals(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     told = Told()
@@ -75,7 +75,7 @@ def test_alternating_valid_and_invalid_payloads_are_logged_at_growing_intervals(
     assert caplog.records[-1].getMessage().startswith("a message on 't' can't be sent (100 so far): ")
 
 
-def test_alternating_valid_and_invalid_messages_are_logged_at_growing_intervals(
+def test_alternating_valid_and_undecodable_messages_are_logged_at_growing_intervals(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     with nep.node("n", "memory", master="rarely") as node:

@@ -117,7 +117,7 @@ def test_timer_with_invalid_period_or_callback_is_rejected(node: nep.Node, perio
 
 
 @pytest.mark.parametrize("time_s", [-1.0, -0.001, math.nan, -math.inf])
-def test_invalid_timeouts_are_rejected(node: nep.Node, time_s: float) -> None:
+def test_negative_nan_or_non_numeric_timeouts_are_rejected(node: nep.Node, time_s: float) -> None:
     sub, pub = node.new_sub("t"), node.new_pub("t")
     sentence = r"_s must be a number of seconds \(0 or greater\) or None, not .*"
     for call in (sub.receive, node.spin, node.graph, pub.close, node.close):
@@ -162,7 +162,7 @@ def test_invalid_timeouts_are_rejected(node: nep.Node, time_s: float) -> None:
         ({"generation": "C"}, "generation is 'C'; use 'A' or 'B'"),
     ],
 )
-def test_direct_connection_with_invalid_address_is_rejected(given: dict[str, Any], sentence: str) -> None:
+def test_direct_connection_with_invalid_address_wire_or_generation_is_rejected(given: dict[str, Any], sentence: str) -> None:
     with nep.node("direct") as node, pytest.raises((nep.NepError, ValueError), match=sentence):
         node.direct(**given)
 

@@ -237,7 +237,7 @@ def test_original_request_with_oversized_text_is_rejected() -> None:
         parse_request(request, PORT_A)
 
 
-def test_unreadable_graph_raises_in_the_waiting_thread(pair: SimpleNamespace) -> None:
+def test_undecodable_graph_reply_raises_in_the_waiting_thread(pair: SimpleNamespace) -> None:
     asked = pair.calls.send_request(QueryGraph())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, body = pair.router.recv_multipart()

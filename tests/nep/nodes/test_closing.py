@@ -225,7 +225,7 @@ def test_all_nodes_flush_concurrently_at_interpreter_exit(master: Master) -> Non
     assert "quiet" not in error, "nothing was sent there, so nothing is missing"
 
 
-def test_unused_master_connections_are_closed(master: Master) -> None:
+def test_unused_master_connections_beyond_a_limit_are_closed(master: Master) -> None:
     with nep.node("n") as node:
         pub = node.new_pub("topic")
         for port in range(1, 40):

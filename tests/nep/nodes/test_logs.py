@@ -218,7 +218,7 @@ def test_any_payload_is_converted_to_a_log_record(payload, level, text):
     assert (record.level, record.text, record.stamp_ns, record.node) == (level, text, 5, "")
 
 
-def test_log_level_names_are_mapped():
+def test_log_level_names_are_parsed_case_insensitively_with_info_as_the_default():
     assert [parse_level(name.upper()) for name in LEVELS] == list(LEVELS)
     assert parse_level(None) == "info"
 

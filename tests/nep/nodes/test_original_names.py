@@ -76,7 +76,7 @@ def test_messages_are_exchanged_with_original_method_names(names: tuple[str, str
         assert poses.listen_json() == (False, {})
 
 
-def test_original_helper_functions_return_expected_values(tmp_path) -> None:
+def test_original_helper_functions_return_the_ip_address_and_convert_json(tmp_path) -> None:
     assert ipaddress.ip_address(nep.getMyIP())
     assert nep.json2dict(nep.dict2json({"a": [1, None]})) == {"a": [1, None]}
     file = tmp_path / "a.json"

@@ -86,7 +86,7 @@ def test_timer_fires_once_per_period_with_two_spinning_threads() -> None:
     assert len(calls) == 2
 
 
-def test_next_due_is_the_earliest_timer() -> None:
+def test_next_due_time_is_that_of_the_earliest_timer() -> None:
     clock = Clock()
     assert next_due([Timer(2.0, print, clock), Timer(0.5, print, clock)]) == 100.5
     assert next_due([]) == float("inf")

@@ -54,7 +54,7 @@ def test_parameter_values_are_published_on_a_latched_topic(make: Make) -> None:
     assert state["parameters"][0]["value"] == 1.5  # type: ignore[index]
 
 
-def test_other_node_sets_parameters_and_receives_rejection_reasons(make: Make) -> None:
+def test_remote_node_sets_parameters_and_receives_rejection_reasons(make: Make) -> None:
     node, other = make("robot"), make("tool")
     node.parameters.declare("speed", 0.5, max=2)
     node.parameters.declare("serial", "X1", read_only=True)

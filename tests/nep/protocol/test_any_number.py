@@ -225,7 +225,7 @@ def test_reply_that_cannot_be_encoded_fails_without_affecting_other_replies(
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1.0, 1e300])
-def test_invalid_cpu_share_is_ignored(value: float) -> None:
+def test_non_finite_negative_or_huge_cpu_share_is_ignored(value: float) -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=0.0)
     graph.apply(Join(NodeRecord("n", "N", "h", 1)), 1, 0.0, "n")
     for request in (Renew("n", 7, 99, (), (), value),):

@@ -156,7 +156,7 @@ def test_implausible_clock_samples_are_discarded(received_ns: int, answered_ns: 
     assert pair.samples.offset() is None
 
 
-def test_reply_after_a_minute_is_discarded() -> None:
+def test_clock_sample_with_a_round_trip_of_a_minute_is_discarded() -> None:
     pair = Pair(0)
     assert not pair.renew(60 * S, 0)
 
@@ -170,7 +170,7 @@ def test_coarse_clock_resolution_increases_the_uncertainty() -> None:
     assert known[1] >= 15_600_000
 
 
-def test_samples_are_cleared_on_a_change_of_master() -> None:
+def test_cleared_clock_samples_have_no_offset_and_no_steps() -> None:
     pair = Pair(0)
     pair.renew(0, 0)
     pair.samples.clear()

@@ -41,7 +41,7 @@ def test_generated_vectors_are_up_to_date() -> None:
         assert (DATA / name).read_text("utf-8") == text, f"{name}: run python tools/wire_vectors.py"
 
 
-def test_each_generated_malformed_message_is_rejected_with_its_code() -> None:
+def test_each_generated_malformed_message_is_rejected_with_its_error_code() -> None:
     assert len({tuple(parts) for _code, *parts in MALFORMED}) == wire_vectors.MALFORMED_COUNT
     wrong = [
         (code, found, parts)
@@ -52,7 +52,7 @@ def test_each_generated_malformed_message_is_rejected_with_its_code() -> None:
 
 
 @pytest.mark.parametrize("vector", BATCHES, ids=name_of)
-def test_batch_is_decoded_or_rejected_with_its_code(vector: dict[str, Any]) -> None:
+def test_batch_is_decoded_or_rejected_with_its_error_code(vector: dict[str, Any]) -> None:
     part = bytes.fromhex(vector["part"])
     if "error" in vector:
         assert code_of([part]) == vector["error"]
@@ -64,7 +64,7 @@ def test_batch_is_decoded_or_rejected_with_its_code(vector: dict[str, Any]) -> N
 
 
 @pytest.mark.parametrize("vector", FILTERS, ids=name_of)
-def test_filter_is_decoded_and_encoded(vector: dict[str, Any]) -> None:
+def test_subscription_filter_is_parsed_and_encoded_or_rejected(vector: dict[str, Any]) -> None:
     part = bytes.fromhex(vector["filter"])
     hello, read, shares = (
         wire.parse_hello(part),
@@ -110,7 +110,7 @@ def test_request_reply_and_push_are_decoded_and_encoded(vector: dict[str, Any]) 
     assert wire_vectors.as_text(unpack(body)) == (vector.get("answer_means") or vector["means"])
 
 
-def test_documentation_lists_every_code() -> None:
+def test_documentation_lists_every_error_code() -> None:
     page = (ROOT / "docs" / "wire.md").read_text("utf-8")
     listed = set(re.findall(r"^\| `([a-z-]+)` \|", page.partition("## Error codes")[2], re.MULTILINE))
     sources = [
@@ -128,7 +128,7 @@ def test_documentation_lists_every_code() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in wire_tables.TABLES if wire_tables.rows(name)])
-def test_documentation_has_types_and_defaults_of_all_fields(name: str) -> None:
+def test_documentation_has_types_and_defaults_of_all_wire_fields(name: str) -> None:
     page = (ROOT / "docs" / "wire.md").read_text("utf-8")
     table = page.partition(f"\n#### `{name}`\n")[2].partition("\n#")[0]
     found = re.findall(r"^\| `(\w+)` \| ([^|]+) \| ([^|]+) \|", table, re.MULTILINE)

@@ -77,7 +77,7 @@ def test_node_joins_a_restarted_master(smallest: ModuleType) -> None:
         eventually(lambda: "example" not in second.view().topics)
 
 
-def test_documentation_shows_the_example() -> None:
+def test_documentation_of_the_smallest_client_contains_the_example() -> None:
     page = (ROOT / "docs" / "smallest-client.md").read_text("utf-8")
     code = EXAMPLE.read_text("utf-8").partition('"""\n\nimport')[2]
     assert page.partition("```python\n")[2].partition("```")[0] == f"import{code}"

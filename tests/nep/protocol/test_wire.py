@@ -134,7 +134,7 @@ def test_invalid_acknowledgement_is_not_parsed(junk: bytes) -> None:
 
 
 @pytest.mark.parametrize("topic", ["a", "/Pepper/camera", "ü/ä", "x" * 200, "a=b,c", "機器人"])
-def test_valid_topics_are_accepted(topic: str) -> None:
+def test_topic_names_of_up_to_200_bytes_in_any_script_are_accepted(topic: str) -> None:
     assert wire.check_topic(topic) == topic
 
 
@@ -154,12 +154,12 @@ def test_valid_topics_are_accepted(topic: str) -> None:
         (7, "a topic name must be a 'str'"),
     ],
 )
-def test_invalid_topics_are_rejected(topic: str, reason: str) -> None:
+def test_empty_or_too_long_topic_names_and_forbidden_characters_are_rejected(topic: str, reason: str) -> None:
     with pytest.raises(BadTopicError, match=reason):
         wire.check_topic(topic)
 
 
-def test_unknown_wire_version_is_reported() -> None:
+def test_unknown_wire_version_raises_an_error_that_suggests_an_update() -> None:
     header = bytearray(wire.Header(1, 0, 1, 2, 3).pack())
     header[0] = 9
     with pytest.raises(

@@ -174,7 +174,7 @@ def test_subscriber_decodes_a_batch(
 
 
 @pytest.mark.parametrize("vector", BAD, ids=name_of)
-def test_subscriber_rejects_an_invalid_message_and_receives_the_next(
+def test_subscriber_rejects_an_invalid_message_and_receives_the_next_message(
     vector: dict[str, Any], node: nep.Node, their: Callable[[int], zmq.Socket[bytes]]
 ) -> None:
     theirs = their(zmq.XPUB)

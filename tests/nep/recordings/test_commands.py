@@ -165,7 +165,7 @@ def test_repair_command_reports_recovered_messages(path, tmp_path, capfd):
     assert json.loads(capfd.readouterr().out)["recovered"] == 24
 
 
-def test_export_command_writes_files_to_the_output_folder(path, tmp_path, capfd):
+def test_export_command_writes_to_the_output_folder_and_rejects_invalid_options(path, tmp_path, capfd):
     run("recording", "export", path, "/arm/*", "-o", tmp_path / "out")
     assert "20 messages" in capfd.readouterr().err
     assert [each.name for each in (tmp_path / "out").iterdir()] == ["arm_joints.csv"]
@@ -234,7 +234,7 @@ def test_play_command_publishes_only_the_named_topics(path, master, capfd):
         (("/arm/joints", "--remap", "/arm/joints=two words"), NepError, "two words"),
     ],
 )
-def test_play_command_rejects_missing_or_unsafe_options(path, words, error, said):
+def test_play_command_rejects_invalid_options_and_robot_topics_without_permission(path, words, error, said):
     with pytest.raises(error, match=said):
         run("play", path, *words)
 
@@ -287,7 +287,7 @@ def test_play_command_stops_publishing_a_topic_when_a_robot_moved_by_the_topic_c
     assert len(told[0]) < 300
 
 
-def test_shell_completion_offers_topics_of_the_file(path):
+def test_shell_completion_offers_the_topics_of_the_recording(path):
     from nep.cli.recording_files import _complete_recorded_topic
 
     def offered(file):
@@ -362,6 +362,6 @@ def test_clock_time_after_midnight_is_on_the_next_day():
         "1" * 400,
     ],
 )
-def test_invalid_time_is_rejected(text):
+def test_malformed_start_time_or_time_outside_the_recording_is_rejected(text):
     with pytest.raises(typer.BadParameter, match="isn't a valid"):
         parse_time_ns(text, START, START + HOUR)

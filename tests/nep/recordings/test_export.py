@@ -206,7 +206,7 @@ def truncate(film):
         os.truncate(film._written, 100)
 
 
-def test_export_of_a_time_range(recording, tmp_path):
+def test_export_of_a_time_range_contains_only_its_messages(recording, tmp_path):
     start = recording.start_ns
     made = export(recording, "csv", tmp_path, Part(start + STEP_NS, start + 2 * STEP_NS, ("/arm/state",)))
     assert made[0].count == 1
@@ -233,7 +233,7 @@ def test_export_file_names_are_unique_and_valid_on_every_system(tmp_path):
     assert all(len(each) < 120 and not set('/\\:*?"<>|') & set(each) for each in names)
 
 
-def test_invalid_export_requests_raise_errors(recording, tmp_path, monkeypatch):
+def test_export_raises_for_unknown_formats_missing_values_images_or_packages(recording, tmp_path, monkeypatch):
     record(tmp_path / "b.mcap", [[json_message(1)]])
     with (
         Recording(tmp_path / "b.mcap") as plain,

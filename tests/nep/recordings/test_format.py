@@ -61,7 +61,7 @@ def test_recorded_message_round_trip(codec, data, seq, stamp_ns, publisher, exte
 
 
 @pytest.mark.parametrize("message", odd_messages(), ids=lambda each: each.topic)
-def test_unusual_message_round_trip(message):
+def test_extreme_and_malformed_messages_round_trip(message):
     assert kept(there_and_back(message)) == kept(message)
     assert kept(there_and_back(message, is_self_contained=True)) == kept(message)
 

@@ -220,7 +220,7 @@ def test_playback_of_an_empty_recording_delivers_no_message(tmp_path):
         playback.advance()
 
 
-def test_player_thread_delivers_messages_in_order_and_seeks_separately(recording, times):
+def test_player_thread_delivers_messages_in_order_and_reports_seeks_separately(recording, times):
     came, jumps, ended = [], [], threading.Event()
     playback = Playback(recording)
     with Player(playback, came.extend, on_jump=jumps.append, on_end=ended.set) as player:

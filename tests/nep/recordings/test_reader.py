@@ -73,7 +73,7 @@ def test_range_read_matches_filtering_of_all_messages(path, everything, data):
 
 @settings(max_examples=60)
 @given(st.data())
-def test_newest_before_and_after_match_a_linear_search(path, everything, data):
+def test_newest_previous_and_next_messages_at_a_time_match_a_linear_search(path, everything, data):
     at = data.draw(st.sampled_from([-1, 0, 2**64 - 1, 2**70, *(each.log_ns for each in everything)]))
     at += data.draw(st.integers(-1, 1))
     wanted = {}
@@ -119,7 +119,7 @@ def test_reader_memory_is_bounded_by_the_cache(path, everything):
             assert len(opened.file._cache) == 1
 
 
-def test_unfinished_file_gives_the_same_messages_and_counts(path, everything, tmp_path):
+def test_unfinished_file_gives_the_same_messages_and_counts_as_the_complete_file(path, everything, tmp_path):
     cut = tmp_path / "cut.mcap"
     with Recording(path) as opened:
         chunks = opened.file.chunks()
@@ -166,7 +166,7 @@ def test_damaged_chunk_is_skipped_and_counted(path, everything, tmp_path):
 
 
 @pytest.mark.parametrize("size", [0, 1, 7, 8, 9, 30, 1000])
-def test_file_that_is_not_a_recording_raises_recording_error(tmp_path, size):
+def test_random_bytes_folder_and_missing_file_raise_recording_error(tmp_path, size):
     path = tmp_path / "a.mcap"
     path.write_bytes(random.Random(size).randbytes(size))
     with pytest.raises(RecordingError, match=r"a\.mcap': .*MCAP file"):

@@ -153,7 +153,7 @@ def test_recorded_messages_equal_received_messages_byte_for_byte(master, tmp_pat
     assert {(each.received, each.lost, each.late) for each in figures.values()} == {(10, 0, 0)}
 
 
-def test_recorder_service_executes_commands(master, tmp_path):
+def test_recorder_service_records_and_keeps_on_command_and_rejects_malformed_commands(master, tmp_path):
     events: list[dict[str, object]] = []
 
     def seen(kind: str) -> list[dict[str, object]]:
@@ -296,7 +296,7 @@ def test_command_line_that_is_too_long_is_discarded(monkeypatch):
 @pytest.mark.parametrize(
     "is_told", [False, pytest.param(True, marks=pytest.mark.skipif(os.name == "nt", reason="needs POSIX"))]
 )
-def test_recorder_process_finishes_on_end_of_input_or_stop_command(master, tmp_path, is_told):
+def test_recorder_process_finishes_on_end_of_input_or_termination_signal(master, tmp_path, is_told):
     path = tmp_path / "a.mcap"
     child = subprocess.Popen(
         [sys.executable, "-m", "nep.recordings.child", "--master", master.address],

@@ -83,7 +83,7 @@ def test_unreadable_file_raises_and_other_files_stay_readable(
         assert next(whole.read())
 
 
-def test_crashed_reader_process_raises_and_the_next_open_starts_another(path: Path) -> None:
+def test_crashed_reader_process_raises_and_the_next_open_starts_a_new_process(path: Path) -> None:
     with ReaderProcess(DIES) as reader:
         for _again in range(2):
             with pytest.raises(RecordingError, match=r"a\.mcap': .*process"):
@@ -123,7 +123,7 @@ def test_closing_the_reader_process_ends_pending_calls(path: Path) -> None:
 NepErrors = (ClosedError, RecordingError)
 
 
-def test_invalid_requests_receive_an_error_reply() -> None:
+def test_malformed_reader_requests_receive_an_error_reply() -> None:
     service = RecordingService(lambda _content: None)
     for request in (
         {},

@@ -189,7 +189,7 @@ def test_recordings_of_other_programs_are_repaired(tmp_path):
         assert not [each for each in McapDoctor(report.path).problems if "earlier" not in each]
 
 
-def test_unusual_messages_survive_a_repair(tmp_path):
+def test_extreme_and_malformed_messages_survive_a_repair(tmp_path):
     record(tmp_path / "a.mcap", [odd_messages(), odd_messages()])
     (tmp_path / "b.mcap").write_bytes((tmp_path / "a.mcap").read_bytes()[:-100])
     assert read(repair(tmp_path / "b.mcap").path) == read(tmp_path / "a.mcap")

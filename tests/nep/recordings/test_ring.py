@@ -122,7 +122,7 @@ def test_segments_of_dead_processes_are_removed_and_segments_of_live_processes_k
     assert all(each.exists() for each in others)
 
 
-def test_invalid_flight_recorder_requests_raise_errors(tmp_path):
+def test_flight_recorder_raises_for_invalid_limits_existing_files_and_damaged_segments(tmp_path):
     with pytest.raises(ValueError, match="greater than 0"):
         FlightRecorder(tmp_path, seconds=0.0)
     with pytest.raises(ValueError, match="greater than 0"):

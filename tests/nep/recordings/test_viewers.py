@@ -184,7 +184,7 @@ def test_viewer_reads_all_supported_encodings(made: Made, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_viewer_shows_json_topic_with_some_invalid_messages(order: int, tmp_path: Path) -> None:
+def test_viewer_shows_json_topic_with_some_undecodable_messages(order: int, tmp_path: Path) -> None:
     whole = json_message(1)
     broken = Message("/odom", b"{", "json", "json", stamp_ns=START_NS, seq=2, publisher=7)
     record(tmp_path / "a.mcap", [[whole, broken][::order]])

@@ -49,7 +49,7 @@ def test_later_robot_is_protected_on_every_topic_of_its_description(network: str
     guard.close()
 
 
-def test_allowed_robots_and_topics_are_not_rejected(network: str, node: nep.Node) -> None:
+def test_allowed_robots_and_topics_are_not_denied(network: str, node: nep.Node) -> None:
     with nep.node("robot", "memory", master=network) as robot:
         describe(robot, "Rover", "/orders")
         describe(robot, "Fido", "/orders")

@@ -132,7 +132,7 @@ def test_call_waits_for_its_server_to_start(make: Make) -> None:
     assert future.result(LONG_S) == {"n": 2}
 
 
-def test_concurrent_calls_of_several_clients(make: Make) -> None:
+def test_concurrent_calls_of_several_clients_receive_their_replies(make: Make) -> None:
     server = make("server").new_server("/double", doubled, threads=2)
     clients = [make(f"client{n}").new_client("/double", timeout_s=LONG_S) for n in range(4)]
     futures = {each.call_async({"n": n}): n for n in range(50) for each in clients}
@@ -282,7 +282,7 @@ def test_call_without_a_server_raises_no_server_error_with_a_suggestion(register
         client.call_async({}, timeout_s=0).result(LONG_S)
 
 
-def test_slow_server_raises_service_timeout_and_its_late_reply_is_dropped(make: Make) -> None:
+def test_slow_server_raises_service_timeout_and_its_late_reply_is_discarded(make: Make) -> None:
     go_on = threading.Event()
     server = make("server").new_server("/slow", lambda request: go_on.wait(LONG_S) and {}, threads=1)
     client = make("client").new_client("/slow")
@@ -454,7 +454,7 @@ def test_callback_that_calls_its_own_single_threaded_server_times_out(make: Make
     assert two.call(1) == "done"
 
 
-def test_fifty_concurrent_clients(make: Make) -> None:
+def test_fifty_concurrent_clients_receive_their_replies(make: Make) -> None:
     server = make("server").new_server("/echo", lambda request: request, threads=4)
     node = make("callers")
     clients = [node.new_client("/echo", timeout_s=LONG_S) for _ in range(50)]
@@ -463,7 +463,7 @@ def test_fifty_concurrent_clients(make: Make) -> None:
     assert (server.calls, server.errors, server.refused) == (1000, 0, 0)
 
 
-def test_listen_info_and_send_info_work_as_in_the_original_nep(make: Make) -> None:
+def test_listen_info_and_send_info_alternate_and_raise_when_called_out_of_order(make: Make) -> None:
     server = make("server").new_server("/x")
     client = make("client").new_client("/x", timeout_s=LONG_S)
     assert server.listen_info(timeout_s=0) is None
@@ -553,7 +553,7 @@ def test_callback_that_returns_futures_replies_in_any_order(make: Make) -> None:
             call.result(LONG_S)
 
 
-def test_service_name_of_maximum_length_works(make: Make) -> None:
+def test_service_name_of_maximum_length_can_be_called(make: Make) -> None:
     name = "x" * 188
     make("server").new_server(name, doubled, threads=1)
     assert make("client").new_client(name).call({"n": 1}, timeout_s=LONG_S) == {"n": 2}

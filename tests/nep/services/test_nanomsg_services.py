@@ -142,7 +142,7 @@ def test_server_death_during_a_call_is_reported_immediately(node: nep.Node, port
         assert client.call({}) == {"pid": program.process.pid}
 
 
-def test_original_wire_errors_are_sent_as_replies(node: nep.Node, port: int) -> None:
+def test_server_exceptions_are_sent_as_replies_on_the_original_wire(node: nep.Node, port: int) -> None:
     def answer(request):
         raise LookupError("no map")
 
@@ -186,7 +186,7 @@ def test_threads_of_timed_out_calls_are_bounded(node: nep.Node, port: int) -> No
     eventually(lambda: not client._transport._threads)
 
 
-def test_invalid_nanomsg_service_requests_are_rejected(node: nep.Node, port: int) -> None:
+def test_nanomsg_services_reject_a_port_in_use_other_codecs_and_closed_nodes(node: nep.Node, port: int) -> None:
     at = node.direct("127.0.0.1", port)
     with node.new_server("/x", lambda request: request, at), pytest.raises(nep.AddressInUseError):
         node.new_server("/x", lambda request: request, at)

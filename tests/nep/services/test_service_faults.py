@@ -65,7 +65,7 @@ def test_call_made_after_server_death_waits_for_a_new_server(client) -> None:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
-def test_suspended_server_answers_pending_calls_after_resuming(client) -> None:
+def test_suspended_server_replies_to_pending_calls_after_resuming(client) -> None:
     with running(SERVER) as program:
         assert program.line() == "ready"
         client.call({})
@@ -79,7 +79,7 @@ def test_suspended_server_answers_pending_calls_after_resuming(client) -> None:
 
 @pytest.mark.parametrize("is_late", [False, True], ids=["before it is unlisted", "after that"])
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
-def test_server_suspended_during_a_call_is_replaced_by_another(master: Master, client, is_late: bool) -> None:
+def test_server_suspended_during_a_call_is_replaced_by_another_server(master: Master, client, is_late: bool) -> None:
     with running(SERVER) as program, nep.node("other") as other:
         assert program.line() == "ready"
         waiting = client.call_async("hang", timeout_s=None)
@@ -197,7 +197,7 @@ def test_many_malformed_calls_do_not_block_the_next_valid_call(master: Master) -
         [b"\2\2\1\0\0\0\0\0" + (1).to_bytes(8, "little"), b"{}"],  # of a later version
     ],
 )
-def test_malformed_reply_raises_service_timeout(master: Master, client, answer) -> None:
+def test_malformed_or_unmatched_reply_raises_service_timeout(master: Master, client, answer) -> None:
     with _fake_server(master, lambda parts: [answer]), pytest.raises(nep.ServiceTimeoutError):
         client.call({}, timeout_s=1.0)
 
@@ -213,7 +213,7 @@ def test_malformed_reply_raises_service_timeout(master: Master, client, answer) 
         (4, 1, b"", nep.RequestRefusedError),
     ],
 )
-def test_invalid_reply_raises_a_nep_error(master: Master, client, kind, codec, data, error) -> None:
+def test_reply_with_undecodable_payload_or_error_raises_a_nep_error(master: Master, client, kind, codec, data, error) -> None:
     def answer(parts):
         return [[bytes([1, kind, codec, 0, 0, 0, 0, 0]) + parts[0][8:], data]]
 

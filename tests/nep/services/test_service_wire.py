@@ -58,7 +58,7 @@ def test_calls_and_replies_match_the_vectors(vector: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("vector", [each for each in VECTORS if "error" in each], ids=name_of)
-def test_malformed_parts_are_rejected_with_their_error_code(
+def test_malformed_service_messages_are_rejected_with_their_error_code(
     vector: dict[str, Any], stream: tuple[TcpStream, socket.socket]
 ) -> None:
     if "parts" in vector:

@@ -117,7 +117,7 @@ def test_failing_respondent_is_counted_and_gives_no_reply(
     assert "a respondent of '/who' failed (1 so far): LookupError: no eyes" in caplog.text
 
 
-def test_concurrent_surveys_of_several_surveyors_and_threads(make: Make) -> None:
+def test_concurrent_surveys_of_several_surveyors_and_threads_receive_all_replies(make: Make) -> None:
     respond(make, *range(5))
     surveyors = [make(f"surveyor {n}").new_surveyor("/who", LONG_MS) for n in range(3)]
     counts: list[int] = []
@@ -231,7 +231,7 @@ def test_survey_and_service_of_the_same_name_are_independent(make: Make) -> None
             make_one("survey:/who")
 
 
-def test_survey_with_large_reply_and_bytes(make: Make) -> None:
+def test_survey_returns_large_replies_and_bytes(make: Make) -> None:
     make("large").new_respondent("/who", lambda _question: b"\0" * 8_000_000, threads=1)
     surveyor = make("surveyor").new_surveyor("/who", LONG_MS, msg_type="msgpack")
     assert surveyor.ask(b"\xff") == [b"\0" * 8_000_000]

@@ -147,7 +147,7 @@ def test_incomplete_call_at_end_of_connection_is_counted(node: nep.Node, port: i
     assert server.calls == 0
 
 
-def test_malformed_calls_are_counted_and_the_next_call_is_answered(node: nep.Node, port: int) -> None:
+def test_malformed_calls_are_counted_and_the_next_call_receives_a_reply(node: nep.Node, port: int) -> None:
     server = serve(node, port)
     with Program(port) as program:
         for _ in range(250):
@@ -191,7 +191,7 @@ def test_killed_server_is_reported_immediately(node: nep.Node, port: int) -> Non
         (struct.pack("<IBBHIQ", 16, 1, 2, 1, 0, 1), nep.DecodeError),
     ],
 )
-def test_malformed_reply_raises_a_nep_error(node: nep.Node, port: int, said, error) -> None:
+def test_malformed_or_unmatched_plain_tcp_reply_raises_a_nep_error(node: nep.Node, port: int, said, error) -> None:
     with socket.create_server(("127.0.0.1", port)) as listener:
         client = node.new_client("/x", node.direct("127.0.0.1", port, wire="tcp"))
         future = client.call_async({}, timeout_s=1.0 if error is nep.ServiceTimeoutError else LONG_S)

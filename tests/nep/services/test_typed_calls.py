@@ -86,7 +86,7 @@ def test_typed_call_sends_and_returns_instances(make: Make) -> None:
     assert asyncio.run(client.acall(way)) == Length(5.0, ["home"])
 
 
-def test_typed_call_over_msgpack(make: Make) -> None:
+def test_typed_requests_and_replies_are_exchanged_over_msgpack(make: Make) -> None:
     make("server").new_server("/length", length_of, threads=1, request=Way, answer=Length)
     client = make("client").new_client("/length", msg_type="msgpack", request=Way, answer=Length)
     assert client.call(Way([Point(1), Point(2)])) == Length(1.0, [""])
@@ -126,7 +126,7 @@ def test_mismatched_request_is_rejected_before_the_callback(
 
 
 @pytest.mark.parametrize("given", [{"points": []}, None, 5, Length(1.0), Way([Point("left")])])  # type: ignore[arg-type]
-def test_request_of_another_type_is_not_sent(memory: nep.Node, given: object) -> None:
+def test_request_that_mismatches_the_declared_type_is_not_sent(memory: nep.Node, given: object) -> None:
     server = memory.new_server("/a", lambda request: request, threads=1)
     client = memory.new_client("/a", request=Way)
     with pytest.raises(EncodeError):
@@ -135,7 +135,7 @@ def test_request_of_another_type_is_not_sent(memory: nep.Node, given: object) ->
 
 
 @pytest.mark.parametrize("answer", [None, {"metres": 1.0}, 5, Length("far")])  # type: ignore[arg-type]
-def test_reply_of_another_type_is_a_service_error(memory: nep.Node, answer: object) -> None:
+def test_reply_that_mismatches_the_declared_type_is_a_service_error(memory: nep.Node, answer: object) -> None:
     server = memory.new_server("/a", lambda _request: answer, threads=1, answer=Length)
     with pytest.raises(ServiceError) as caught:
         memory.new_client("/a").call({})
@@ -152,7 +152,7 @@ def test_mismatched_reply_raises_decode_error(memory: nep.Node) -> None:
         client.call_async({}).result(30.0)
 
 
-def test_none_without_a_reply_type_is_an_empty_map(memory: nep.Node) -> None:
+def test_callback_result_none_without_a_reply_type_is_sent_as_an_empty_map(memory: nep.Node) -> None:
     memory.new_server("/a", lambda _request: None, threads=1, request=Way)
     assert memory.new_client("/a").call({"points": []}) == {}
 
@@ -168,7 +168,7 @@ def test_typed_dict_requests_and_replies_are_maps(memory: nep.Node) -> None:
         client.call({"nam": "Pepper"})
 
 
-def test_original_style_calls_support_types(memory: nep.Node) -> None:
+def test_send_info_and_listen_info_support_typed_requests_and_replies(memory: nep.Node) -> None:
     server = memory.new_server("/a", request=Way, answer=Length)
     client = memory.new_client("/a", request=Way, answer=Length)
     client.send_info(Way([]))
@@ -190,7 +190,7 @@ def test_mismatched_original_style_request_is_rejected_and_the_next_request_is_r
         bad.result(30.0)
 
 
-def test_surveys_support_types(memory: nep.Node) -> None:
+def test_surveys_support_typed_questions_and_replies(memory: nep.Node) -> None:
     memory.new_respondent("/who", lambda asked: {"name": "a", "age": len(asked)}, threads=1, question=Asked)
     memory.new_respondent("/who", lambda _asked: {"name": "b", "age": "old"}, threads=1)
     surveyor = memory.new_surveyor("/who", 30_000, question=Asked, answer=Told)
@@ -201,7 +201,7 @@ def test_surveys_support_types(memory: nep.Node) -> None:
 
 
 @pytest.mark.parametrize("kind", [int, dict, list[int], "Way", 5, Way([])])
-def test_unsupported_types_of_calls_are_rejected(memory: nep.Node, kind: Any) -> None:
+def test_unsupported_request_and_reply_types_are_rejected(memory: nep.Node, kind: Any) -> None:
     with pytest.raises(ValueError, match=r"dataclass|neither"):
         memory.new_server("/a", length_of, request=kind)
     with pytest.raises(ValueError, match=r"dataclass|neither"):

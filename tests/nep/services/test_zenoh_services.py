@@ -112,7 +112,7 @@ def test_server_death_during_a_call_is_reported_immediately(make: Make, place: s
         assert waiting.result(LONG_S) == {"pid": program.process.pid}
 
 
-def test_calls_and_server_death_through_a_router(make: Make, routed: str) -> None:
+def test_calls_succeed_and_server_death_is_reported_through_a_router(make: Make, routed: str) -> None:
     client = make("client", routed).new_client("/x", timeout_s=LONG_S)
     with running(SERVER, routed) as program:
         program.line()
@@ -127,7 +127,7 @@ def test_calls_and_server_death_through_a_router(make: Make, routed: str) -> Non
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
-def test_suspended_server_answers_pending_calls_after_resuming(make: Make, place: str) -> None:
+def test_suspended_server_replies_to_pending_calls_after_resuming(make: Make, place: str) -> None:
     client = make("client").new_client("/x", timeout_s=LONG_S)
     with running(SERVER, place) as program:
         program.line()

@@ -63,25 +63,25 @@ def test_removed_program_keeps_its_modules(held) -> None:
     assert made_by(held.archive, "late") == "old late"
 
 
-def test_import_from_a_removed_program_exits_without_hold_code(program) -> None:
+def test_import_from_a_removed_program_exits_if_the_archive_is_not_kept_open(program) -> None:
     program.file.unlink()
     with pytest.raises(SystemExit):
         program.archive.extract("late")
 
 
-def test_hold_code_ignores_a_program_already_removed(program) -> None:
+def test_keep_archive_open_ignores_a_program_already_removed(program) -> None:
     program.file.unlink()
     assert not keep_archive_open()
     assert program.archive._filename == str(program.file)
 
 
-def test_hold_code_has_no_effect_when_running_from_source(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_keep_archive_open_has_no_effect_when_running_from_source(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, LOADER_MODULE, raising=False)
     assert not keep_archive_open()
 
 
 @only_linux
-def test_packaged_entry_programs_call_hold_code_before_importing_main() -> None:
+def test_packaged_entry_programs_keep_the_archive_open_before_importing_main() -> None:
     entries = Path(__file__).resolve().parents[3] / "installers" / "entries"
     for entry in sorted(entries.glob("*_program.py")):
         lines = entry.read_text("utf-8").splitlines()

@@ -50,7 +50,7 @@ def test_inbox_keeps_the_newest_messages_within_both_limits(
     assert inbox.pop() is None
 
 
-def test_inbox_of_the_latest_message_counts_no_drops() -> None:
+def test_inbox_that_keeps_only_the_latest_message_counts_no_drops() -> None:
     inbox = Inbox("latest")
     assert [inbox.put(message(n)) for n in range(3)] == [0, 0, 0]
     assert [each.seq for each in inbox.pop_all()] == [2]
@@ -77,7 +77,7 @@ def test_loss_counting_starts_at_the_first_message_without_an_echo() -> None:
     assert (sources.received, sources.lost) == (1, 0)
 
 
-def test_repeated_latched_message_is_dropped() -> None:
+def test_repeated_latched_message_is_discarded() -> None:
     sources = PublisherTracker()
     assert sources.count_message(1, 5, is_alone=True)
     assert not sources.count_message(1, 5, is_alone=True)
@@ -284,7 +284,7 @@ def test_did_you_mean_suggests_a_similar_name() -> None:
     assert did_you_mean("xyz", ["json", "string"]) == "known names: 'json', 'string'"
 
 
-def test_invalid_node_names_are_rejected() -> None:
+def test_node_names_outside_1_to_200_bytes_are_rejected() -> None:
     for name in ("", "x" * 201):
         with pytest.raises(nep.BadNameError, match=f"the name is {len(name)} bytes; 1 to 200"):
             nep.node(name)

@@ -58,7 +58,7 @@ def test_node_name_length_is_1_to_200_bytes() -> None:
 
 
 @pytest.mark.parametrize("name", ["a\x1b[2J", "a\nb", "a\u202eb", "\x9b2J", "x" * 201], ids=repr)
-def test_node_with_an_invalid_name_is_not_created(name: str) -> None:
+def test_node_with_control_characters_or_a_too_long_name_is_not_created(name: str) -> None:
     with pytest.raises(ValueError, match="node"):
         nep.node(name, "memory")
 

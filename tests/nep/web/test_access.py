@@ -76,7 +76,7 @@ def signed(token: str, time_s: int, end_s: int, rand: str = "r") -> Auth:
     return Auth(None, hashlib.sha512(text.encode()).hexdigest(), "c", "d", rand, time_s, "user", end_s)
 
 
-def test_auth_is_accepted_once_and_for_a_limited_time() -> None:
+def test_auth_signature_is_accepted_once_and_for_a_limited_time() -> None:
     check = AuthVerifier("s3cret", clock=lambda: 1_000.0)
     assert check.verify(signed("s3cret", 1_001, 2_000))
     assert not check.verify(signed("s3cret", 1_001, 2_000))

@@ -214,7 +214,7 @@ def test_msgpack_is_sent_as_json(foxglove: WebServer, node: nep.Node) -> None:
         assert json.loads(message_of(client)[1]) == {"data": "YWJj", "n": 2**60}
 
 
-def test_invalid_messages_are_answered_and_the_client_stays_connected(foxglove: WebServer) -> None:
+def test_invalid_messages_receive_an_error_status_and_the_client_stays_connected(foxglove: WebServer) -> None:
     channel = {"id": 1, "topic": "/a", "encoding": "json", "schemaName": "x/Y"}
     wrong = [
         b"", b"[1]", b"\x01", b"\x01\xff\xff\xff\xff[", b"\x02\x00\x00", b"\x07", b"\xff\xfe", b"[" * 9_000,
@@ -237,7 +237,7 @@ def test_invalid_messages_are_answered_and_the_client_stays_connected(foxglove: 
         assert foxglove.counts.rejected == len(wrong)
 
 
-def test_client_that_stops_reading_loses_images_without_affecting_others(
+def test_images_for_a_client_that_stops_reading_are_dropped_without_affecting_others(
     foxglove: WebServer, node: nep.Node
 ) -> None:
     camera = node.new_pub("/camera", "image")
@@ -269,7 +269,7 @@ def test_client_that_stops_reading_loses_images_without_affecting_others(
         slow.socket.shutdown(socket.SHUT_RDWR)
 
 
-def test_page_of_another_origin_is_rejected(foxglove: WebServer) -> None:
+def test_page_of_a_disallowed_origin_is_rejected(foxglove: WebServer) -> None:
     options = {"origin": "https://evil.example", "subprotocols": ["foxglove.sdk.v1"]}
     with pytest.raises(InvalidStatus) as refused, connect(foxglove.url, **options):
         pass

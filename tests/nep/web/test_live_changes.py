@@ -72,7 +72,7 @@ def test_new_token_disconnects_all_clients_with_the_old_token(server: WebServer,
     assert [each.kind for each in server.rejections] == ["token", "token"]
 
 
-def test_server_for_other_computers_keeps_its_token(master: Master) -> None:
+def test_token_of_a_server_for_other_computers_cannot_be_removed(master: Master) -> None:
     server = WebServer(WebSettings(listen=("0.0.0.0",), access=Access(token="a-token-of-some-letters")))
     with pytest.raises(NepError):
         server.set_access(Access())

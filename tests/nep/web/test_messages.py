@@ -57,7 +57,7 @@ def test_string_is_converted_to_and_from_a_data_field() -> None:
         from_ros({"data": 1}, "std_msgs/String", "string")
 
 
-def test_plain_json_is_unchanged() -> None:
+def test_json_payload_is_sent_unchanged_and_nan_as_null() -> None:
     text = b'{"z": 1.50, "a": [1, {"b": null}]}'
     made = message("json", None, Encoded(text))
     (frame,) = publish_frames("/t", made, EncodingOptions())
@@ -108,7 +108,7 @@ def test_cbor_has_typed_arrays_for_array_types() -> None:
     assert sent(message("json", {"ranges": [1.0]}), "cbor") == {"ranges": [1.0]}
 
 
-def test_cbor_raw_is_the_ros_message() -> None:
+def test_cbor_raw_contains_the_serialized_ros_message() -> None:
     twist = message("geometry_msgs/Twist", {"linear": {"x": 2.0}})
     raw = sent(twist, "cbor-raw")
     assert (raw["secs"], raw["nsecs"]) == (1, 500_000_002)
@@ -119,7 +119,7 @@ def test_cbor_raw_is_the_ros_message() -> None:
     assert sent(message("string", "hi"), "cbor-raw")["bytes"] == b"\x02\0\0\0hi"
 
 
-def test_png_holds_the_text_and_large_texts_are_rejected() -> None:
+def test_png_round_trip_preserves_the_text_and_invalid_or_large_png_is_rejected() -> None:
     for text in (b"{}", json.dumps({"x": "é" * 999}).encode()):
         assert decode_png(encode_png(text)) == text
     packed = json.loads(publish_frames("/t", message("json", {"a": 1}), EncodingOptions("png"))[0].data)
@@ -153,7 +153,7 @@ def test_reply_that_cannot_be_encoded_as_json_is_rejected() -> None:
         operation_frames({"op": "service_response", "values": {"x": object()}}, EncodingOptions())
 
 
-def test_definitions_have_the_fields_of_nep_types() -> None:
+def test_ros_type_definitions_have_the_fields_of_nep_types() -> None:
     for module in (geometry, sensor):
         for name in module.__all__:
             kind = getattr(module, name)

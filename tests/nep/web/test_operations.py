@@ -74,7 +74,7 @@ def test_mutated_operations_raise_only_operation_errors() -> None:
         refusal(bytes(text))
 
 
-def test_operation_beyond_a_limit_is_rejected_before_parsing() -> None:
+def test_operation_beyond_limits_or_on_internal_topics_is_rejected() -> None:
     for data in (
         b'"' + b"x" * MAX_MESSAGE_BYTES + b'"',
         b"[" * 1_000 + b"]" * 1_000,
@@ -113,7 +113,7 @@ def test_fragments_are_joined_in_any_order() -> None:
     assert len(buffer) == 0
 
 
-def test_incomplete_operations_are_bounded() -> None:
+def test_number_and_size_of_incomplete_operations_are_bounded() -> None:
     buffer = FragmentBuffer()
     for number in range(3 * MAX_FRAGMENTED_OPERATIONS):
         buffer.add(part(f"f{number}", "x", 0, 2))

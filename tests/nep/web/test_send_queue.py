@@ -28,7 +28,7 @@ def numbers(source: Feed) -> list[int | None]:
     return [source.pop(0.0).seq for _left in range(len(source))]
 
 
-def test_slow_page_loses_the_oldest_messages() -> None:
+def test_oldest_messages_of_a_slow_page_are_dropped() -> None:
     slow = feed(queue_length=3)
     for number in range(10):
         slow.add(message(number))
@@ -54,7 +54,7 @@ def test_throttled_subscription_keeps_the_newest_message() -> None:
     assert slow.next_at == 100.5
 
 
-def test_subscriptions_of_a_page_are_combined() -> None:
+def test_subscriptions_of_a_page_to_one_topic_are_combined() -> None:
     both = feed(throttle_s=0.5, queue_length=2, fragment_size=900, compression="png")
     both.subscribe(Subscribe("t", "/t", "", 0.1, 5, 300, "cbor"), as_pixels=False)
     assert (both.form.compression, both.form.fragment_size) == ("cbor", 300)
@@ -100,7 +100,7 @@ def test_topics_are_sent_round_robin_after_other_operations() -> None:
     assert asyncio.run(drain()) == [b"status", 0, 9, 1, 2]
 
 
-def test_page_that_does_not_read_replies_is_closed_once() -> None:
+def test_page_that_does_not_read_replies_is_disconnected_once() -> None:
     async def fill() -> int:
         ended: list[bool] = []
         waiting = SendQueue(lambda: 0.0, lambda: ended.append(True))

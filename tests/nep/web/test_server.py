@@ -70,7 +70,7 @@ def test_latched_message_of_a_page_reaches_late_subscribers(node: nep.Node, page
     assert node.new_sub("/map").listen(timeout_s=30) == (True, {"cells": [1, 2]})
 
 
-def test_page_calls_services_and_serves_them(node: nep.Node, page: Peer, open_page: Open) -> None:
+def test_page_calls_and_serves_services(node: nep.Node, page: Peer, open_page: Open) -> None:
     node.new_server("/add", lambda given: {"sum": given["a"] + given["b"]}, threads=1)
     assert page.call("/add", a=1, b=2)["values"] == {"sum": 3}
     failed = page.call("/add", a=1)
@@ -172,7 +172,7 @@ def test_page_moves_an_allowed_robot(master: Master, node: nep.Node) -> None:
 # ---- refused operations
 
 
-def test_invalid_operations_are_answered_and_the_page_stays_connected(
+def test_invalid_operations_receive_an_error_status_and_the_page_stays_connected(
     server: WebServer, node: nep.Node, page: Peer
 ) -> None:
     node.new_pub("/picture", "image")
@@ -249,7 +249,7 @@ def test_page_that_does_not_read_does_not_affect_other_pages(
     assert server.counts.dropped + len(got) == 60
 
 
-def test_other_origins_are_rejected_before_a_page_is_created(server: WebServer) -> None:
+def test_connection_of_a_disallowed_origin_is_rejected_before_a_page_is_created(server: WebServer) -> None:
     for origin in ("http://evil.example", "null"):
         with pytest.raises(InvalidStatus) as refused, connect(server.url, origin=origin):
             pass

@@ -59,7 +59,7 @@ def test_unresponsive_connections_do_not_delay_shutdown(server: WebServer, node:
     assert server.pages == ()
 
 
-def test_page_that_never_reads_is_disconnected(server: WebServer, node: nep.Node) -> None:
+def test_page_that_never_reads_can_be_disconnected(server: WebServer, node: nep.Node) -> None:
     with page_that_never_reads(server.url, node):
         eventually(lambda: len(server.pages) == 2)
         server.disconnect(server.pages[0].id)

@@ -108,7 +108,7 @@ def test_timeout_starts_when_the_action_runs_and_not_while_queued(turtle) -> Non
     assert ears.final("2")["state"] == "succeeded"
 
 
-def test_heartbeat_is_sent_while_an_action_runs_or_waits(turtle) -> None:
+def test_heartbeat_is_sent_only_while_an_action_runs(turtle) -> None:
     body, ears, clock = turtle
 
     def beats() -> int:

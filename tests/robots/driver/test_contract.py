@@ -283,7 +283,7 @@ def test_stop_action_stops_the_robot(bench) -> None:
     assert bench.ears.final(started)["state"] == "canceled"
 
 
-def test_stop_that_ends_a_program_rejects_its_later_commands(bench) -> None:
+def test_stop_that_ends_a_program_cancels_its_later_commands(bench) -> None:
     bench.ears.command(id=bench.new_id(), op="stop", ends="the key of a program")
     late = bench.invoke(bench.any_action(), program_of("the key of a program"))
     assert bench.ears.final(late)["state"] == "canceled"
@@ -456,7 +456,7 @@ def test_duplicate_command_runs_once(bench) -> None:
 # ---- its life --------------------------------------------------------------------------------------
 
 
-def test_close_answers_open_actions_and_leaves_no_thread(kind) -> None:
+def test_close_cancels_the_running_action_and_leaves_no_thread(kind) -> None:
     name = f"Closing {kind.model}"
     with at_its_start(kind, name) as bench:  # closes it once more
         ears = bench.ears
@@ -470,7 +470,7 @@ def test_close_answers_open_actions_and_leaves_no_thread(kind) -> None:
     assert [t.name for t in threading.enumerate() if t.name.startswith(name)] == []
 
 
-def test_all_described_actions_succeed_with_the_real_clock(kind) -> None:
+def test_actions_that_use_different_parts_succeed_concurrently_with_the_real_clock(kind) -> None:
     """Actions that use different parts of the robot run at the same time."""
     with at_its_start(kind, f"Real_{kind.model}", real_clock=True) as bench:
         robot, ears = bench.robot, bench.ears

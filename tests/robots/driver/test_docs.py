@@ -32,7 +32,7 @@ def rover(monkeypatch):
     return module.ROBOT
 
 
-def test_documented_driver_listing_works(rover, node):
+def test_documented_driver_executes_actions_and_stops(rover, node):
     assert parse(dict(rover.thing_model)).action("drive").text == "%robot drive %distance m"
     with nep.node("listener", "memory") as other:
         ears = Ears(other, "Fido")

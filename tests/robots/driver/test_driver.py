@@ -16,7 +16,7 @@ from app.robots.kit import Failed
 from tests.robots.conftest import TURTLE, Ears, eventually
 
 
-def test_late_subscriber_receives_the_description(turtle, node):
+def test_late_subscriber_receives_the_description_and_the_rize_ready_message(turtle, node):
     _, _, _ = turtle
     with nep.node("late", "memory") as late:
         message = late.new_sub("/Turtle/description", "robot/description").receive(30.0)
@@ -267,7 +267,7 @@ def test_hanging_stop_is_reported_to_each_caller_and_commands_are_rejected(turtl
     assert ears.final("2")["state"] == "succeeded"
 
 
-def test_stop_answer_timeout_is_at_most_half_of_the_studio_timeout():
+def test_stop_reply_timeout_is_at_most_half_of_the_studio_timeout():
     assert 0 < STOP_REPLY_TIMEOUT_S <= STOP_TIMEOUT_S / 2
 
 

@@ -147,7 +147,7 @@ def test_commands_received_before_a_stop_are_not_run_after_the_stop(busy, how):
     eventually(lambda: ears.invoke("after", "light") or "succeeded" in ears.states("after"))
 
 
-def test_command_after_a_stop_in_the_same_batch_is_run(turtle):
+def test_command_after_a_stop_is_run(turtle):
     body, ears, _clock = turtle
     ears.command(id="s", op="stop")
     assert ears.final("s", "stop")["state"] == "succeeded"
@@ -251,7 +251,7 @@ def test_exception_in_a_queued_call_is_counted_and_the_next_call_runs(node, erro
         assert other.final("1")["state"] == "succeeded"
 
 
-def test_answer_callback_that_raises_does_not_block_other_stop_answers(node):
+def test_reply_callback_that_raises_does_not_block_other_stop_replies(node):
     with Driver(TURTLE, "Other", node) as driver:
         told: list[object] = []
 

@@ -170,7 +170,7 @@ if __name__ == "__main__":
 """
 
 
-def test_driver_with_a_full_output_pipe_answers_and_exits(network, tmp_path):
+def test_driver_with_a_full_output_pipe_replies_and_exits(network, tmp_path):
     """The pipe holds 64 kB and is not read; a terminal paused with Ctrl+S holds less."""
     (tmp_path / "box.py").write_text(CHATTERBOX, encoding="utf-8")
     process = start(str(tmp_path / "box.py"), network=network)
@@ -251,7 +251,7 @@ TYPES = {
     ],
     ids=["works", "types"],
 )
-def test_declared_actions_return_the_declared_results(network, tmp_path, functions, given, answers):
+def test_typed_actions_return_their_results_or_fail_and_stop_still_succeeds(network, tmp_path, functions, given, answers):
     """The actions are called over the network; a Stop afterwards must be answered in any case."""
     actions = "".join(
         f'{DO}    {head}:\n        """What the test says."""\n        {body}\n'

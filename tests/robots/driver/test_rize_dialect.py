@@ -74,7 +74,7 @@ def test_stop_command_has_the_fields_that_older_drivers_read(robot):
     assert stop.keys() == action.keys()  # drivers that do not know a cancel read what every action has
 
 
-def test_rize_answers_are_parsed(robot):
+def test_rize_replies_are_parsed(robot):
     sent = rize.to_command(robot, "say", {"text": "hello"}, "1")
     good = rize.from_reply({**sent, "state": "success"})
     assert (good["id"], good["op"], good["state"], good["error"]) == ("1", "invoke", "succeeded", None)
@@ -167,7 +167,7 @@ def test_rize_receives_its_command_back_with_the_result(speaker):
     assert [each for each in speaker.ears.heard["answer"] if each["op"] != "alive"] == []
 
 
-def test_several_primitives_are_answered_once_with_text_numbers_and_named_inputs(speaker):
+def test_several_primitives_with_numbers_as_text_and_named_inputs_are_answered_once(speaker):
     speaker.let()
     command = speaker.command(speaker.several)
     assert speaker.answered() == [{**command, "state": "success"}]
@@ -255,7 +255,7 @@ def test_driver_kit_runs_a_list_of_primitives_in_parallel(turtle):
     assert ears.heard["action_state"][0]["primitives"] == [SAY, wait]
 
 
-def test_virtual_robot_walks_backwards(pepper):
+def test_rize_walk_command_moves_the_virtual_robot_backwards(pepper):
     walk = primitive("walk", "backwards", {"meters": 0.1})
     pepper.rize(
         {"node": "action", "primitives": walk, "robots": "Pepper", "state": "idle", "times": 0, "id": "2"}

@@ -239,7 +239,7 @@ def test_values_round_trip_between_json_and_python(kind, json, python):
         (object, object(), "the value must be a JSON value, not object"),
     ],
 )
-def test_value_of_another_type_is_rejected_with_a_message(kind, value, sentence):
+def test_value_that_mismatches_the_declared_type_is_rejected_with_a_message(kind, value, sentence):
     with pytest.raises(RobotValueError) as caught:
         to_json(kind, value)
     assert str(caught.value) == sentence
@@ -402,7 +402,7 @@ def test_return_value_of_a_function_is_the_output(arm, asked, returned, output):
         ("anything", {"a": ["\ud800"]}, "the value must be valid Unicode text"),
     ],
 )
-def test_return_value_of_another_type_is_a_failure(arm, asked, returned, why):
+def test_return_value_that_mismatches_the_declared_type_is_a_failure(arm, asked, returned, why):
     body, ears = arm
     body.gives = returned
     ears.invoke("1", asked)

@@ -229,7 +229,7 @@ def test_motion_ends_exactly_at_the_requested_distance(amount, speed):
     assert total == pytest.approx(amount, abs=1e-9)
 
 
-def test_held_joint_keeps_its_angle():
+def test_stopped_joint_keeps_its_angle():
     joint = Joint(100, -10, 10)
     joint.set_target(5)
     joint.step(0.01)

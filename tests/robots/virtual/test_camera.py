@@ -111,7 +111,7 @@ def test_face_is_detected_only_while_visible(eyes):
     assert not seen(hidden)
 
 
-def test_detection_message_has_the_name_of_the_largest_detection(eyes):
+def test_detection_message_has_count_name_and_image_size_and_no_name_if_empty(eyes):
     body = Body()
     told = message(eyes.faces(body.room, lens_of(body)), lens_of(body))
     assert (told["count"], told["name"], told["width"], told["height"]) == (1, "Aiko", 320, 240)

@@ -102,7 +102,7 @@ def test_new_block_returned_to_the_toolbox_does_not_count_as_a_deletion(qtbot, v
     assert told == []
 
 
-def test_dropping_a_block_on_the_bin_deletes_the_block_and_lists_newest_first(qtbot, view, them, told):
+def test_block_dropped_on_the_bin_is_deleted_and_the_bin_lists_the_newest_first(qtbot, view, them, told):
     delete_the_hat(them)
     bin_ = centre(them, ".nepBin")
     start = them.hold("[data-id=one] > .blocklyPath")

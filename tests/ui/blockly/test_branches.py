@@ -61,7 +61,7 @@ def press_button(them: Person, number: int) -> None:
     them.click(f"[data-id=if] > [data-test='{pressed}']", dx=9, dy=9)
 
 
-def test_file_with_branches_round_trips_and_an_old_file_is_loaded(person):
+def test_branches_round_trip_and_the_if_else_block_of_older_files_is_loaded(person):
     them: Person = person(state=full())
     assert the_if(them) == full()["blocks"]["blocks"][0]["next"]["block"] | the_if(them)
     assert {"CONDITION2", "BODY2", "ELSE"} <= set(the_if(them)["inputs"])
@@ -124,7 +124,7 @@ def test_context_menu_adds_branches_with_the_keyboard_only(qtbot, view, person):
     them.press(Qt.Key_Escape)
 
 
-def test_collapsed_if_block_shows_its_branches(person):
+def test_collapsed_if_block_has_no_branch_button_labels_in_its_text(person):
     them: Person = person(state=full())
     choose(them, "if", "Collapse")
     them.wait_for("document.querySelector('[data-id=if]').classList.contains('blocklyCollapsed')")

@@ -63,7 +63,7 @@ def test_bubble_scrolls_with_its_block(qtbot, view, person) -> None:
     qtbot.waitUntil(lambda: them.box(".nepBubble > path")["bottom"] < bubble["top"] - 300, timeout=WAIT_MS)
 
 
-def test_bubble_of_a_block_below_the_toolbox_is_hidden(qtbot, view, person) -> None:
+def test_bubble_of_a_block_covered_by_the_open_flyout_is_hidden(qtbot, view, person) -> None:
     them = person(state=workspace(wait_block("w", 20, 20)))
     shown_beside(qtbot, them, view, "w")
     visible = "document.querySelector('.nepBubble').checkVisibility({visibilityProperty: true})"

@@ -267,7 +267,7 @@ def test_drag_continues_in_the_opened_tab_and_connects_to_a_script(qtbot, view, 
     assert told.deleted == []
 
 
-def test_drag_through_a_tab_leaves_the_tab_unchanged(qtbot, view, them, told) -> None:
+def test_drag_through_a_tab_changes_neither_its_program_nor_its_undo_stack(qtbot, view, them, told) -> None:
     changes: list[str] = []
     view.changed.connect(lambda key, _program: changes.append(key))
     histories: list[tuple[bool, bool]] = []
@@ -292,7 +292,7 @@ def test_drag_through_a_tab_leaves_the_tab_unchanged(qtbot, view, them, told) ->
 
 
 @pytest.mark.parametrize("how", ["outside", "toolbox", "escape"])
-def test_drag_released_elsewhere_or_cancelled_in_another_tab_restores_the_block(
+def test_drag_released_outside_or_cancelled_in_another_tab_restores_the_block(
     qtbot, view, them, told, how: str
 ) -> None:
     before = them.newest()

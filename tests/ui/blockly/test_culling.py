@@ -67,7 +67,7 @@ def test_culling_preserves_the_stacking_order(person):
     them.wait_for(order, ["under", "here", "over"])
 
 
-def test_far_script_is_rendered_after_joining_another_by_redo(person):
+def test_far_script_is_rendered_after_a_redo_joins_another_script(person):
     below = script("below", 40, 1400)
     them = person(script("here", 40, 40), below)
     them.wait_for(drawn("here", "below"), ["here"])

@@ -133,6 +133,6 @@ def test_focus_moves_to_the_connection_of_the_deleted_block(qtbot, them):
     assert [top["id"] for top in them.tops()] == ["start"]
 
 
-def test_every_block_shortcut_is_listed():
+def test_block_shortcuts_are_listed_as_fixed_shortcuts():
     listed = {key for fixed in FIXED_KEYS if fixed.scope == "Blocks" for key in fixed.key.split(", ")}
     assert {"Ctrl+D", "Ctrl+M", "Ctrl+L", "Ctrl+B", "Delete", "Alt+Down"} <= listed

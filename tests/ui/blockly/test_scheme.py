@@ -57,7 +57,7 @@ def test_missing_fonts_yield_an_empty_stylesheet(tmp_path):
     assert read_content("/fonts.css", tmp_path) == ("text/css", b"")
 
 
-def test_symlink_out_of_the_folder_is_not_followed(tmp_path):
+def test_symlink_out_of_the_bundle_folder_is_not_followed(tmp_path):
     (tmp_path / "blockly").mkdir()
     (tmp_path / "secret.txt").write_text("secret")
     (tmp_path / "blockly" / "link.txt").symlink_to(tmp_path / "secret.txt")

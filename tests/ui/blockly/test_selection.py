@@ -104,7 +104,7 @@ def test_selection_button_makes_the_next_drag_draw_one_rubber_band(them):
 
 
 @pytest.mark.parametrize("key", [Qt.ControlModifier, Qt.ShiftModifier])
-def test_modifier_click_toggles_selection_and_plain_click_clears_it(them, key):
+def test_modifier_click_toggles_selection_and_plain_click_clears_the_selection(them, key):
     click(them, "d")
     click(them, "e", key)
     click(them, "b", key)

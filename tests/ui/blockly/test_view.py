@@ -72,7 +72,7 @@ def test_open_category_stays_open_when_robots_connect(qtbot, view, person):
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
 
 
-def test_equal_definitions_cause_no_update(qtbot, view, person):
+def test_equal_definitions_or_new_topics_do_not_rebuild_the_toolbox(qtbot, view, person):
     them = person(START)
     them.ask("document.querySelector('.nepHeading').setAttribute('data-same', 'yes')")
     view.set_definitions(copy.deepcopy(DEFINITIONS))

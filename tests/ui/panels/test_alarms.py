@@ -162,7 +162,7 @@ def test_banner_shows_the_value_that_triggered_the_alarm(panel, window) -> None:
     assert "is 12, below 20" in alert.title
 
 
-def test_actions_are_added_renamed_and_removed(panel) -> None:
+def test_alarm_actions_are_added_changed_and_removed(panel) -> None:
     panel.alarms.set_rule(BELOW)
     panel.refresh()
     press(slot(panel, "add"))
@@ -233,7 +233,7 @@ def test_entering_a_limit_enables_the_alarm(panel) -> None:
     assert panel.alarms.rules[0].condition.limit == 15
 
 
-def test_history_is_filtered_and_saved(panel, tmp_path) -> None:
+def test_history_is_filtered_and_exported_as_csv(panel, tmp_path) -> None:
     record = AlarmRecord("x", "=cmd|' /C calc'!A0", panel.now_s() - 60, 4.0, count=2)
     record.add(ActionResult("call", "restart replied"))
     panel.alarms.history.add(record)

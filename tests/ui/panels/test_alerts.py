@@ -45,7 +45,7 @@ def test_alerts_are_sorted_by_severity_and_disappear_when_resolved(panel, window
     assert panel.chip.text == ""
 
 
-def test_dismissed_alert_stays_in_the_list(panel, window) -> None:
+def test_dismissed_alert_stays_in_the_alerts_panel(panel, window) -> None:
     rows = list(panel.rows)
     window.session.alerts.dismiss("message:/faces")
     panel.refresh()

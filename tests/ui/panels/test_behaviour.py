@@ -240,7 +240,7 @@ def test_function_keys_in_the_page_trigger_window_commands(panel, window) -> Non
     assert window.commands == ["key:F12", "key:F5"]  # the window knows what a person made of them
 
 
-def test_title_shows_name_and_save_state_of_the_behaviour(panel, window) -> None:
+def test_tab_shows_name_and_save_state_of_the_behaviour(panel, window) -> None:
     (tab,) = panel._bar.tabs.tabs.values()
     assert tab.accessibleName() == "Greeting"
     window.session.document.dirty = True

@@ -220,7 +220,7 @@ def test_esc_cancels_renaming(tabs) -> None:
     assert tabs.add.isVisible()
 
 
-def test_invalid_name_shows_the_reason_and_stays_editable(tabs) -> None:
+def test_rejected_tab_name_shows_the_reason_and_stays_editable(tabs) -> None:
     renamed = heard(tabs.renamed)
     tabs.why_not = lambda key, name: f"{key} can't be {name}" if name == "Taken" else ""
     QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)

@@ -120,7 +120,7 @@ def logged(window, level="info", text="hello", node="Pepper", name="app.robots.d
     window.session.console.add_messages([Message(LOG_TOPIC, json.dumps(given).encode(), "json", LOG_TYPE)])
 
 
-def test_log_records_of_programs_are_listed_among_the_lines(panel, window) -> None:
+def test_log_records_of_programs_are_listed_with_level_node_and_logger(panel, window) -> None:
     logged(window, "warning", "the stop command failed", file="tasks.py", line=272)
     logged(window, "debug", "a detail")
     panel.refresh()

@@ -52,7 +52,7 @@ def test_blocks_nested_below_when_started_count_and_detached_blocks_do_not() -> 
     )
 
 
-def test_malformed_behaviours_complete_no_steps() -> None:
+def test_malformed_behaviours_are_searched_for_tutorial_blocks_without_error() -> None:
     assert find_tutorial_blocks({"blocks": 3}) == TutorialBlocks()
     assert find_tutorial_blocks(
         {"blocks": {"blocks": [3, {"type": "events_started", "next": 3, "inputs": 4}]}}

@@ -557,7 +557,7 @@ def test_click_in_the_overview_moves_the_viewport(panel: GraphPanel) -> None:
     assert panel.canvas.visible_rect().contains(wanted)
 
 
-def test_card_is_placed_below_when_space_is_narrow(panel: GraphPanel, qtbot) -> None:
+def test_card_is_placed_below_the_graph_when_space_is_narrow(panel: GraphPanel, qtbot) -> None:
     panel.show_topic("/blackboard")
     panel.resize(460, 700)
     qtbot.waitUntil(lambda: panel.card.y() > panel.canvas.y())

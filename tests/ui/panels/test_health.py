@@ -96,7 +96,7 @@ def test_panel_follows_the_selected_robot_and_names_the_robot_if_several_are_con
     assert asked.session.looked_at == []
 
 
-def test_rows_are_rebuilt_for_another_text_size(panel) -> None:
+def test_health_rows_are_rebuilt_when_the_text_size_changes(panel) -> None:
     old = panel.rows[0]
     panel.theme_changed()
     panel.refresh()

@@ -9,7 +9,7 @@ def test_line_shows_offset_bytes_and_printable_characters() -> None:
     assert hex_line(memoryview(bytes(range(64))), 32, 4) == ("0020", "20 21 22 23", ' !"#')
 
 
-def test_only_visible_lines_are_painted_and_the_scroll_position_is_kept(qtbot, qapp) -> None:
+def test_new_bytes_are_painted_at_the_kept_scroll_position(qtbot, qapp) -> None:
     view = HexView(Theme("light"))
     qtbot.addWidget(view)
     view.resize(600, 200)

@@ -330,7 +330,7 @@ class Paints(QObject):
 
 
 @pytest.mark.parametrize("layout", ["behaviour", "developer"])
-def test_unchanged_items_are_not_repainted(qtbot, case: Case, layout: str) -> None:
+def test_ticks_without_changes_repaint_only_the_status_bar(qtbot, case: Case, layout: str) -> None:
     bench = case.window.show_layout(layout)
     for name in ("health", "robots", "alerts", "console"):
         bench.open(name)

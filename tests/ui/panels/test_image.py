@@ -226,7 +226,7 @@ def test_pixel_value_under_the_mouse_is_shown(qtbot, view) -> None:
     qtbot.waitUntil(lambda: "#" not in view.label_text)
 
 
-def test_image_panel_shows_the_first_image_topic_and_others_on_demand(qtbot, qapp) -> None:
+def test_image_panel_shows_the_first_image_topic_and_another_topic_on_request(qtbot, qapp) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     assert panel.subtitle() == "/robot/camera"
@@ -438,14 +438,14 @@ def test_every_action_has_a_shortcut_while_the_image_has_focus(qtbot, qapp) -> N
     assert words == [*(row.text for row in ACTION_SPECS), "Record a sequence", "Open in the Inspector"]
 
 
-def test_window_shortcuts_are_disabled_while_the_image_has_focus(qtbot, qapp) -> None:
+def test_focused_image_overrides_window_shortcuts_except_f12(qtbot, qapp) -> None:
     panel = made(qtbot, Window(Session.full()))
     for name in ("Ctrl++", "Ctrl+-", "Ctrl+0", "Space"):
         assert name in panel.view.keys
     assert "F12" not in panel.view.keys
 
 
-def test_frozen_image_is_kept_and_labelled_as_frozen(qtbot, qapp) -> None:
+def test_frozen_image_is_labelled_and_another_topic_ends_the_freeze(qtbot, qapp) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     panel.freeze.click()

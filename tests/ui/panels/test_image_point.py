@@ -267,7 +267,7 @@ def test_arming_elsewhere_does_not_arm_the_image_panel_and_closing_disarms(qtbot
     assert points.kind.value == MESSAGE_TYPES[1]
 
 
-def test_robot_command_topic_requires_confirmation_and_another_source_disarms(qtbot, window, panel) -> None:
+def test_robot_command_topic_requires_confirmation_and_a_source_change_disarms(qtbot, window, panel) -> None:
     acting, points = window.session.acting, panel.points
     topic = window.session.fleet.connected[0].robot.topics.command
     panel.restore_state({**panel.save_state(), "point": {"on": True, "topic": topic, "type": "json"}})

@@ -342,7 +342,7 @@ def shown_number(panel: InspectorPanel) -> object:
     return value.get("n") if panel.body.page == TREE and isinstance(value, Mapping) else None
 
 
-def test_other_large_messages_are_decoded_only_on_request(qtbot, panel, window) -> None:
+def test_large_messages_that_are_not_json_are_decoded_only_on_request(qtbot, panel, window) -> None:
     topic = window.session.topics["/speech/words"]
     topic.newest = Message("/speech/words", b"x" * 1_200_000, "string", "string", seq=1)
     panel.show_topic("/speech/words")
@@ -356,7 +356,7 @@ def test_other_large_messages_are_decoded_only_on_request(qtbot, panel, window) 
     assert panel.model.value() == {"value": "x" * 1_200_000}
 
 
-def test_large_text_that_is_not_json_is_shown_as_bytes(qtbot, panel, window) -> None:
+def test_large_malformed_json_message_is_shown_as_bytes(qtbot, panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", b"[" * 1_100_000)
     qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == RAW)[1])

@@ -58,7 +58,7 @@ def test_camera_does_not_offer_a_robot_that_is_already_starting(qtbot) -> None:
     made.close()
 
 
-def test_bars_show_that_the_virtual_robot_is_starting() -> None:
+def test_robots_chip_health_item_and_run_bar_show_that_the_virtual_robot_is_starting() -> None:
     session = fakes.Session()
     facts = StatusFormatter(session)
     said = (robots_chip(session)[0], facts.health()[1], session.runs.view().detail)

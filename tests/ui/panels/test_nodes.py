@@ -183,7 +183,7 @@ def test_nep_generations_have_labels(generation, words, version) -> None:
     assert limits_text(NodeEntry("1", "new")) == ""
 
 
-def test_unsupported_version_is_flagged_with_the_fix() -> None:
+def test_unsupported_nep_version_is_flagged_with_the_versions_to_install() -> None:
     node = NodeEntry("1", "old", generation="0.5.4.6")
     cell = generation_cell(NodeRow(node))
     assert (cell.text, cell.icon, cell.role) == ("NEP 0.5.4.6", "triangle-alert", "warn")

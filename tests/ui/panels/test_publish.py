@@ -218,7 +218,7 @@ def test_topic_names_are_suggested_and_their_type_is_adopted(panel) -> None:
     assert panel.form.sentence.text().startswith("Messages of type image can't be edited by hand.")
 
 
-def test_messages_are_copied_deleted_and_restored_by_undo(window, panel) -> None:
+def test_saved_messages_are_duplicated_deleted_and_restored_by_undo(window, panel) -> None:
     panel.list.select_key("b")
     QTest.keyClick(panel.list, Qt.Key.Key_D, Qt.KeyboardModifier.ControlModifier)
     names = [each.name for each in acting_of(window).shelf.messages]
@@ -234,7 +234,7 @@ def test_messages_are_copied_deleted_and_restored_by_undo(window, panel) -> None
     assert panel.message.name == "Stand still 2"
 
 
-def test_list_is_filtered_and_empty_list_offers_a_new_message(window, panel) -> None:
+def test_saved_messages_are_filtered_and_an_empty_list_offers_a_new_message(window, panel) -> None:
     panel.filter.setText("cmd")
     assert panel.list.model().rowCount() == 1
     panel.filter.clear()
@@ -246,7 +246,7 @@ def test_list_is_filtered_and_empty_list_offers_a_new_message(window, panel) -> 
     assert panel.form.sentence.text().startswith("Choose a topic first.")
 
 
-def test_publish_is_in_the_menu_of_every_topic(qtbot, window) -> None:
+def test_publish_is_in_the_menu_of_topics_with_fields(qtbot, window) -> None:
     table = window.make(topics.PANEL)
     qtbot.addWidget(table)
     for widget in table.header_widgets():

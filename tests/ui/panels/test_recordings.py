@@ -111,7 +111,7 @@ def test_thumbnails_are_decoded_in_another_thread(qtbot, panel, folder):
     assert (image.width(), image.height()) == (128, 96)
 
 
-def test_click_selects_and_enter_opens(qtbot, panel, window, folder):
+def test_click_selects_and_enter_opens_a_recording(qtbot, panel, window, folder):
     seen(qtbot, panel, "arm", "camera", "cut")
     table = choose(panel, folder, "arm")
     rect = table.visualRect(table.currentIndex())
@@ -121,7 +121,7 @@ def test_click_selects_and_enter_opens(qtbot, panel, window, folder):
     assert window.commands == [f"recording.open:{folder / 'arm.mcap'}"]
 
 
-def test_f2_renames_in_place_and_never_overwrites(qtbot, panel, window, folder):
+def test_f2_renames_a_recording_in_place_and_overwrites_no_file(qtbot, panel, window, folder):
     (folder / "arm.mcap.bookmarks.json").write_text("[]")
     seen(qtbot, panel, "arm", "camera", "cut")
     table = choose(panel, folder, "arm")
@@ -144,7 +144,7 @@ def test_f2_renames_in_place_and_never_overwrites(qtbot, panel, window, folder):
     assert table.field is None
 
 
-def test_delete_moves_to_the_trash_and_undo_restores(qtbot, panel, window, folder, tmp_path, monkeypatch):
+def test_delete_moves_a_recording_to_the_trash_and_undo_restores_the_recording(qtbot, panel, window, folder, tmp_path, monkeypatch):
     place = tmp_path / "bin"
     place.mkdir()
 
@@ -167,7 +167,7 @@ def test_delete_moves_to_the_trash_and_undo_restores(qtbot, panel, window, folde
     seen(qtbot, panel, "arm", "camera", "cut")
 
 
-def test_active_recording_shows_its_stats_and_cannot_be_renamed(qtbot, panel, window, folder):
+def test_active_recording_shows_its_stats_and_cannot_be_renamed_or_deleted(qtbot, panel, window, folder):
     client = window.session.recordings.client
     client.state = RecorderState(
         "recording", folder / "arm.mcap", message_count=77, size_bytes=10**9, duration_s=61.0, lost=3

@@ -48,7 +48,7 @@ def test_mute_button_shows_the_reason_for_a_missing_voice(panel, window) -> None
     assert "no voice" not in panel.sound.toolTip()
 
 
-def test_sound_is_shown_in_a_bubble_next_to_its_name() -> None:
+def test_sound_is_shown_in_the_caption_as_a_note_with_its_name() -> None:
     played = {"title": "bell", "number": 1, "notes": [[880, 0.3]], "played": 0.1}
     assert RobotState.parse({"sound": played}).caption == "♪\N{NO-BREAK SPACE}bell"
     assert RobotState.parse({"speech": "Hi", "sound": played}).caption == "Hi ♪\N{NO-BREAK SPACE}bell"

@@ -81,7 +81,7 @@ def test_words_that_the_behaviour_waits_for_are_suggested(panel, window) -> None
     assert [action.text() for action in menu(panel).actions()] == ["quiz", "hello"]
 
 
-def test_other_events_are_simulated_from_a_menu(panel, window) -> None:
+def test_events_except_heard_words_are_simulated_from_a_menu(panel, window) -> None:
     press(panel.say.events)
     entries = [action.text() for action in menu(panel).actions()]
     assert {"Sees a face", "Bumps into something with its front", "Left hand is touched"} <= set(entries)

@@ -83,7 +83,7 @@ def test_values_are_updated_and_marked_during_a_run_and_kept_afterwards(panel, w
     assert panel.model.cell_at(0, 1).role == "textSecondary"
 
 
-def test_list_is_expanded_by_click_and_keyboard(panel, window) -> None:
+def test_list_variable_is_expanded_by_click_and_keyboard(panel, window) -> None:
     window.session.runs.run()
     tells(window, panel, names=["Ada", "Grace"])
     index = panel.model.index_of("names 0")

@@ -157,7 +157,7 @@ def test_unknown_command_id_from_a_panel_raises_immediately(window: MainWindow) 
         window.commands.shortcuts.keys_of("help.nobody")
 
 
-def test_command_arguments_are_typed() -> None:
+def test_command_arguments_are_parsed_to_typed_values() -> None:
     assert TabPosition.parse("a:b:2") == TabPosition("a:b", 2)
     assert RobotReplacement.parse("NAO:Pepper:2") == RobotReplacement("NAO", "Pepper:2")
     with pytest.raises(ValueError, match="invalid literal"):

@@ -93,7 +93,7 @@ def test_unavailable_layout_commands_are_disabled_only_while_the_menu_is_open(
     assert commands.actions["layout.delete"].isEnabled()
 
 
-def test_panels_are_opened_and_closed(tools, window, dropped) -> None:
+def test_panel_menu_closes_an_open_panel(tools, window, dropped) -> None:
     click(tools.panels)
     ((menu, below),) = dropped
     assert below is tools.panels

@@ -129,7 +129,7 @@ def test_suggested_name_skips_numbers_in_use(folder: Path) -> None:
         ("", ""),
     ],
 )
-def test_invalid_names_are_rejected_with_a_reason(name: str, wrong: str) -> None:
+def test_invalid_file_names_are_rejected_with_a_reason(name: str, wrong: str) -> None:
     assert name_problem(name) == wrong
 
 
@@ -245,7 +245,7 @@ def test_columns_are_readable_at_every_text_size(
     QApplication.processEvents()
 
 
-def test_window_opens_the_custom_file_sheet(
+def test_open_command_opens_the_file_sheet_with_recent_folders(
     qtbot: QtBot, theme: Theme, session: Session, folder: Path
 ) -> None:
     session.settings.add_recent(folder / "Greeting.nepb", "Greeting")

@@ -292,7 +292,7 @@ def test_closing_the_tab_of_a_running_program_stops_the_program(commands, window
     assert stopped == [True]
 
 
-def test_tabs_are_selected_moved_and_closed_by_name(commands, window, tmp_path: Path) -> None:
+def test_tabs_are_selected_moved_and_closed_by_commands(commands, window, tmp_path: Path) -> None:
     for name in "ABC":
         commands.files.open(saved(tmp_path / f"{name}.nepb"))
     commands.run("tab.next")
@@ -330,7 +330,7 @@ def test_save_as_renames_the_tab_and_keeps_the_old_file(
     assert answers.asked[-1] == f"save {tmp_path / 'Old.nepb'}"
 
 
-def test_external_files_are_opened_and_unsupported_files_raise_a_single_alert(
+def test_behaviour_files_are_opened_and_unsupported_files_raise_a_single_alert(
     commands, window, tmp_path: Path
 ) -> None:
     picture = tmp_path / "photo.png"

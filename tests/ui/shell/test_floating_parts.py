@@ -117,7 +117,7 @@ def test_alert_text_is_not_interpreted_as_markup(place: QWidget, theme: Theme) -
     assert "&lt;b&gt;" in banner.banner.words.toolTip()
 
 
-def test_long_text_uses_a_smaller_font_and_wraps_to_the_available_lines(place: QWidget, theme: Theme) -> None:
+def test_long_alert_text_wraps_to_the_lines_that_fit(place: QWidget, theme: Theme) -> None:
     banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     banner.show_alerts([Said("a", detail="It means a lot. " * 30)])
@@ -223,7 +223,7 @@ def test_first_mouse_press_in_a_window_shows_no_focus_ring(qtbot, theme: Theme) 
     assert ring.target is None
 
 
-def test_focus_ring_is_clipped_at_the_edge_of_a_scroll_area(qtbot, place: QWidget, theme: Theme) -> None:
+def test_focus_ring_is_hidden_while_its_widget_is_scrolled_out_of_view(qtbot, place: QWidget, theme: Theme) -> None:
     ring = FocusRing(theme, place)
     inside = QWidget()
     inside.setFixedSize(300, 2000)

@@ -179,7 +179,7 @@ def test_pages_show_the_current_shortcuts(tmp_path: Path) -> None:
     assert page.text == "# Keys\nRun: **Ctrl+F5**, **-**\n"
 
 
-def test_search_matches_words_in_any_order_and_ignores_accents() -> None:
+def test_search_matches_words_in_any_order_and_letter_case() -> None:
     page = GuidePage("Stop", "# Stop\n**Stop** tells *every* robot")
     assert page.matches("robot stop")
     assert page.matches("STOP TELLS")
@@ -197,7 +197,7 @@ def guide(qtbot, window: MainWindow, commands: Commands) -> GuideSheet:
     return found
 
 
-def test_list_opens_pages_and_search_lists_pages_with_matches(qtbot, guide: GuideSheet) -> None:
+def test_page_list_opens_pages_and_search_lists_matching_pages(qtbot, guide: GuideSheet) -> None:
     assert [guide.list.item(row).text() for row in range(guide.list.count())] == TITLES
     qtbot.waitUntil(guide.list.hasFocus)
     QTest.keyClick(guide.list, Qt.Key.Key_Down)

@@ -23,7 +23,7 @@ def changed(**values: object) -> bytes:
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
-def test_written_layout_is_read_back(encoding: str):
+def test_layout_file_round_trips_in_utf_8_and_utf_16(encoding: str):
     saved = encode_layout("Mine", "developer", SAVED).decode().encode(encoding)
     found = decode_layout(saved, "file", PANELS)
     assert (found.name, found.base, found.saved, found.unknown_panels) == ("Mine", "developer", SAVED, ())

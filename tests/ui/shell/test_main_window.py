@@ -549,7 +549,7 @@ def test_large_text_clips_no_button_of_the_bars(
     assert window.run_bar.height() >= window.run_bar.sizeHint().height()
 
 
-def test_window_closes_cleanly(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_closing_the_window_closes_its_panels_and_stops_its_timer_once(qtbot, window: MainWindow, commands: Commands) -> None:
     done: list[str] = []
     window.on_shut = lambda: done.append("shut")
     show(qtbot, window)
@@ -578,7 +578,7 @@ def test_no_plain_qt_buttons_are_used(qtbot, window: MainWindow, commands: Comma
     assert window.findChildren(QPushButton) == []
 
 
-def test_all_controls_have_accessible_names(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_all_buttons_of_the_behaviour_layout_have_accessible_names(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     window.show_layout("behaviour")
     window.tick()
@@ -806,7 +806,7 @@ def test_demo_option_starts_the_demo_except_in_self_drive_mode(
     assert begun == ["demo"]
 
 
-def test_only_panels_of_a_visible_layout_are_preloaded(theme: Theme, session: Session) -> None:
+def test_preloaded_panels_are_created_once_and_used_by_their_layout(theme: Theme, session: Session) -> None:
     made: list[str] = []
     seen: dict[str, PlainPanel] = {}
 

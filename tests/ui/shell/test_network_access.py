@@ -43,7 +43,7 @@ def make(qtbot, tmp_path):
         reach.close()
 
 
-def test_sheet_warns_shows_the_address_and_allows_connections(make):
+def test_network_access_sheet_warns_shows_the_address_and_allows_connections(make):
     sheet, reach, asked = make()
     sheet.open()
     assert sheet.heading.text() == "Let other computers connect?"

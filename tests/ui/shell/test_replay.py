@@ -142,7 +142,7 @@ def test_image_of_a_paused_recording_is_not_stale_and_keeps_its_recorded_age(
     assert "Last image" not in image.view.label_text
 
 
-def test_robots_and_alarms_use_live_messages_during_a_replay(qtbot, window, session, path):
+def test_live_topics_keep_receiving_messages_during_a_replay(qtbot, window, session, path):
     watch = session.watch("/a")
     opened(qtbot, window, path)
     said = live(session, 2000)
@@ -181,7 +181,7 @@ def test_recording_is_opened_by_menu_and_drop_and_replaces_the_open_recording(
     until(qtbot, window, lambda: first.has_ended)
 
 
-def test_invalid_recording_raises_an_alert_and_can_be_closed(qtbot, window, session, tmp_path):
+def test_file_that_is_not_a_recording_raises_an_alert_and_can_be_closed(qtbot, window, session, tmp_path):
     broken = tmp_path / "broken.mcap"
     broken.write_bytes(b"no recording")
     window.commands.run(f"recording.open:{broken}")

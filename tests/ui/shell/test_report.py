@@ -269,7 +269,7 @@ def test_new_version_entry_exists_only_when_the_project_has_a_web_page() -> None
 
 
 @pytest.mark.parametrize("works", [True, False])
-def test_checking_for_a_new_version_only_opens_the_page(
+def test_checking_for_a_new_version_only_opens_the_releases_page(
     window: MainWindow, session: Session, answers: Answers, opened: Opened, works: bool
 ) -> None:
     opened.works = works

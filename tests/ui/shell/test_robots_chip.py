@@ -21,7 +21,7 @@ def chip(*states: str, run: str = "ready", silent: str | None = None) -> tuple[s
         ("ready", "paused", "Robot 1 is paused"),
     ],
 )
-def test_single_robot_shows_its_state(state: str, run: str, words: str) -> None:
+def test_chip_shows_the_state_of_a_single_robot(state: str, run: str, words: str) -> None:
     assert chip(state, run=run) == (words, "ok")
 
 

@@ -219,7 +219,7 @@ def test_long_success_result_is_shortened_to_make_room_for_an_error(qtbot, bar: 
     qtbot.waitUntil(lambda: bar.result.width() >= bar.result.sizeHint().width())
 
 
-def test_title_without_a_detail_is_vertically_centred(bar: RunBar) -> None:
+def test_title_without_a_detail_is_the_only_line(bar: RunBar) -> None:
     bar.show_view(replace(VIEWS["proven"], title="Stopped", detail=""))
     assert [text for text, _font, _role in bar.sentence.lines(300.0)] == ["Stopped"]
     assert bar.sentence.accessibleName() == "Stopped"

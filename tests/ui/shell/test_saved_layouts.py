@@ -68,7 +68,7 @@ def test_layout_is_saved_under_a_name_and_the_built_in_layout_is_unchanged(
     assert opened(shown) == {"topics"}
 
 
-def test_invalid_layout_names_are_reported(shown: MainWindow, commands: Commands) -> None:
+def test_duplicate_long_or_empty_layout_names_are_reported(shown: MainWindow, commands: Commands) -> None:
     sheet = keep_as(shown, commands, "developer")
     assert sheet.isVisible()
     assert sheet.wrong.text() == "“developer” already exists."
@@ -159,7 +159,7 @@ def test_settings_of_the_wrong_type_are_ignored(qtbot, session: Session, theme: 
     window.close()
 
 
-def test_unavailable_entries_are_disabled_in_the_menu(shown: MainWindow, commands: Commands) -> None:
+def test_unavailable_entries_of_the_view_menu_are_disabled(shown: MainWindow, commands: Commands) -> None:
     lists = commands.menus
     lists._refresh("View")
     assert not commands.actions["layout.delete"].isEnabled()

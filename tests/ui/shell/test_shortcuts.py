@@ -222,7 +222,7 @@ def press(sheet: ShortcutSheet, key: Qt.Key, held: Qt.KeyboardModifier = NONE) -
     QTest.keyClick(sheet.field, key, held)
 
 
-def test_sheet_lists_every_command_and_every_fixed_shortcut(sheet: ShortcutSheet) -> None:
+def test_shortcut_sheet_lists_every_command_and_every_fixed_shortcut(sheet: ShortcutSheet) -> None:
     shown = [line.entry.id for line in sheet.rows.lines.lines if isinstance(line, Match)]
     assert shown == list(dict.fromkeys(shown))
     assert set(shown) == {f"command:{row.id}" for row in COMMANDS if row.in_shortcuts} | {

@@ -263,7 +263,7 @@ def test_app_bar_shortens_its_texts_before_collapsing_its_menus(
     assert button.toolTip() == ""
 
 
-def test_search_field_right_of_the_menus_fits_the_available_width(qtbot, window: MainWindow) -> None:
+def test_search_field_is_wide_enough_and_the_layout_switch_stays_centred(qtbot, window: MainWindow) -> None:
     window.resize(1024, 600)
     window.show_start()
     settle(qtbot, window)

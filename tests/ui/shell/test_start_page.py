@@ -211,7 +211,7 @@ def test_robots_chip_is_shown_only_with_a_robot(qtbot, page: StartPage) -> None:
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_start_page_with_large_text_scrolls_and_clips_no_text(
+def test_start_page_clips_no_text_at_any_text_size(
     qtbot, page: StartPage, theme: Theme, percent: int
 ) -> None:
     page.resize(1100, 660)

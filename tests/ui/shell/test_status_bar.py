@@ -34,7 +34,7 @@ def test_health_item_shows_alerts_before_robots(session: fakes.Session) -> None:
     assert facts(session).health() == ("circle-check", "Pepper: no problems", "ok")
 
 
-def test_health_item_matches_the_health_panel(session: fakes.Session) -> None:
+def test_health_item_counts_the_problems_of_the_robot(session: fakes.Session) -> None:
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.values["battery"] = 7

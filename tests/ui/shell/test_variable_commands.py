@@ -132,7 +132,7 @@ def test_find_command_steps_through_the_uses_of_a_variable(shown: MainWindow, co
     assert uses_of(parse_workspace(SAVED), "s") == ["set", "get"]
 
 
-def test_value_can_be_set_only_while_the_behaviour_runs(shown: MainWindow, commands: Commands) -> None:
+def test_value_cannot_be_set_while_the_behaviour_does_not_run(shown: MainWindow, commands: Commands) -> None:
     commands.run("variable.put:s")
     assert not shown.findChildren(NameSheet)
 

@@ -139,7 +139,7 @@ def test_topic_stats_are_updated_in_place_and_keep_selection_and_expansion(desk:
     assert (topic.topic, topic.rate_hz) == ("/buttons", 12.0)
 
 
-def test_disconnected_page_is_struck_through_without_a_button(desk: Desk) -> None:
+def test_disconnected_page_stays_listed_and_cannot_be_disconnected_again(desk: Desk) -> None:
     server, sheet = with_pages(desk), desk.sheet
     server.leave(1)
     sheet.refresh()
@@ -163,7 +163,7 @@ def test_row_button_disconnects_its_page(desk: Desk) -> None:
     assert server.kept_out == set()
 
 
-def test_refreshing_many_pages_takes_less_than_a_frame(desk: Desk) -> None:
+def test_refresh_of_many_pages_emits_signals_only_for_the_changed_page_and_topic(desk: Desk) -> None:
     server, sheet = desk.switch_on(), desk.sheet
     topics = [replace(CAMERA, topic=f"/topic{number}") for number in range(50)]
     server.pages = tuple(page(number, *topics) for number in range(100))

@@ -61,7 +61,7 @@ def test_only_known_child_processes_are_started(capsys: pytest.CaptureFixture[st
     assert "no process 'os'" in capsys.readouterr().err
 
 
-def test_frozen_build_starts_the_recorder_as_a_module_process() -> None:
+def test_module_entry_runs_the_recorder_process() -> None:
     done = python("-m", "app", "--module", "nep.recordings.child", "--help")
     assert done.returncode == 0, done.stderr
     assert "--master" in done.stdout

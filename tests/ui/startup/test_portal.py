@@ -82,7 +82,7 @@ def test_system_dialogs_are_available_on_windows_macos_and_with_a_portal() -> No
 
 
 @pytest.mark.skipif(shutil.which("dbus-run-session") is None, reason="needs dbus-run-session (package dbus)")
-def test_portal_query_on_a_real_session_bus_produces_no_output() -> None:
+def test_file_chooser_portal_is_detected_on_a_real_session_bus_without_error_output() -> None:
     environ = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
     command = ["dbus-run-session", "--", sys.executable, "-c", BOTH, FAKE, ASK]
     said = subprocess.run(command, capture_output=True, text=True, check=True, env=environ).stdout

@@ -37,7 +37,7 @@ from app.ui.startup.qt_log import (
         ("The page says: Failed to load vulkan:", True),
     ],
 )
-def test_only_known_irrelevant_qt_messages_are_dropped(
+def test_only_known_irrelevant_qt_messages_are_discarded(
     caplog: pytest.LogCaptureFixture, words: str, heard: bool
 ) -> None:
     on_qt_message(QtMsgType.QtWarningMsg, QMessageLogContext(), words)

@@ -79,7 +79,7 @@ def test_namespace_sandbox_is_disabled_without_namespaces_and_user_flags_are_kep
     assert environ == {FLAGS_VARIABLE: f"--log-level=3 {NO_NAMESPACES_FLAG}"}
 
 
-def test_sandbox_flags_are_unchanged_with_namespaces_or_without_a_test_process() -> None:
+def test_no_sandbox_flags_are_set_with_namespaces_or_without_a_test_process() -> None:
     environ: dict[str, str] = {}
     configure_sandbox(environ, Told(True))
     configure_sandbox(environ, None)
@@ -95,7 +95,7 @@ def test_sandbox_flags_are_unchanged_with_namespaces_or_without_a_test_process()
         ({FLAGS_VARIABLE: "--no-sandbox"}, "linux"),
     ],
 )
-def test_no_sandbox_test_runs_on_other_systems_or_if_the_user_set_the_option(
+def test_no_sandbox_test_runs_outside_linux_or_if_the_user_set_the_option(
     environ: dict[str, str], platform: str
 ) -> None:
     assert start_trial(environ, platform) is None

@@ -196,7 +196,7 @@ def test_socket_is_in_the_runtime_folder_with_one_per_studio_folder(runtime: Pat
 
 @needs_modes
 @pytest.mark.parametrize("wrong", ["open", "linked", "missing", "relative"])
-def test_runtime_folder_accessible_to_others_is_not_used(
+def test_runtime_folder_that_is_linked_missing_relative_or_open_to_others_is_not_used(
     runtime: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wrong: str
 ) -> None:
     home = runtime / "home"  # a short name: with several workers that of `tmp_path` is too long for a socket

@@ -43,7 +43,7 @@ def test_colour_roles_depend_on_the_theme_mode(theme: Theme) -> None:
     assert theme.dark
 
 
-def test_unknown_role_raises(theme: Theme) -> None:
+def test_unknown_colour_role_raises(theme: Theme) -> None:
     with pytest.raises(KeyError, match="sparkle"):
         theme.colour("sparkle")
 

@@ -36,7 +36,7 @@ def test_enter_presses_the_focused_button(qtbot, window, key):
     qtbot.waitUntil(lambda: window.pressed == ["button"])
 
 
-def test_enter_key_handling_leaves_text_fields_and_other_keys_unchanged(qtbot, window):
+def test_enter_handling_does_not_affect_text_fields_ctrl_enter_and_other_keys(qtbot, window):
     window.button.setFocus()
     QTest.keyClick(window.windowHandle(), Qt.Key_Return, Qt.ControlModifier)
     QTest.keyClick(window.windowHandle(), Qt.Key_A)

@@ -85,7 +85,7 @@ def test_wheel_changes_the_slider_only_with_focus(qtbot, slider: SliderWithUnit)
     assert slider.value > 0.5
 
 
-def test_double_click_restores_the_default(slider: SliderWithUnit) -> None:
+def test_double_click_on_the_slider_restores_its_default(slider: SliderWithUnit) -> None:
     QTest.mouseDClick(slider.track, Qt.MouseButton.LeftButton)
     assert slider.value == 0.25
 

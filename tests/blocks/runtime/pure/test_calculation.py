@@ -139,7 +139,7 @@ def test_number_blocks_run_and_error_names_its_block():
     )
 
 
-def test_every_option_of_a_block_has_a_readable_label_and_runs():
+def test_every_option_of_number_text_and_date_blocks_runs():
     from app.blocks.toolbox.catalogue import Catalogue
 
     known = Catalogue([]).blocks

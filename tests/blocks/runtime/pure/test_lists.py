@@ -95,7 +95,7 @@ def test_list_is_copied_when_added_to_itself_and_list_size_is_limited() -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(st.lists(st.text(max_size=4)), st.text(min_size=1, max_size=2))
-def test_split_reverses_join(items, between) -> None:
+def test_joining_the_split_parts_restores_the_text(items, between) -> None:
     whole = lists.join_items(items, between)
     assert between.join(map(str, lists.split_text(whole, between))) == whole
 
@@ -172,7 +172,7 @@ def test_error_in_list_names_its_block() -> None:
     assert run.runtime.error.sentence == "The list has only 3 items; it has no item 5."
 
 
-def test_hidden_list_slot_is_not_required() -> None:
+def test_hidden_item_number_slot_of_list_block_is_not_required() -> None:
     first = block("lists_get", WHERE="first", LIST=FRUITS)
     run = play(workspace(started(write(first))))
     assert run.lines == ["apple"]

@@ -221,7 +221,7 @@ def test_state_changes_within_one_pixel_are_painted_once(panel) -> None:
     assert wide / 3 < len(boxes) < 2.5 * wide
 
 
-def test_footer_reports_undecodable_and_discarded_messages(panel) -> None:
+def test_footer_reports_undecodable_messages_and_discarded_points(panel) -> None:
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 60))
     bad = Message("/odom", b"{", "json", "json", stamp_ns=panel.session.series.origin_ns, publisher=1)
@@ -513,7 +513,7 @@ def test_topic_without_known_fields_prompts_for_the_field(panel) -> None:
 # -- one over another --------------------------------------------------------------------------------------
 
 
-def test_second_curve_is_plotted_over_the_first(panel) -> None:
+def test_second_curve_is_plotted_against_the_first_in_xy_mode(panel) -> None:
     show(panel, "/odom.x", "/odom.y")
     angles = np.linspace(0, 6, 300).tolist()
     send(panel, "/odom", [(a * 5, {"x": float(np.cos(a)), "y": float(np.sin(a))}) for a in angles])
