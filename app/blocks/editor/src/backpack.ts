@@ -1,28 +1,28 @@
 // The backpack: stacks of blocks that a person keeps for other files, other Studios and the next start. The window
 // keeps what is in it (`app/core/documents/backpack.py`); all behaviours show the same.
 import * as Blockly from 'blockly/core';
-import {countOf} from './bin';
+import {countBlocks} from './bin';
 import {withoutTypeChecks} from './checker';
-import {type Copied, type CopiedBlocks, add, stateOf, stateOfRun} from './clipboard';
-import {inSight} from './free_place';
+import {type CopiedItem, type CopiedBlocks, pasteItems, stateOf, stateOfRun} from './clipboard';
+import {visibleArea} from './free_place';
 import {focusedBlock} from './help';
 import {drawIcon, iconElement} from './icons';
 import {ctrl} from './keys';
-import {PACK, addToMenus} from './menu';
-import {chosenWith, notesChosenWith, runsOf} from './selection';
-import {Sheet, disposeSheet, openable, sheetOf} from './sheet';
+import {ADD_TO_BACKPACK, registerBackpackMenu} from './menu';
+import {getSelectedBlocksWith, getSelectedNotesWith, groupIntoStacks} from './selection';
+import {Sheet, disposeSheet, createSheet, sheetOf} from './sheet';
 import {type BlockState, wrapUnknown, wrapWholeStack} from './unknown_blocks';
-import {withOwnVariables} from './own_variables';
+import {withLocalVariableIds} from './own_variables';
 import {t} from './words';
 
-const SVG = 'http://www.w3.org/2000/svg';
+const SVG_NS = 'http://www.w3.org/2000/svg';
 /** Room at the left of each stack for the button that takes it out, in units of the sheet. */
 const GUTTER = 40;
-const SIDE = 30;
-const BUSY_MS = 60;
+const BUTTON_SIZE = 30;
+const RETRY_MS = 60;
 
 /** A stack of blocks in the backpack. */
-export interface Packed {
+export interface BackpackEntry {
   id: string;
   at: number;
   block: BlockState;
@@ -30,12 +30,12 @@ export interface Packed {
 
 type BlockInfo = Blockly.utils.toolbox.BlockInfo;
 
-type Asked = {do: 'put'; blocks: BlockState[]; count: number; notes: number} | {do: 'remove'; id: string} | {do: 'empty' | 'look'};
+type BackpackRequest = {do: 'put'; blocks: BlockState[]; count: number; notes: number} | {do: 'remove'; id: string} | {do: 'empty' | 'look'};
 
-let contents: readonly Packed[] = [];
-let tell: (asked: Asked) => void = () => undefined;
+let contents: readonly BackpackEntry[] = [];
+let sendRequest: (request: BackpackRequest) => void = () => undefined;
 let button: HTMLButtonElement | null = null;
-const all = new Set<Backpack>();
+const backpacks = new Set<Backpack>();
 
 /** Beside the bin; one for all behaviours. */
 export function backpackButton(): HTMLButtonElement {
@@ -44,25 +44,25 @@ export function backpackButton(): HTMLButtonElement {
   button.type = 'button';
   button.className = 'nepBackpack';
   button.append(iconElement('backpack', 18));
-  dress();
+  updateButton();
   return button;
 }
 
 /** The button says how many stacks are in it. */
-function dress(): void {
+function updateButton(): void {
   const count = contents.length;
-  const words = count ? t('Backpack ({count})', {count}) : t('Backpack: stores blocks to use in other files');
+  const label = count ? t('Backpack ({count})', {count}) : t('Backpack: stores blocks to use in other files');
   if (!button) return;
-  button.title = words;
-  button.setAttribute('aria-label', words);
+  button.title = label;
+  button.setAttribute('aria-label', label);
   button.classList.toggle('nepFull', count > 0);
 }
 
 /** The window says what is in it, the newest first. */
-export function showContents(items: readonly Packed[]): void {
+export function setBackpackContents(items: readonly BackpackEntry[]): void {
   contents = items;
-  dress();
-  for (const each of all) each.refresh();
+  updateButton();
+  for (const backpack of backpacks) backpack.refresh();
 }
 
 /** Whether letting go there puts it into the backpack. */
@@ -72,60 +72,60 @@ export function isOverBackpack({x, y}: {x: number; y: number}): boolean {
 }
 
 /** Shows that letting go there puts it in. */
-export function aimAtBackpack(aims: boolean): void {
+export function highlightBackpack(aims: boolean): void {
   button?.classList.toggle('nepOver', aims);
 }
 
 /** Whether this block is one of the backpack's own. */
-export function isPacked(block: Blockly.Block): boolean {
+export function isInBackpack(block: Blockly.Block): boolean {
   return sheetOf(block) instanceof BackpackSheet;
 }
 
-export function pack(copied: Copied | CopiedBlocks): void {
+export function addToBackpack(copied: CopiedItem | CopiedBlocks): void {
   if (copied.nepStudio === 'note') return;
   const notes = copied.nepStudio === 'blocks' ? copied.notes?.length ?? 0 : 0;
   const states = copied.nepStudio === 'blocks' ? copied.states : [copied.state];
   const blocks = states.map(({id: _id, x: _x, y: _y, ...rest}) => rest as BlockState);
-  const count = blocks.reduce((sum, each) => sum + countOf(each as Blockly.serialization.blocks.State), 0);
-  if (blocks.length) tell({do: 'put', blocks, count, notes});
+  const count = blocks.reduce((sum, block) => sum + countBlocks(block as Blockly.serialization.blocks.State), 0);
+  if (blocks.length) sendRequest({do: 'put', blocks, count, notes});
 }
 
 /** The block with what hangs below it, or all blocks that are chosen with it. */
-function packBlock(block: Blockly.BlockSvg): void {
-  const chosen = chosenWith(block);
-  const one = chosen.length ? null : stateOf(block, true);
-  const states = chosen.length ? runsOf(chosen).map(stateOfRun) : [one?.state ?? null];
-  const notes = notesChosenWith(block).map((each) => stateOf(each)?.state).filter((each) => each !== undefined);
-  pack({nepStudio: 'blocks', states: states.filter((each) => each !== null), notes});
+function addBlockToBackpack(block: Blockly.BlockSvg): void {
+  const selected = getSelectedBlocksWith(block);
+  const single = selected.length ? null : stateOf(block, true);
+  const states = selected.length ? groupIntoStacks(selected).map(stateOfRun) : [single?.state ?? null];
+  const notes = getSelectedNotesWith(block).map((note) => stateOf(note)?.state).filter((state) => state !== undefined);
+  addToBackpack({nepStudio: 'blocks', states: states.filter((state) => state !== null), notes});
 }
 
 /** Once for the page: the menus and the key; `ask` tells the window what is to be done with the backpack. */
-export function registerBackpack(ask: (asked: string) => void, shown: () => Backpack): void {
-  tell = (asked) => ask(JSON.stringify(asked));
-  const may = (block: Blockly.BlockSvg | null | undefined): block is Blockly.BlockSvg =>
+export function registerBackpack(postRequest: (json: string) => void, getBackpack: () => Backpack): void {
+  sendRequest = (request) => postRequest(JSON.stringify(request));
+  const canAddToBackpack = (block: Blockly.BlockSvg | null | undefined): block is Blockly.BlockSvg =>
     Boolean(block) && !block!.isInFlyout && !block!.isShadow();
   Blockly.ShortcutRegistry.registry.register({
-    name: PACK, keyCodes: [ctrl(Blockly.utils.KeyCodes.P, Blockly.utils.KeyCodes.SHIFT)], displayText: () => t('Add to backpack'),
-    preconditionFn: (workspace) => !workspace.isDragging() && may(focusedBlock()),
+    name: ADD_TO_BACKPACK, keyCodes: [ctrl(Blockly.utils.KeyCodes.P, Blockly.utils.KeyCodes.SHIFT)], displayText: () => t('Add to backpack'),
+    preconditionFn: (workspace) => !workspace.isDragging() && canAddToBackpack(focusedBlock()),
     callback: (_workspace, event) => {
       event.preventDefault();
       const block = focusedBlock();
-      if (may(block)) packBlock(block);
+      if (canAddToBackpack(block)) addBlockToBackpack(block);
       return true;
     },
   });
-  addToMenus({
-    may, pack: packBlock,
-    isPacked, remove: (block) => sheetOf(block)?.remove(block.getRootBlock()),
-    count: () => contents.length, open: () => shown().toggle(true), empty: () => tell({do: 'empty'}),
+  registerBackpackMenu({
+    may: canAddToBackpack, pack: addBlockToBackpack,
+    isPacked: isInBackpack, remove: (block) => sheetOf(block)?.remove(block.getRootBlock()),
+    count: () => contents.length, open: () => getBackpack().toggle(true), empty: () => sendRequest({do: 'empty'}),
   });
 }
 
 /** A stack that can't be made here, whatever is wrong with it, is shown grey and kept as it is. */
-class CarefulInflater extends Blockly.BlockFlyoutInflater {
+class TolerantBlockInflater extends Blockly.BlockFlyoutInflater {
   override createBlock({kind, ...state}: BlockInfo, workspace: Blockly.WorkspaceSvg): Blockly.BlockSvg {
     const before = new Set(workspace.getTopBlocks(false));
-    const make = (made: BlockState) => super.createBlock({kind, ...made} as BlockInfo, workspace);
+    const make = (blockState: BlockState) => super.createBlock({kind, ...blockState} as BlockInfo, workspace);
     try {
       return make(wrapUnknown(state as unknown as BlockState));
     } catch (error) {
@@ -138,9 +138,9 @@ class CarefulInflater extends Blockly.BlockFlyoutInflater {
 
 class BackpackSheet extends Sheet {
   protected override readonly tabWidth_: number = GUTTER;
-  private readonly inflater = new CarefulInflater();
+  private readonly inflater = new TolerantBlockInflater();
   private readonly ids = new Map<Blockly.BlockSvg, string>();
-  onTake: (block: Blockly.BlockSvg) => void = () => undefined;
+  onPick: (block: Blockly.BlockSvg) => void = () => undefined;
 
   override init(target: Blockly.WorkspaceSvg): void {
     super.init(target);
@@ -158,47 +158,47 @@ class BackpackSheet extends Sheet {
     empty.title = t('Empty the backpack');
     empty.setAttribute('aria-label', empty.title);
     empty.append(iconElement('trash-2', 16));
-    empty.onclick = () => tell({do: 'empty'});
-    this.head.lastElementChild?.before(empty);
+    empty.onclick = () => sendRequest({do: 'empty'});
+    this.header.lastElementChild?.before(empty);
   }
 
-  override take(block: Blockly.BlockSvg): void {
-    this.onTake(block);
+  override pick(block: Blockly.BlockSvg): void {
+    this.onPick(block);
   }
 
   override remove(block: Blockly.BlockSvg): void {
     const id = this.ids.get(block);
-    if (id !== undefined) tell({do: 'remove', id});
+    if (id !== undefined) sendRequest({do: 'remove', id});
   }
 
   /** Shows what is in it; what was scrolled to stays in sight, and the keys stay at their place. */
-  fill(): void {
-    const inside = this.getWorkspace();
-    const place = this.isVisible() ? this.focusedPlace : -1;
-    const {scrollY} = inside;
+  renderContents(): void {
+    const flyoutWorkspace = this.getWorkspace();
+    const focusedIndex = this.isVisible() ? this.focusedPlace : -1;
+    const {scrollY} = flyoutWorkspace;
     const names = new Map<string, string>();
-    const shown = contents.map(({block}) => {
-      const {id: _id, x: _x, y: _y, ...rest} = withOwnVariables(structuredClone(block), this.targetWorkspace, names);
+    const items = contents.map(({block}) => {
+      const {id: _id, x: _x, y: _y, ...rest} = withLocalVariableIds(structuredClone(block), this.targetWorkspace, names);
       return {kind: 'block', ...rest};
     });
     const none = [t('The backpack is empty.'), t('Drag blocks to the backpack button'), t('to use them in other files'),
       t('and the next time you start Studio.')].map((text) => ({kind: 'label', text}));
-    this.setTitle(shown.length ? t('Backpack ({count})', {count: shown.length}) : t('Backpack'));
-    this.head.querySelector('.nepEmpty')?.toggleAttribute('hidden', !shown.length);
+    this.setTitle(items.length ? t('Backpack ({count})', {count: items.length}) : t('Backpack'));
+    this.header.querySelector('.nepEmpty')?.toggleAttribute('hidden', !items.length);
     withoutTypeChecks(() =>
-      this.show((shown.length ? shown : none) as unknown as Blockly.utils.toolbox.FlyoutItemInfoArray));
-    const blocks = this.getContents().map((item) => item.getElement()).filter((each) => each instanceof Blockly.BlockSvg);
+      this.show((items.length ? items : none) as unknown as Blockly.utils.toolbox.FlyoutItemInfoArray));
+    const blocks = this.getContents().map((item) => item.getElement()).filter((element) => element instanceof Blockly.BlockSvg);
     this.ids.clear();
     blocks.forEach((block, number) => {
       this.ids.set(block, contents[number]?.id ?? '');
-      block.getSvgRoot().append(this.outButton(block));
+      block.getSvgRoot().append(this.createRemoveButton(block));
     });
-    if (place < 0) {
+    if (focusedIndex < 0) {
       this.scrollToStart();
       return;
     }
-    inside.scrollbar?.setY(-scrollY);
-    const next = blocks[Math.min(place, blocks.length - 1)];
+    flyoutWorkspace.scrollbar?.setY(-scrollY);
+    const next = blocks[Math.min(focusedIndex, blocks.length - 1)];
     Blockly.getFocusManager().focusNode(next ?? this.targetWorkspace);
   }
 
@@ -217,16 +217,16 @@ class BackpackSheet extends Sheet {
   }
 
   /** By keys it is Delete, or the menu. */
-  private outButton(block: Blockly.BlockSvg): SVGGElement {
-    const group = document.createElementNS(SVG, 'g');
+  private createRemoveButton(block: Blockly.BlockSvg): SVGGElement {
+    const group = document.createElementNS(SVG_NS, 'g');
     group.setAttribute('class', 'nepTakeOut');
     group.setAttribute('aria-hidden', 'true');
     group.setAttribute('transform', `translate(${-GUTTER}, 6)`);
-    const title = document.createElementNS(SVG, 'title');
+    const title = document.createElementNS(SVG_NS, 'title');
     title.textContent = t('Remove from backpack');
-    const back = document.createElementNS(SVG, 'circle');
-    for (const name of ['cx', 'cy', 'r']) back.setAttribute(name, String(SIDE / 2));
-    const icon = document.createElementNS(SVG, 'g');
+    const back = document.createElementNS(SVG_NS, 'circle');
+    for (const name of ['cx', 'cy', 'r']) back.setAttribute(name, String(BUTTON_SIZE / 2));
+    const icon = document.createElementNS(SVG_NS, 'g');
     drawIcon(icon, 'x', 18);
     icon.setAttribute('transform', 'translate(6, 6)');
     group.append(title, back, icon);
@@ -249,49 +249,49 @@ export class Backpack {
   private timer = 0;
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg) {
-    all.add(this);
+    backpacks.add(this);
   }
 
   dispose(): void {
     window.clearTimeout(this.timer);
-    all.delete(this);
+    backpacks.delete(this);
     disposeSheet(this.sheet);
   }
 
   /** Opens the sheet, or closes it; `byKey`: the keys go to what is on top. */
   toggle(byKey: boolean): void {
-    const sheet = this.sheet ??= this.makeSheet();
+    const sheet = this.sheet ??= this.createSheet();
     if (sheet.isVisible()) {
       sheet.hide();
       return;
     }
     this.workspace.hideChaff();
-    sheet.fill();
+    sheet.renderContents();
     if (byKey) sheet.focusFirst();
-    tell({do: 'look'});
+    sendRequest({do: 'look'});
   }
 
   /** There are other things in it: an open sheet shows them, but not while the mouse holds one of them. */
   refresh(): void {
     window.clearTimeout(this.timer);
     if (!this.sheet?.isVisible()) return;
-    if (Blockly.Gesture.inProgress()) this.timer = window.setTimeout(() => this.refresh(), BUSY_MS);
-    else this.sheet.fill();
+    if (Blockly.Gesture.inProgress()) this.timer = window.setTimeout(() => this.refresh(), RETRY_MS);
+    else this.sheet.renderContents();
   }
 
-  private makeSheet(): BackpackSheet {
-    const sheet = openable(this.workspace, (options) => new BackpackSheet(options));
-    sheet.onTake = (block) => this.take(block);
+  private createSheet(): BackpackSheet {
+    const sheet = createSheet(this.workspace, (options) => new BackpackSheet(options));
+    sheet.onPick = (block) => this.addToWorkspace(block);
     return sheet;
   }
 
   /** Lays a copy free on the canvas, where it can be seen; it stays in the backpack. */
-  private take(block: Blockly.BlockSvg): void {
+  private addToWorkspace(block: Blockly.BlockSvg): void {
     const copied = stateOf(block, true);
     this.sheet?.hide();
     if (!copied) return;
-    const {left, right, top, bottom} = inSight(this.workspace);
-    const wanted = new Blockly.utils.Coordinate(left + (right - left) / 4, top + (bottom - top) / 4);
-    add({...copied, state: withOwnVariables(copied.state, this.workspace)}, this.workspace, wanted);
+    const {left, right, top, bottom} = visibleArea(this.workspace);
+    const position = new Blockly.utils.Coordinate(left + (right - left) / 4, top + (bottom - top) / 4);
+    pasteItems({...copied, state: withLocalVariableIds(copied.state, this.workspace)}, this.workspace, position);
   }
 }

@@ -1,14 +1,14 @@
 // What was deleted in a behaviour while it is open: it waits in the bin, newest first, and can be taken back.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
-import {Sheet, disposeSheet, openable} from './sheet';
+import {Sheet, disposeSheet, createSheet} from './sheet';
 import {t} from './words';
 
-const MOST = 50;
+const MAX_ENTRIES = 50;
 /** Deletions that belong together come within this time. */
-const TOGETHER_MS = 60;
-const APART = 40;
-const TRIES = 40;
+const DEBOUNCE_MS = 60;
+const SPACING = 40;
+const MAX_TRIES = 40;
 
 type State = Blockly.serialization.blocks.State;
 
@@ -36,10 +36,10 @@ class BinArea extends Blockly.DeleteArea {
 
 /** The sheet with what was deleted. */
 class BinSheet extends Sheet {
-  onTake: (id: string) => void = () => undefined;
+  onPick: (id: string) => void = () => undefined;
 
-  override take(block: Blockly.BlockSvg): void {
-    this.onTake(block.id);
+  override pick(block: Blockly.BlockSvg): void {
+    this.onPick(block.id);
   }
 
   protected override get closes(): string {
@@ -58,8 +58,8 @@ export class Bin {
   /** The oldest first. */
   private entries: State[] = [];
   /** What was taken out again: deleted once more it comes back here, even by Redo. */
-  private readonly takenBack = new Map<string, State>();
-  private readonly made = new Map<string, string>();
+  private readonly restored = new Map<string, State>();
+  private readonly creationGroups = new Map<string, string>();
   /** What goes to another behaviour. */
   private readonly moves = new Set<string>();
   private last = {group: '', ids: [] as string[], count: 0};
@@ -77,9 +77,9 @@ export class Bin {
     this.hint.className = 'nepDropHere';
     this.hint.hidden = true;
     this.hint.setAttribute('aria-hidden', 'true');
-    const words = document.createElement('span');
-    words.textContent = t('Drop here to delete');
-    this.hint.append(iconElement('trash-2', 40), words);
+    const label = document.createElement('span');
+    label.textContent = t('Drop here to delete');
+    this.hint.append(iconElement('trash-2', 40), label);
     workspace.getInjectionDiv().append(this.hint);
   }
 
@@ -88,10 +88,10 @@ export class Bin {
   }
 
   /** Another program is here. */
-  forget(): void {
+  clear(): void {
     this.entries = [];
-    this.takenBack.clear();
-    this.made.clear();
+    this.restored.clear();
+    this.creationGroups.clear();
     this.last = {group: '', ids: [], count: 0};
     this.sheet?.hide();
     this.listener.changed();
@@ -103,7 +103,7 @@ export class Bin {
   }
 
   /** This block goes to another behaviour: its deletion here is no loss. */
-  leaves(id: string): void {
+  markAsMoved(id: string): void {
     this.moves.add(id);
   }
 
@@ -117,13 +117,13 @@ export class Bin {
 
   /** Opens the sheet, or closes it; `byKey`: the keys go to what was deleted last. */
   toggle(byKey: boolean): void {
-    const sheet = this.sheet ??= this.makeSheet();
+    const sheet = this.sheet ??= this.createSheet();
     if (sheet.isVisible()) {
       sheet.hide();
       return;
     }
     this.workspace.hideChaff();
-    this.fill(sheet);
+    this.renderContents(sheet);
     if (byKey) sheet.focusFirst();
   }
 
@@ -131,13 +131,13 @@ export class Bin {
   undoLast(): boolean {
     const stack = this.workspace.getUndoStack();
     if (stack[stack.length - 1]?.group === this.last.group) return true;  // undo does it
-    for (const id of this.last.ids) this.takeBack(id, true);
+    for (const id of this.last.ids) this.restore(id, true);
     return false;
   }
 
   /** Puts it on the canvas again: at its place (`exactly`), or where it can be seen and covers nothing. */
-  takeBack(id: string, exactly = false): void {
-    const state = this.entries.find((each) => each.id === id);
+  restore(id: string, exactly = false): void {
+    const state = this.entries.find((entry) => entry.id === id);
     this.sheet?.hide();
     if (!state) return;
     const group = Blockly.Events.getGroup();
@@ -145,41 +145,41 @@ export class Bin {
     try {
       const block = Blockly.serialization.blocks.append(structuredClone(state), this.workspace,
         {recordUndo: true}) as Blockly.BlockSvg;
-      if (!exactly) this.place(block);
+      if (!exactly) this.placeInView(block);
       Blockly.getFocusManager().focusNode(block);
     } finally {
       Blockly.Events.setGroup(group);
     }
   }
 
-  private place(block: Blockly.BlockSvg): void {
+  private placeInView(block: Blockly.BlockSvg): void {
     Blockly.renderManagement.triggerQueuedRenders(this.workspace);
     const view = this.workspace.getMetricsManager().getViewMetrics(true);
-    const shown = new Blockly.utils.Rect(view.top, view.top + view.height, view.left, view.left + view.width);
+    const viewRect = new Blockly.utils.Rect(view.top, view.top + view.height, view.left, view.left + view.width);
     const {x, y} = block.getRelativeToSurfaceXY();
-    if (!shown.contains(x, y) || !shown.contains(x + APART, y + APART)) {
-      block.moveBy(view.left + APART - x, view.top + APART - y);
+    if (!viewRect.contains(x, y) || !viewRect.contains(x + SPACING, y + SPACING)) {
+      block.moveBy(view.left + SPACING - x, view.top + SPACING - y);
     }
-    const others = this.workspace.getTopBlocks(false).filter((each) => each !== block)
-      .map((each) => each.getBoundingRectangle());
-    for (let number = 0; number < TRIES; number += 1) {
+    const others = this.workspace.getTopBlocks(false).filter((other) => other !== block)
+      .map((other) => other.getBoundingRectangle());
+    for (let number = 0; number < MAX_TRIES; number += 1) {
       const mine = block.getBoundingRectangle();
-      const covered = others.find((each) => each.intersects(mine));
+      const covered = others.find((rect) => rect.intersects(mine));
       if (!covered) break;
-      block.moveBy(0, covered.bottom + APART / 2 - mine.top);
+      block.moveBy(0, covered.bottom + SPACING / 2 - mine.top);
     }
     block.snapToGrid();
     const now = block.getRelativeToSurfaceXY();
-    if (!shown.contains(now.x, now.y)) this.workspace.centerOnBlock(block.id);
+    if (!viewRect.contains(now.x, now.y)) this.workspace.centerOnBlock(block.id);
   }
 
-  private makeSheet(): BinSheet {
-    const sheet = openable(this.workspace, (options) => new BinSheet(options));
-    sheet.onTake = (id) => this.takeBack(id);
+  private createSheet(): BinSheet {
+    const sheet = createSheet(this.workspace, (options) => new BinSheet(options));
+    sheet.onPick = (id) => this.restore(id);
     return sheet;
   }
 
-  private fill(sheet: BinSheet): void {
+  private renderContents(sheet: BinSheet): void {
     sheet.setTitle(t('Deleted blocks'));
     const none = [t('No deleted blocks yet.'), t('Deleted blocks stay here'), t('until you close the behaviour.')]
       .map((text) => ({kind: 'label', text}));
@@ -197,11 +197,11 @@ export class Bin {
   }
 
   private onCreate(event: Blockly.Events.BlockCreate): void {
-    if (event.group) this.made.set(event.blockId ?? '', event.group);
-    const at = this.entries.findIndex((each) => each.id === event.blockId);
-    const [entry] = at >= 0 ? this.entries.splice(at, 1) : [];
+    if (event.group) this.creationGroups.set(event.blockId ?? '', event.group);
+    const index = this.entries.findIndex((state) => state.id === event.blockId);
+    const [entry] = index >= 0 ? this.entries.splice(index, 1) : [];
     if (!entry) return;
-    this.takenBack.set(entry.id ?? '', entry);
+    this.restored.set(entry.id ?? '', entry);
     this.sheet?.hide();
     this.listener.changed();
   }
@@ -211,40 +211,40 @@ export class Bin {
     const state = event.oldJson;
     if (this.moves.delete(id)) return;
     // A mend that hangs what was in it elsewhere has arranged the blocks; who wants them back undoes it.
-    if (!state || event.wasShadow || idsOf({...state, id}).some((each) => this.workspace.getBlockById(each))) return;
-    const cameBack = this.takenBack.delete(id);
+    if (!state || event.wasShadow || idsOf({...state, id}).some((blockId) => this.workspace.getBlockById(blockId))) return;
+    const wasRestored = this.restored.delete(id);
     // What never was more than a block in the hand is no loss, and an undone addition can be done again.
-    const loss = event.recordUndo && (this.made.get(id) !== event.group || !event.group);
-    this.made.delete(id);
-    if (!loss && !cameBack) return;
+    const loss = event.recordUndo && (this.creationGroups.get(id) !== event.group || !event.group);
+    this.creationGroups.delete(id);
+    if (!loss && !wasRestored) return;
     this.entries.push({...state, id});
-    this.entries.splice(0, this.entries.length - MOST);
-    this.show();
-    if (loss) this.tell(event.group, id, countOf(state));
+    this.entries.splice(0, this.entries.length - MAX_ENTRIES);
+    this.refresh();
+    if (loss) this.notifyDeleted(event.group, id, countBlocks(state));
   }
 
-  private tell(group: string, id: string, count: number): void {
+  private notifyDeleted(group: string, id: string, count: number): void {
     if (group !== this.last.group || !group) this.last = {group, ids: [], count: 0};
     this.last.ids.push(id);
     this.last.count += count;
     window.clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => this.listener.deleted(this.last.count), TOGETHER_MS);
+    this.timer = window.setTimeout(() => this.listener.deleted(this.last.count), DEBOUNCE_MS);
   }
 
-  private show(): void {
+  private refresh(): void {
     this.listener.changed();
-    if (this.sheet?.isVisible()) this.fill(this.sheet);
+    if (this.sheet?.isVisible()) this.renderContents(this.sheet);
   }
 }
 
 /** The block, those in it and those below it. */
 function idsOf({id, inputs, next}: State): string[] {
-  const held = Object.values(inputs ?? {}).map((input) => input.block);
-  return [id ?? '', ...[...held, next?.block].flatMap((each) => each ? idsOf(each) : [])];
+  const inputBlocks = Object.values(inputs ?? {}).map((input) => input.block);
+  return [id ?? '', ...[...inputBlocks, next?.block].flatMap((child) => child ? idsOf(child) : [])];
 }
 
 /** How many blocks a person sees in it: the grey values in the gaps are part of what holds them. */
-export function countOf(state: State): number {
-  const held = Object.values(state.inputs ?? {}).map((input) => input.block);
-  return [...held, state.next?.block].reduce((sum, each) => sum + (each ? countOf(each) : 0), 1);
+export function countBlocks(state: State): number {
+  const inputBlocks = Object.values(state.inputs ?? {}).map((input) => input.block);
+  return [...inputBlocks, state.next?.block].reduce((sum, child) => sum + (child ? countBlocks(child) : 0), 1);
 }

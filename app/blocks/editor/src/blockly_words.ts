@@ -3,7 +3,7 @@
 import * as Blockly from 'blockly/core';
 import {lazy, t} from './words';
 
-const WORDS: Readonly<Record<string, string>> = {
+const MESSAGES: Readonly<Record<string, string>> = {
   CLEAN_UP: lazy('Tidy up'),
   WORKSPACE_COMMENT_DEFAULT_TEXT: lazy('Write a note'),
   DELETE_BLOCK: lazy('Delete'),
@@ -109,8 +109,8 @@ const WORDS: Readonly<Record<string, string>> = {
 };
 
 /** Gives Blockly our words; its own stay where nobody has translated ours. */
-export function giveBlocklyOurWords(language: string): void {
-  for (const [key, english] of Object.entries(WORDS)) {
+export function setBlocklyMessages(language: string): void {
+  for (const [key, english] of Object.entries(MESSAGES)) {
     if (language === 'en' || t(english) !== english) Blockly.Msg[key] = t(english);
   }
 }

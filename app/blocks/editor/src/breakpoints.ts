@@ -4,26 +4,26 @@ import * as Blockly from 'blockly/core';
 import {drawIcon} from './icons';
 import {t} from './words';
 
-const SVG = 'http://www.w3.org/2000/svg';
-const SIZE = 22;
+const SVG_NS = 'http://www.w3.org/2000/svg';
+const MARK_SIZE = 22;
 
-type Data = Record<string, unknown>;
+type BlockData = Record<string, unknown>;
 
-function dataOf(block: Blockly.Block): Data {
+function dataOf(block: Blockly.Block): BlockData {
   try {
-    const told: unknown = JSON.parse(block.data ?? '{}');
-    return typeof told === 'object' && told !== null && !Array.isArray(told) ? told as Data : {};
+    const parsed: unknown = JSON.parse(block.data ?? '{}');
+    return typeof parsed === 'object' && parsed !== null && !Array.isArray(parsed) ? parsed as BlockData : {};
   } catch {
     return {};
   }
 }
 
-export function pausesHere(block: Blockly.Block): boolean {
+export function hasBreakpoint(block: Blockly.Block): boolean {
   return dataOf(block)['pause'] === true;
 }
 
 /** Only what is done one after the other can be paused before. */
-export function canPause(block: Blockly.Block): boolean {
+export function canHaveBreakpoint(block: Blockly.Block): boolean {
   return block.previousConnection !== null;
 }
 
@@ -44,41 +44,41 @@ class BreakpointChange extends Blockly.Events.BlockBase {
     const block = this.getEventWorkspace_().getBlockById(this.blockId ?? '') ?? this.block;
     const before = block.data;
     block.data = forward ? this.to : this.from;
-    showMark(block);
+    updateBreakpointMark(block);
     Blockly.Events.fire(new BreakpointChange(block, before, block.data));  // undo itself is told to nobody
   }
 }
 
-export function togglePause(block: Blockly.BlockSvg): void {
+export function toggleBreakpoint(block: Blockly.BlockSvg): void {
   const {pause, ...rest} = dataOf(block);
   const from = block.data;
-  const data: Data = pause === true ? rest : {...rest, pause: true};
+  const data: BlockData = pause === true ? rest : {...rest, pause: true};
   block.data = Object.keys(data).length ? JSON.stringify(data) : null;
-  showMark(block);
+  updateBreakpointMark(block);
   Blockly.Events.fire(new BreakpointChange(block, from, block.data));
 }
 
-function showMark(block: Blockly.Block): void {
+function updateBreakpointMark(block: Blockly.Block): void {
   if (!(block instanceof Blockly.BlockSvg)) return;
   const root = block.getSvgRoot();
   root.querySelector(':scope > .nepPauseMark')?.remove();
-  if (!pausesHere(block)) return;
-  const mark = document.createElementNS(SVG, 'g');
+  if (!hasBreakpoint(block)) return;
+  const mark = document.createElementNS(SVG_NS, 'g');
   mark.setAttribute('class', 'nepPauseMark');
-  mark.setAttribute('transform', `translate(${-SIZE + 2}, 13)`);
-  const title = document.createElementNS(SVG, 'title');
+  mark.setAttribute('transform', `translate(${-MARK_SIZE + 2}, 13)`);
+  const title = document.createElementNS(SVG_NS, 'title');
   title.textContent = t('The program pauses before this block');
-  const ground = document.createElementNS(SVG, 'circle');
-  for (const name of ['cx', 'cy', 'r']) ground.setAttribute(name, `${SIZE / 2}`);
-  const picture = document.createElementNS(SVG, 'g');
+  const ground = document.createElementNS(SVG_NS, 'circle');
+  for (const name of ['cx', 'cy', 'r']) ground.setAttribute(name, `${MARK_SIZE / 2}`);
+  const picture = document.createElementNS(SVG_NS, 'g');
   picture.setAttribute('transform', 'translate(4, 4)');
-  drawIcon(picture, 'pause', SIZE - 8);
+  drawIcon(picture, 'pause', MARK_SIZE - 8);
   mark.append(title, ground, picture);
   root.append(mark);
 }
 
-const init = Blockly.BlockSvg.prototype.initSvg;
+const originalInitSvg = Blockly.BlockSvg.prototype.initSvg;
 Blockly.BlockSvg.prototype.initSvg = function (this: Blockly.BlockSvg) {
-  init.call(this);
-  if (this.data) showMark(this);
+  originalInitSvg.call(this);
+  if (this.data) updateBreakpointMark(this);
 };

@@ -9,11 +9,11 @@ type Point = Blockly.utils.Coordinate;
 const {Coordinate} = Blockly.utils;
 
 /** Makes blocks that hang below each other a script of their own; what it returns puts them back. */
-export function takeOut(run: readonly Block[]): () => void {
+export function detachRun(run: readonly Block[]): () => void {
   const [head, tail] = [run[0]!, run[run.length - 1]!];
   const above = (head.previousConnection ?? head.outputConnection)?.targetConnection ?? null;
   const below = tail.getNextBlock();
-  const place = head.getRelativeToSurfaceXY();
+  const position = head.getRelativeToSurfaceXY();
   if (below) tail.nextConnection!.disconnect();
   if (above) head.unplug(false);
   const next = below?.previousConnection ?? null;
@@ -23,7 +23,7 @@ export function takeOut(run: readonly Block[]): () => void {
   return () => {
     if (heals) below!.unplug(false);
     if (above) above.connect((head.previousConnection ?? head.outputConnection)!);
-    else head.moveTo(place);
+    else head.moveTo(position);
     if (below) tail.nextConnection!.connect(next!);
   };
 }
@@ -31,25 +31,25 @@ export function takeOut(run: readonly Block[]): () => void {
 /** Deletes them; the scripts that they were in close. */
 export function removeAll(runs: readonly Block[][], notes: readonly Note[]): void {
   for (const run of runs) {
-    takeOut(run);
+    detachRun(run);
     run[0]!.dispose(false);
   }
   for (const note of notes) note.dispose();
 }
 
 /** The first is in the hand, the others keep their places beside it. */
-export class Carried {
+export class DraggedGroup {
   readonly head: Item;
   private readonly others: {item: Item; from: Point}[];
   private readonly putBack: (() => void)[];
 
-  constructor(readonly runs: readonly Block[][], readonly notes: readonly Note[], held: Item) {
+  constructor(readonly runs: readonly Block[][], readonly notes: readonly Note[], draggedItem: Item) {
     const heads = runs.map((run) => run[0]!);
-    this.head = notes.find((note) => note === held) ??
-      heads[runs.findIndex((run) => run.includes(held as Block))] ?? heads[0]!;
-    this.putBack = runs.map(takeOut);
+    this.head = notes.find((note) => note === draggedItem) ??
+      heads[runs.findIndex((run) => run.includes(draggedItem as Block))] ?? heads[0]!;
+    this.putBack = runs.map(detachRun);
     Blockly.renderManagement.triggerQueuedRenders();
-    this.others = [...heads, ...notes].filter((each) => each !== this.head)
+    this.others = [...heads, ...notes].filter((item) => item !== this.head)
       .map((item) => ({item, from: item.getRelativeToSurfaceXY()}));
   }
 
@@ -66,24 +66,24 @@ export class Carried {
 
   /** Where they are let go; undo takes back the whole way. */
   end(by: Point): void {
-    this.goBack();
+    this.returnToStart();
     for (const {item} of this.others) item.moveBy(by.x, by.y, ['drag']);
   }
 
   /** The head is gone already. Undo brings them back to where they were taken. */
   remove(): void {
-    this.goBack();
+    this.returnToStart();
     for (const {item} of this.others) item.dispose(false);
   }
 
   /** As if nobody had touched them. */
   revert(): void {
-    this.goBack();
-    for (const each of [...this.putBack].reverse()) each();
+    this.returnToStart();
+    for (const restore of [...this.putBack].reverse()) restore();
   }
 
   /** Nobody is told of the way: it was only in the hand. */
-  private goBack(): void {
+  private returnToStart(): void {
     Blockly.Events.disable();
     for (const {item, from} of this.others) {
       item.setDragging(false);

@@ -1,20 +1,20 @@
 // Blocks or a note carried out of the page: the window sees where they are, and may take them to another behaviour.
 // When it shows another behaviour while they are held, they stay in the hand: back on the page, they are dragged there.
 import * as Blockly from 'blockly/core';
-import {countOf} from './bin';
+import {countBlocks} from './bin';
 import {removeAll} from './carry';
-import {type Copied, type CopiedBlocks, add, copyOfAll, inOneStep, stateOf} from './clipboard';
-import {forgetSoon, takeInHand} from './drag';
-import {inSight} from './free_place';
-import {asPng, pictureOf} from './picture';
+import {type CopiedItem, type CopiedBlocks, pasteItems, copyOfAll, withUndoGroup, stateOf} from './clipboard';
+import {discardUndoGroup, startDragAt} from './drag';
+import {visibleArea} from './free_place';
+import {renderPng, createPicture} from './picture';
 import type {Item, Note} from './selection';
 import type {Tab} from './tab';
 
 type Point = Blockly.utils.Coordinate;
 
 /** What is in the hand. It is where it was before once it is let go outside of the page. */
-export interface Leaving {
-  copied: Copied | CopiedBlocks;
+export interface OutgoingDrag {
+  copied: CopiedItem | CopiedBlocks;
   /** How it goes to another behaviour: what comes from the toolbox was never here. */
   how: 'moved' | 'copied' | 'added';
   /** The blocks at the top of what goes; none: it is a note. */
@@ -27,7 +27,7 @@ export interface Leaving {
   remove(): void;
 }
 
-export interface CarryingWindow {
+export interface CrossTabDragListener {
   /** Something in the hand, of the behaviour `home`, is outside of the page there; not `out`: it is not any more. */
   carried(x: number, y: number, out: boolean, home: string): void;
   /** How it looks, as a `data:` URL of a PNG with so many pixels in one of the page. */
@@ -38,7 +38,7 @@ export interface CarryingWindow {
   brought(count: number, how: string, from: string): void;
 }
 
-interface Step {
+interface UndoStep {
   tab: Tab;
   group: string;
   /** The same without undo, when other edits came later. */
@@ -46,14 +46,14 @@ interface Step {
 }
 
 /** What was held when another behaviour came to show: the mouse is still pressed. */
-interface Hand {
+interface HeldDrag {
   from: Tab;
-  what: Leaving;
+  what: OutgoingDrag;
   /** It lies on the page of the behaviour that shows, and is dragged there. */
-  visit: Visit | null;
+  visit: VisitingCopy | null;
 }
 
-interface Visit {
+interface VisitingCopy {
   tab: Tab;
   made: Item[];
   group: string;
@@ -62,15 +62,15 @@ interface Visit {
 }
 
 /** How large a picture of what is carried is at most, in pixels of the page. */
-const MOST_WIDE = 360;
-const MOST_HIGH = 240;
+const MAX_PICTURE_WIDTH = 360;
+const MAX_PICTURE_HEIGHT = 240;
 
-export function isOutside({x, y}: Point): boolean {
+export function isOutsideViewport({x, y}: Point): boolean {
   return x < 0 || y < 0 || x >= window.innerWidth || y >= window.innerHeight;
 }
 
 /** What would leave the page with this; null: it stays. */
-export function leaving(item: unknown, fromToolbox: boolean, copies: boolean, mouse: Point): Leaving | null {
+export function createOutgoingDrag(item: unknown, fromToolbox: boolean, copies: boolean, mouse: Point): OutgoingDrag | null {
   const isOne = item instanceof Blockly.BlockSvg || item instanceof Blockly.comments.RenderedWorkspaceComment;
   const copied = isOne ? stateOf(item, true) : null;
   if (!isOne || !copied) return null;
@@ -88,98 +88,98 @@ export function leaving(item: unknown, fromToolbox: boolean, copies: boolean, mo
 }
 
 /** The same of blocks and notes that were chosen together. */
-export function leavingTogether(runs: readonly Blockly.BlockSvg[][], notes: readonly Note[], copies: boolean, mouse: Point): Leaving | null {
+export function createOutgoingGroupDrag(runs: readonly Blockly.BlockSvg[][], notes: readonly Note[], copies: boolean, mouse: Point): OutgoingDrag | null {
   const heads = runs.flatMap(([head]) => head ?? []);
   const first = heads[0] ?? notes[0];
   if (!first) return null;
   const all = [...runs.flat(), ...notes];
   return {
     copied: copyOfAll(runs, notes),
-    how: copies || !all.every((each) => each.isDeletable()) ? 'copied' : 'moved',
+    how: copies || !all.every((item) => item.isDeletable()) ? 'copied' : 'moved',
     heads,
     place: first.getRelativeToSurfaceXY(),
     grip: Blockly.utils.Coordinate.difference(mouse, first.getRelativeToSurfaceXY()),
-    isGone: () => all.some((each) => each.isDeadOrDying()),
+    isGone: () => all.some((item) => item.isDeadOrDying()),
     remove: () => removeAll(runs, notes),
   };
 }
 
-export class Carrying {
+export class CrossTabDrag {
   private mouse: Point | null = null;
   private frame = 0;
-  private isTold = false;
-  private held: {tab: Tab; what: Leaving} | null = null;
+  private isReported = false;
+  private pendingDrop: {tab: Tab; what: OutgoingDrag} | null = null;
   /** What undoes the last one, the other behaviour first. */
-  private steps: Step[] = [];
+  private steps: UndoStep[] = [];
 
-  private hand: Hand | null = null;
+  private hand: HeldDrag | null = null;
   /** Another behaviour comes to show, or what visits one goes: the ends of drags that follow are none of a person's. */
   private turning = false;
   /** The newest picture that was asked for. */
   private picture = 0;
 
-  constructor(private readonly window: CarryingWindow, private readonly shown: () => Tab) {}
+  constructor(private readonly window: CrossTabDragListener, private readonly getActiveTab: () => Tab) {}
 
   /** Where the mouse is with these in the hand, while that is outside; told once in a frame. */
-  over(mouse: Point | null, items: readonly Item[] = []): void {
+  trackOutside(mouse: Point | null, items: readonly Item[] = []): void {
     if (this.turning) return;
-    if (mouse && this.hand?.visit) window.setTimeout(() => this.leave());  // not in the middle of its drag
-    if (mouse && !this.mouse && items.length) void this.takePicture(items);
+    if (mouse && this.hand?.visit) window.setTimeout(() => this.endVisit());  // not in the middle of its drag
+    if (mouse && !this.mouse && items.length) void this.updateDragImage(items);
     this.mouse = mouse;
-    if (mouse) this.frame ||= window.requestAnimationFrame(() => this.tell());
-    else this.tell();
+    if (mouse) this.frame ||= window.requestAnimationFrame(() => this.notifyPosition());
+    else this.notifyPosition();
   }
 
-  letGo(tab: Tab, what: Leaving, mouse: Point): void {
+  dropOutside(tab: Tab, drag: OutgoingDrag, mouse: Point): void {
     if (this.turning) {
-      this.hand ??= this.take({from: tab, what, visit: null});
+      this.hand ??= this.startHolding({from: tab, what: drag, visit: null});
       return;
     }
     const {hand} = this;
-    if (hand) this.drop();
-    this.held = hand ? {tab: hand.from, what: hand.what} : {tab, what};
+    if (hand) this.stopHolding();
+    this.pendingDrop = hand ? {tab: hand.from, what: hand.what} : {tab, what: drag};
     this.window.dropped(Math.round(mouse.x), Math.round(mouse.y));
   }
 
   /** Shows another behaviour. What is held outside of the page goes back to where it was, and stays in the hand. */
-  turn(show: () => void): void {
-    if (this.hand?.visit) this.leave();
-    this.quietly(show);
+  switchTab(show: () => void): void {
+    if (this.hand?.visit) this.endVisit();
+    this.runWhileSwitching(show);
   }
 
   /** A drag on the page has ended; that of a visitor has brought it here, or it is where it was. */
-  dragEnded(placed: boolean, copies: boolean): void {
+  dragEnded(isPlaced: boolean, copies: boolean): void {
     const {hand} = this;
     if (this.turning || !hand?.visit) return;
-    if (!placed) return this.drop();
+    if (!isPlaced) return this.stopHolding();
     const {from, what, visit: {tab, made, group}} = hand;
     hand.visit = null;
-    this.drop();
+    this.stopHolding();
     const how = copies && what.how === 'moved' ? 'copied' : what.how;
     const removes = how === 'moved' && !what.isGone();
     if (tab === from) {  // it came back by a detour
-      if (removes) inGroup(group, what.remove);
+      if (removes) withEventGroup(group, what.remove);
       return;
     }
-    this.steps = [stepOf(tab, group, made)];
-    if (removes) this.remove(what, from);
-    this.window.brought(countIn(what.copied), how, from.key);
+    this.steps = [createUndoStep(tab, group, made)];
+    if (removes) this.removeOriginals(what, from);
+    this.window.brought(countCopiedBlocks(what.copied), how, from.key);
   }
 
   /** Lays it free on the canvas of `to`, in sight and selected, and takes it away where it was. */
-  bring(to: Tab): void {
-    const {held} = this;
-    this.held = null;
+  dropInto(to: Tab): void {
+    const {pendingDrop: held} = this;
+    this.pendingDrop = null;
     if (!held || held.tab === to) return;
     const {tab: from, what} = held;
     this.steps = [];
-    if (!this.lay(what.copied, to)) return;
-    if (what.how === 'moved' && !what.isGone()) this.remove(what, from);
-    this.window.brought(countIn(what.copied), what.how, from.key);
+    if (!this.insertCopy(what.copied, to)) return;
+    if (what.how === 'moved' && !what.isGone()) this.removeOriginals(what, from);
+    this.window.brought(countCopiedBlocks(what.copied), what.how, from.key);
   }
 
   /** Undoes the last `bring`, in both behaviours, after the edits of this frame have reached the lists of edits. */
-  giveBack(): void {
+  undoDrop(): void {
     const {steps} = this;
     this.steps = [];
     window.requestAnimationFrame(() => window.setTimeout(() => {
@@ -193,7 +193,7 @@ export class Carrying {
 
   // -- in the hand, while another behaviour shows
 
-  private take(hand: Hand): Hand {
+  private startHolding(hand: HeldDrag): HeldDrag {
     window.addEventListener('pointermove', this.onMove, true);
     window.addEventListener('pointerup', this.onUp, true);
     window.addEventListener('keydown', this.onKey, true);
@@ -201,80 +201,80 @@ export class Carrying {
   }
 
   /** Nothing is in the hand any more; what it was is where it was. */
-  private drop(): void {
-    if (this.hand?.visit) this.leave();
+  private stopHolding(): void {
+    if (this.hand?.visit) this.endVisit();
     this.hand = null;
     window.removeEventListener('pointermove', this.onMove, true);
     window.removeEventListener('pointerup', this.onUp, true);
     window.removeEventListener('keydown', this.onKey, true);
     Blockly.Events.setGroup(false);
-    this.over(null);
+    this.trackOutside(null);
   }
 
   private readonly onMove = (event: PointerEvent): void => {
     if (!this.hand || this.hand.visit) return;
     const mouse = new Blockly.utils.Coordinate(event.clientX, event.clientY);
-    if (!(event.buttons & 1)) this.drop();  // it was let go where the page could not see it
-    else if (isOutside(mouse)) this.over(mouse);
-    else this.visit(event, mouse);
+    if (!(event.buttons & 1)) this.stopHolding();  // it was let go where the page could not see it
+    else if (isOutsideViewport(mouse)) this.trackOutside(mouse);
+    else this.startVisit(event, mouse);
   };
 
   private readonly onUp = (event: PointerEvent): void => {
     const {hand} = this;
     if (!hand || hand.visit) return;  // the drag on the page ends by itself
     const mouse = new Blockly.utils.Coordinate(event.clientX, event.clientY);
-    if (isOutside(mouse)) this.letGo(hand.from, hand.what, mouse);
-    else this.drop();
+    if (isOutsideViewport(mouse)) this.dropOutside(hand.from, hand.what, mouse);
+    else this.stopHolding();
   };
 
   private readonly onKey = (event: KeyboardEvent): void => {
-    if (event.key === 'Escape' && this.hand && !this.hand.visit) this.drop();
+    if (event.key === 'Escape' && this.hand && !this.hand.visit) this.stopHolding();
   };
 
   /** The mouse is on the page of another behaviour: it has a copy in the hand there, which a person drags on. */
-  private visit(event: PointerEvent, mouse: Point): void {
+  private startVisit(event: PointerEvent, mouse: Point): void {
     const hand = this.hand!;
-    const tab = this.shown();
+    const tab = this.getActiveTab();
     const {workspace} = tab;
     const {scrollX, scrollY} = workspace;
     const {svgMath, Coordinate} = Blockly.utils;
-    const held = Coordinate.difference(svgMath.screenToWsCoordinates(workspace, mouse), hand.what.grip);
+    const dragPosition = Coordinate.difference(svgMath.screenToWsCoordinates(workspace, mouse), hand.what.grip);
     // Never left of what is in sight, as under the toolbox: Blockly would scroll to it, and all else would move.
-    const {left, top} = inSight(workspace);
-    const wanted = new Coordinate(Math.max(held.x, left), Math.max(held.y, top));
-    const variables = new Set(workspace.getVariableMap().getAllVariables().map((each) => each.getId()));
-    this.over(null);
+    const {left, top} = visibleArea(workspace);
+    const position = new Coordinate(Math.max(dragPosition.x, left), Math.max(dragPosition.y, top));
+    const variables = new Set(workspace.getVariableMap().getAllVariables().map((variable) => variable.getId()));
+    this.trackOutside(null);
     Blockly.Events.setGroup(true);  // until it is let go: all of it is one step
-    const made = add(hand.what.copied, workspace, wanted);
-    const [first] = made;
-    if (!first) return this.drop();
+    const addedItems = pasteItems(hand.what.copied, workspace, position);
+    const [first] = addedItems;
+    if (!first) return this.stopHolding();
     workspace.scroll(scrollX, scrollY);  // what has the keys is brought into sight, but the hand leads this one
-    hand.visit = {tab, made, group: Blockly.Events.getGroup(), variables};
+    hand.visit = {tab, made: addedItems, group: Blockly.Events.getGroup(), variables};
     const grip = Coordinate.sum(first.getRelativeToSurfaceXY(), hand.what.grip);
-    takeInHand(first, svgMath.wsToScreenCoordinates(workspace, grip), event);
+    startDragAt(first, svgMath.wsToScreenCoordinates(workspace, grip), event);
   }
 
   /** Takes what visits a behaviour out of it again, as if it had never been there. */
-  private leave(): void {
+  private endVisit(): void {
     const visit = this.hand?.visit;
     if (!visit) return;
     this.hand!.visit = null;
     const {tab, made, group, variables} = visit;
-    this.quietly(() => tab.letGo());
-    inGroup(group, () => {
-      for (const each of made) if (!each.isDeadOrDying()) {
-        tab.bin.leaves(each.id);
-        each.dispose();
+    this.runWhileSwitching(() => tab.cancelInteraction());
+    withEventGroup(group, () => {
+      for (const item of made) if (!item.isDeadOrDying()) {
+        tab.bin.markAsMoved(item.id);
+        item.dispose();
       }
       const map = tab.workspace.getVariableMap();
-      for (const each of map.getAllVariables()) if (!variables.has(each.getId())) map.deleteVariable(each);
+      for (const variable of map.getAllVariables()) if (!variables.has(variable.getId())) map.deleteVariable(variable);
     });
     Blockly.Events.setGroup(false);
-    forgetSoon(tab.workspace, group);
-    window.requestAnimationFrame(() => window.setTimeout(() => tab === this.shown() && tab.program.tellHistory()));
+    discardUndoGroup(tab.workspace, group);
+    window.requestAnimationFrame(() => window.setTimeout(() => tab === this.getActiveTab() && tab.program.notifyHistory()));
   }
 
-  private quietly(act: () => void): void {
+  private runWhileSwitching(act: () => void): void {
     const before = this.turning;
     this.turning = true;
     try {
@@ -284,56 +284,56 @@ export class Carrying {
     }
   }
 
-  private async takePicture(items: readonly Item[]): Promise<void> {
+  private async updateDragImage(items: readonly Item[]): Promise<void> {
     const mine = this.picture += 1;
     const {workspace} = items[0]!;
-    const picture = await pictureOf(workspace, false, new Set(items));
+    const picture = await createPicture(workspace, false, new Set(items));
     if (!picture) return;
-    const shown = Math.min(workspace.scale, MOST_WIDE / picture.width, MOST_HIGH / picture.height);
+    const scale = Math.min(workspace.scale, MAX_PICTURE_WIDTH / picture.width, MAX_PICTURE_HEIGHT / picture.height);
     const ratio = window.devicePixelRatio;
-    const data = await asPng(picture, shown * ratio);
+    const data = await renderPng(picture, scale * ratio);
     if (mine === this.picture && this.mouse) this.window.pictured(data, ratio);
   }
 
-  private tell(): void {
+  private notifyPosition(): void {
     window.cancelAnimationFrame(this.frame);
     this.frame = 0;
-    if (!this.mouse && !this.isTold) return;
-    this.isTold = this.mouse !== null;
-    const home = (this.hand?.from ?? this.shown()).key;
-    this.window.carried(Math.round(this.mouse?.x ?? 0), Math.round(this.mouse?.y ?? 0), this.isTold, home);
+    if (!this.mouse && !this.isReported) return;
+    this.isReported = this.mouse !== null;
+    const home = (this.hand?.from ?? this.getActiveTab()).key;
+    this.window.carried(Math.round(this.mouse?.x ?? 0), Math.round(this.mouse?.y ?? 0), this.isReported, home);
   }
 
-  private lay(copied: Copied | CopiedBlocks, tab: Tab): boolean {
+  private insertCopy(copied: CopiedItem | CopiedBlocks, tab: Tab): boolean {
     const {workspace} = tab;
-    const {left, right, top, bottom} = inSight(workspace);
-    const wanted = new Blockly.utils.Coordinate(left + (right - left) / 4, top + (bottom - top) / 4);
-    const [made, group] = inOneStep(() => [add(copied, workspace, wanted), Blockly.Events.getGroup()] as const);
+    const {left, right, top, bottom} = visibleArea(workspace);
+    const position = new Blockly.utils.Coordinate(left + (right - left) / 4, top + (bottom - top) / 4);
+    const [made, group] = withUndoGroup(() => [pasteItems(copied, workspace, position), Blockly.Events.getGroup()] as const);
     const [first] = made;
     if (!first) return false;
     const box = (first as Blockly.IBoundedElement).getBoundingRectangle();
-    if (first instanceof Blockly.BlockSvg && !inSight(workspace).contains(box.left, box.top)) tab.reveal(first.id);
-    this.steps.push(stepOf(tab, group, made));
+    if (first instanceof Blockly.BlockSvg && !visibleArea(workspace).contains(box.left, box.top)) tab.reveal(first.id);
+    this.steps.push(createUndoStep(tab, group, made));
     return true;
   }
 
-  private remove({heads, copied, place, remove}: Leaving, tab: Tab): void {
-    const where = heads[0]?.getRelativeToSurfaceXY() ?? place;
-    const group = inOneStep(() => {
-      for (const {id} of heads) tab.bin.leaves(id);
+  private removeOriginals({heads, copied, place, remove}: OutgoingDrag, tab: Tab): void {
+    const position = heads[0]?.getRelativeToSurfaceXY() ?? place;
+    const group = withUndoGroup(() => {
+      for (const {id} of heads) tab.bin.markAsMoved(id);
       remove();
       return Blockly.Events.getGroup();
     });
-    this.steps.push({tab, group, otherwise: () => void add(copied, tab.workspace, where)});
+    this.steps.push({tab, group, otherwise: () => void pasteItems(copied, tab.workspace, position)});
   }
 }
 
 /** What undoes that these were made. */
-function stepOf(tab: Tab, group: string, made: readonly Item[]): Step {
-  return {tab, group, otherwise: () => inOneStep(() => made.forEach((each) => !each.isDeadOrDying() && each.dispose()))};
+function createUndoStep(tab: Tab, group: string, items: readonly Item[]): UndoStep {
+  return {tab, group, otherwise: () => withUndoGroup(() => items.forEach((item) => !item.isDeadOrDying() && item.dispose()))};
 }
 
-function inGroup(group: string, change: () => void): void {
+function withEventGroup(group: string, change: () => void): void {
   const before = Blockly.Events.getGroup();
   Blockly.Events.setGroup(group);
   try {
@@ -344,8 +344,8 @@ function inGroup(group: string, change: () => void): void {
 }
 
 /** How many blocks a person sees in it; 0: it is a note. */
-function countIn(copied: Copied | CopiedBlocks): number {
+function countCopiedBlocks(copied: CopiedItem | CopiedBlocks): number {
   if (copied.nepStudio === 'note') return 0;
   const states = copied.nepStudio === 'blocks' ? copied.states : [copied.state];
-  return states.reduce((sum, each) => sum + countOf(each as Blockly.serialization.blocks.State), 0);
+  return states.reduce((sum, state) => sum + countBlocks(state as Blockly.serialization.blocks.State), 0);
 }

@@ -29,48 +29,48 @@ export interface ChoiceConfig extends Blockly.FieldConfig {
 }
 
 /** What people may type: the words of the last option, and those of the question. */
-const TYPED = {
+const PROMPTS = {
   topic: {other: () => t('Other topic…'), name: () => t('Topic name')},
   field: {other: () => t('Other field…'), name: () => t('Field name')},
   message: {other: () => t('New message…'), name: () => t('Message name')},
 };
 
-const OTHER = '\u0000other';
+const OTHER_VALUE = '\u0000other';
 
 export class FieldChoice extends Blockly.FieldDropdown {
-  private readonly given: Option[];
+  private readonly staticOptions: Option[];
   private readonly source: string;
   /** The value the block has although no option offers it. */
-  private kept: string | null = null;
+  private retainedValue: string | null = null;
 
   /** `typed`: what a person may type instead of choosing, or "". */
-  constructor(config: ChoiceConfig, private readonly typed: keyof typeof TYPED | '' = '') {
+  constructor(config: ChoiceConfig, private readonly typed: keyof typeof PROMPTS | '' = '') {
     super(Blockly.Field.SKIP_SETUP);
-    this.given = (config.options ?? []).filter(isOption);
+    this.staticOptions = (config.options ?? []).filter(isOption);
     this.source = config.source ?? (typed === 'topic' ? 'topics' : '');
     const value = config.value ?? config.topic ?? config.text;
-    if (value !== undefined) this.kept = value;
-    this.setOptions(() => this.choices());
+    if (value !== undefined) this.retainedValue = value;
+    this.setOptions(() => this.createOptions());
     if (value !== undefined) this.setValue(value);
     this.configure_(config);
   }
 
   /** What is known to choose from now. */
-  protected offered(): Option[] {
-    return (this.source && sources.get(this.source)) || this.given;
+  protected availableOptions(): Option[] {
+    return (this.source && sources.get(this.source)) || this.staticOptions;
   }
 
   /** What stands in the question for another one: it can be taken as it is, without a keyboard. */
-  protected suggested(): string {
+  protected promptDefault(): string {
     return this.value_ ?? '';
   }
 
   /** Present options, always with the present value among them and never empty. */
-  private choices(): Option[] {
-    const options: Option[] = [...this.offered()];
-    const kept = this.kept;
-    if (kept !== null && !options.some((each) => each[1] === kept)) options.push([kept, kept]);
-    if (this.typed) options.push([TYPED[this.typed].other(), OTHER]);
+  private createOptions(): Option[] {
+    const options: Option[] = [...this.availableOptions()];
+    const value = this.retainedValue;
+    if (value !== null && !options.some((option) => option[1] === value)) options.push([value, value]);
+    if (this.typed) options.push([PROMPTS[this.typed].other(), OTHER_VALUE]);
     return options.length ? options : [['–', '']];
   }
 
@@ -85,26 +85,26 @@ export class FieldChoice extends Blockly.FieldDropdown {
   override setOptions(options: Blockly.MenuGenerator): void {
     this.menuGenerator_ = options;
     const first = this.getOptions(false)[0];
-    if (Array.isArray(first)) this.setValue(first[1] === OTHER ? '' : first[1]);
+    if (Array.isArray(first)) this.setValue(first[1] === OTHER_VALUE ? '' : first[1]);
   }
 
   protected override doClassValidation_(value?: unknown): string | null {
-    return typeof value === 'string' && value !== OTHER ? value : null;
+    return typeof value === 'string' && value !== OTHER_VALUE ? value : null;
   }
 
   protected override doValueUpdate_(value: string): void {
-    this.kept = value;
+    this.retainedValue = value;
     this.getOptions(false);
     super.doValueUpdate_(value);
   }
 
   protected override onItemSelected_(menu: Blockly.Menu, item: Blockly.MenuItem): void {
-    if (item.getValue() !== OTHER) {
+    if (item.getValue() !== OTHER_VALUE) {
       super.onItemSelected_(menu, item);
       return;
     }
-    Blockly.dialog.prompt(TYPED[this.typed || 'topic'].name(), this.suggested(), (words) => {
-      const name = words?.trim().replace(/\s+/g, ' ');
+    Blockly.dialog.prompt(PROMPTS[this.typed || 'topic'].name(), this.promptDefault(), (text) => {
+      const name = text?.trim().replace(/\s+/g, ' ');
       if (name) this.setValue(name);
     });
     document.querySelector<HTMLInputElement>('.blocklyDialogInput')?.select();
@@ -134,7 +134,7 @@ export class FieldBroadcast extends FieldChoice {
     super(config, 'message');
   }
 
-  protected override offered(): Option[] {
+  protected override availableOptions(): Option[] {
     const workspace = this.getSourceBlock()?.workspace as Blockly.WorkspaceSvg | undefined;
     const main = workspace?.targetWorkspace ?? workspace;
     const blocks = FieldBroadcast.types.flatMap((type) => main?.getBlocksByType(type, false) ?? []);
@@ -143,10 +143,10 @@ export class FieldBroadcast extends FieldChoice {
   }
 
   /** The first of “message 1”, “message 2” and so on that no block has. */
-  protected override suggested(): string {
-    const used = new Set(this.offered().map(([, name]) => name));
+  protected override promptDefault(): string {
+    const usedNames = new Set(this.availableOptions().map(([, name]) => name));
     let number = 1;
-    while (used.has(t('message {number}', {number}))) number += 1;
+    while (usedNames.has(t('message {number}', {number}))) number += 1;
     return t('message {number}', {number});
   }
 

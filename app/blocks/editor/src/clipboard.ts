@@ -2,15 +2,15 @@
 // that it can be pasted in another tab, in another Studio, or sent to somebody. What is pasted lies free and in sight.
 import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
-import {freePlace, inSight, obstacles} from './free_place';
+import {findFreePosition, visibleArea, obstacles} from './free_place';
 import {focusedBlock} from './help';
-import {type Item, type Note, allChosenWith, chosenWith, notesChosenWith, removeChosenWith, runsOf, selectionOf} from './selection';
+import {type Item, type Note, getSelectedItemsWith, getSelectedBlocksWith, getSelectedNotesWith, deleteSelectionWith, groupIntoStacks, selectionOf} from './selection';
 import {type BlockState, unwrapUnknown, wrapUnknown} from './unknown_blocks';
 
 /** Every text of ours begins so; `app/ui/blockly/bridge.py` looks for it. */
-const MARK = '{"nepStudio":';
+const JSON_PREFIX = '{"nepStudio":';
 
-export interface Copied {
+export interface CopiedItem {
   nepStudio: 'block' | 'note';
   state: BlockState;
 }
@@ -30,7 +30,7 @@ export interface SystemClipboard {
   read(): Promise<string>;
 }
 
-const FROM_ORIGINAL = 34;
+const PASTE_OFFSET = 34;
 
 export class Clipboard {
   /** What was copied here: pasted when the computer's clipboard holds other things by now. */
@@ -54,7 +54,7 @@ export class Clipboard {
   cut(item = focusedItem()): boolean {
     if (!item || item.workspace.isFlyout || !item.isDeletable() || !this.copy(item)) return false;
     if (item instanceof Blockly.BlockSvg) item.checkAndDelete();
-    else if (!removeChosenWith(item)) inOneStep(() => item.dispose());
+    else if (!deleteSelectionWith(item)) withUndoGroup(() => item.dispose());
     return true;
   }
 
@@ -62,24 +62,24 @@ export class Clipboard {
   duplicate(item = focusedItem()): boolean {
     if (!item || item.workspace.isFlyout) return false;
     const copied = copyOf(item);
-    if (copied) add(copied, item.workspace, beside(item));
+    if (copied) pasteItems(copied, item.workspace, positionBeside(item));
     return copied !== null;
   }
 
   /** At a place of the page, else under the mouse, beside the block that has the keys, or in the middle. */
-  async paste(where: {x: number; y: number} | null = null): Promise<void> {
-    const read = parse(await this.system.read()) ?? parse(this.copied);
+  async paste(pagePosition: {x: number; y: number} | null = null): Promise<void> {
+    const read = parseClipboard(await this.system.read()) ?? parseClipboard(this.copied);
     if (!read) return;
     const workspace = Blockly.common.getMainWorkspace() as Blockly.WorkspaceSvg;
-    add(read, workspace, where ? toCanvas(workspace, where) : this.wanted(workspace));
+    pasteItems(read, workspace, pagePosition ? toWorkspaceCoordinates(workspace, pagePosition) : this.pastePosition(workspace));
   }
 
-  private wanted(workspace: Blockly.WorkspaceSvg): Point {
+  private pastePosition(workspace: Blockly.WorkspaceSvg): Point {
     const block = focusedBlock();
     const byKeys = Blockly.keyboardNavigationController.getIsActive();
-    if (!byKeys && this.mouse && isCanvas(workspace, this.mouse)) return toCanvas(workspace, this.mouse);
-    if (block && block.workspace === workspace) return beside(block);
-    const {left, right, top, bottom} = inSight(workspace);
+    if (!byKeys && this.mouse && isOverCanvas(workspace, this.mouse)) return toWorkspaceCoordinates(workspace, this.mouse);
+    if (block && block.workspace === workspace) return positionBeside(block);
+    const {left, right, top, bottom} = visibleArea(workspace);
     return new Blockly.utils.Coordinate(left + (right - left) / 3, top + (bottom - top) / 3);
   }
 }
@@ -91,24 +91,24 @@ export function focusedItem(): Item | null {
 }
 
 /** `stack`: with the blocks that hang below it. */
-export function stateOf(item: Item, stack = false): Copied | null {
+export function stateOf(item: Item, stack = false): CopiedItem | null {
   const data = item.toCopyData(stack) as {blockState?: unknown; commentState?: unknown} | null;
   if (data?.blockState) return {nepStudio: 'block', state: unwrapUnknown(data.blockState as BlockState)};
   return data?.commentState ? {nepStudio: 'note', state: data.commentState as BlockState} : null;
 }
 
 /** The item, or all that are chosen with it. */
-function copyOf(item: Item): Copied | CopiedBlocks | null {
-  if (!allChosenWith(item).length) return stateOf(item);
-  const copied = copyOfAll(runsOf(chosenWith(item)), notesChosenWith(item));
+function copyOf(item: Item): CopiedItem | CopiedBlocks | null {
+  if (!getSelectedItemsWith(item).length) return stateOf(item);
+  const copied = copyOfAll(groupIntoStacks(getSelectedBlocksWith(item)), getSelectedNotesWith(item));
   const [only, ...more] = copied.states;
   return only && !more.length && !copied.notes ? {nepStudio: 'block', state: only} : copied;
 }
 
 export function copyOfAll(runs: readonly Blockly.BlockSvg[][], notes: readonly Note[]): CopiedBlocks {
-  const states = runs.map(stateOfRun).filter((each) => each !== null);
-  const words = notes.map((each) => stateOf(each)?.state).filter((each) => each !== undefined);
-  return {nepStudio: 'blocks', states, ...(words.length && {notes: words})};
+  const states = runs.map(stateOfRun).filter((state) => state !== null);
+  const noteStates = notes.map((note) => stateOf(note)?.state).filter((state) => state !== undefined);
+  return {nepStudio: 'blocks', states, ...(noteStates.length && {notes: noteStates})};
 }
 
 /** Blocks that hang below each other, without what hangs below them and is not chosen. */
@@ -116,24 +116,24 @@ export function stateOfRun(run: readonly Blockly.BlockSvg[]): BlockState | null 
   let state: BlockState | null = null;
   for (const block of [...run].reverse()) {
     const copied = stateOf(block);
-    if (copied) state = state ? {...copied.state, next: {block: withoutPlace(state)}} : copied.state;
+    if (copied) state = state ? {...copied.state, next: {block: withoutPosition(state)}} : copied.state;
   }
   return state;
 }
 
-function withoutPlace({x: _x, y: _y, ...rest}: BlockState): BlockState {
+function withoutPosition({x: _x, y: _y, ...rest}: BlockState): BlockState {
   return rest as BlockState;
 }
 
 /** What is on the clipboard, if it is ours. It may come from anywhere: whatever is in it has still to be made. */
-function parse(text: string): Copied | CopiedBlocks | null {
-  if (!text.startsWith(MARK)) return null;
+function parseClipboard(text: string): CopiedItem | CopiedBlocks | null {
+  if (!text.startsWith(JSON_PREFIX)) return null;
   try {
-    const {nepStudio, state, states, notes} = JSON.parse(text) as Copied & {states?: unknown; notes?: unknown};
+    const {nepStudio, state, states, notes} = JSON.parse(text) as CopiedItem & {states?: unknown; notes?: unknown};
     if ((nepStudio as string) === 'blocks') {
-      const good = (Array.isArray(states) ? states as unknown[] : []).filter(isBlock);
-      const words = (Array.isArray(notes) ? notes as unknown[] : []).filter(isState);
-      return good.length || words.length ? {nepStudio: 'blocks', states: good, ...(words.length && {notes: words})} : null;
+      const validBlocks = (Array.isArray(states) ? states as unknown[] : []).filter(isBlock);
+      const validNotes = (Array.isArray(notes) ? notes as unknown[] : []).filter(isState);
+      return validBlocks.length || validNotes.length ? {nepStudio: 'blocks', states: validBlocks, ...(validNotes.length && {notes: validNotes})} : null;
     }
     const isOne = ['block', 'note'].includes(nepStudio) && typeof state === 'object' && state !== null;
     return isOne && (nepStudio === 'note' || typeof state.type === 'string') ? {nepStudio, state} : null;
@@ -150,24 +150,24 @@ function isBlock(state: unknown): state is BlockState {
   return isState(state) && typeof state.type === 'string';
 }
 
-function toCanvas(workspace: Blockly.WorkspaceSvg, {x, y}: {x: number; y: number}): Point {
+function toWorkspaceCoordinates(workspace: Blockly.WorkspaceSvg, {x, y}: {x: number; y: number}): Point {
   return Blockly.utils.svgMath.screenToWsCoordinates(workspace, new Blockly.utils.Coordinate(x, y));
 }
 
 /** Whether the mouse is over the canvas itself, not over the toolbox or what floats. */
-function isCanvas(workspace: Blockly.WorkspaceSvg, {x, y}: {x: number; y: number}): boolean {
+function isOverCanvas(workspace: Blockly.WorkspaceSvg, {x, y}: {x: number; y: number}): boolean {
   const under = document.elementFromPoint(x, y);
   return under !== null && workspace.getParentSvg().contains(under) && !under.closest('.blocklyFlyout');
 }
 
 /** To the right of the stack that it is in, at its own height. */
-function beside(item: Item): Point {
+function positionBeside(item: Item): Point {
   const stack = item instanceof Blockly.BlockSvg ? item.getRootBlock() : item;
   const {right} = (stack as Blockly.IBoundedElement).getBoundingRectangle();
-  return new Blockly.utils.Coordinate(right + FROM_ORIGINAL, item.getRelativeToSurfaceXY().y);
+  return new Blockly.utils.Coordinate(right + PASTE_OFFSET, item.getRelativeToSurfaceXY().y);
 }
 
-export function inOneStep<T>(change: () => T): T {
+export function withUndoGroup<T>(change: () => T): T {
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
   try {
@@ -178,65 +178,65 @@ export function inOneStep<T>(change: () => T): T {
 }
 
 /** Makes it as one step that undo takes back, lets it lie free, and gives it the keys; none: it can't be made. */
-export function add(copied: Copied | CopiedBlocks, workspace: Blockly.WorkspaceSvg, wanted: Point): Item[] {
-  const there = new Set<unknown>([...workspace.getTopBlocks(false), ...workspace.getTopComments()]);
+export function pasteItems(copied: CopiedItem | CopiedBlocks, workspace: Blockly.WorkspaceSvg, position: Point): Item[] {
+  const existing = new Set<unknown>([...workspace.getTopBlocks(false), ...workspace.getTopComments()]);
   const {scrollX, scrollY} = workspace;
   workspace.hideChaff();
-  const made = inOneStep(() => {
+  const pasted = withUndoGroup(() => {
     try {
-      return layFree(makeAll(copied, workspace, wanted), wanted);
+      return moveToFreePosition(createItems(copied, workspace, position), position);
     } catch (error) {
       console.warn(`not pasted: ${String(error)}`);
-      for (const each of [...workspace.getTopBlocks(false), ...workspace.getTopComments()]) {
-        if (!there.has(each)) each.dispose();
+      for (const item of [...workspace.getTopBlocks(false), ...workspace.getTopComments()]) {
+        if (!existing.has(item)) item.dispose();
       }
       return [];
     }
   });
   workspace.scroll(scrollX, scrollY);  // more on the canvas is no reason to move what is there
-  if (made[0]) Blockly.getFocusManager().focusNode(made[0]);
-  if (made.length > 1) selectionOf(workspace)?.choose(made.flatMap(allOf));
-  return made;
+  if (pasted[0]) Blockly.getFocusManager().focusNode(pasted[0]);
+  if (pasted.length > 1) selectionOf(workspace)?.select(pasted.flatMap(stackItems));
+  return pasted;
 }
 
 /** The note, or the blocks of the stack. */
-function allOf(top: Item): Item[] {
+function stackItems(top: Item): Item[] {
   if (!(top instanceof Blockly.BlockSvg)) return [top];
   const blocks: Blockly.BlockSvg[] = [];
-  for (let each: Blockly.BlockSvg | null = top; each; each = each.getNextBlock()) blocks.push(each);
+  for (let block: Blockly.BlockSvg | null = top; block; block = block.getNextBlock()) blocks.push(block);
   return blocks;
 }
 
 /** Together at a free place, as they were beside each other. */
-function layFree(made: Item[], wanted: Point): Item[] {
+function moveToFreePosition(items: Item[], position: Point): Item[] {
   Blockly.renderManagement.triggerQueuedRenders();
-  const boxes = made.map((each) => (each as Blockly.IBoundedElement).getBoundingRectangle());
+  const boxes = items.map((item) => (item as Blockly.IBoundedElement).getBoundingRectangle());
   const [left, top] = [Math.min(...boxes.map((box) => box.left)), Math.min(...boxes.map((box) => box.top))];
   const size = {width: Math.max(...boxes.map((box) => box.right)) - left,
     height: Math.max(...boxes.map((box) => box.bottom)) - top};
-  const [first] = made;
-  if (!first) return made;
-  const place = freePlace(wanted, size, obstacles(first.workspace, new Set(made)), inSight(first.workspace));
-  for (const each of made) each.moveBy(place.x - left, place.y - top);
-  return made;
+  const [first] = items;
+  if (!first) return items;
+  const freePosition = findFreePosition(position, size, obstacles(first.workspace, new Set(items)), visibleArea(first.workspace));
+  for (const item of items) item.moveBy(freePosition.x - left, freePosition.y - top);
+  return items;
 }
 
-function makeAll(copied: Copied | CopiedBlocks, workspace: Blockly.WorkspaceSvg, wanted: Point): Item[] {
-  if (copied.nepStudio !== 'blocks') return [make(copied, workspace, wanted)];
-  const each = (nepStudio: 'block' | 'note') => (state: BlockState) => {
-    const place = new Blockly.utils.Coordinate(Number(state['x']) || 0, Number(state['y']) || 0);
-    return make({nepStudio, state}, workspace, place);
+function createItems(copied: CopiedItem | CopiedBlocks, workspace: Blockly.WorkspaceSvg, position: Point): Item[] {
+  if (copied.nepStudio !== 'blocks') return [createItem(copied, workspace, position)];
+  const createFrom = (nepStudio: 'block' | 'note') => (state: BlockState) => {
+    const savedPosition = new Blockly.utils.Coordinate(Number(state['x']) || 0, Number(state['y']) || 0);
+    return createItem({nepStudio, state}, workspace, savedPosition);
   };
-  return [...copied.states.map(each('block')), ...(copied.notes ?? []).map(each('note'))];
+  return [...copied.states.map(createFrom('block')), ...(copied.notes ?? []).map(createFrom('note'))];
 }
 
-function make({nepStudio, state}: Copied, workspace: Blockly.WorkspaceSvg, {x, y}: Point): Item {
+function createItem({nepStudio, state}: CopiedItem, workspace: Blockly.WorkspaceSvg, {x, y}: Point): Item {
   const {id, ...rest} = {...state, x, y};
   void id;
   const how = {recordUndo: true};
   if (nepStudio === 'note') {
     return Blockly.serialization.workspaceComments.append(rest, workspace, how) as unknown as Item;
   }
-  const placed = wrapUnknown(rest as BlockState) as Blockly.serialization.blocks.State;
-  return withoutTypeChecks(() => Blockly.serialization.blocks.append(placed, workspace, how) as Blockly.BlockSvg);
+  const blockState = wrapUnknown(rest as BlockState) as Blockly.serialization.blocks.State;
+  return withoutTypeChecks(() => Blockly.serialization.blocks.append(blockState, workspace, how) as Blockly.BlockSvg);
 }

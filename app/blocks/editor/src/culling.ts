@@ -2,8 +2,8 @@
 // scroll or a running block cost. They stay what they are; only their picture is left out until the view comes near.
 import * as Blockly from 'blockly/core';
 
-const SVG = 'http://www.w3.org/2000/svg';
-const FAR = 'nepFar';
+const SVG_NS = 'http://www.w3.org/2000/svg';
+const CULLED_CLASS = 'nepFar';
 /** How far outside the view scripts are drawn, in pixels: more than one turn of a wheel. */
 const MARGIN = 240;
 
@@ -16,29 +16,29 @@ export class Culling {
     const translate = workspace.translate;
     workspace.translate = (x, y) => {
       translate.call(workspace, x, y);
-      this.lookSoon();
+      this.scheduleUpdate();
     };
     workspace.addChangeListener((event) => {
-      if (!event.isUiEvent || event.type === Blockly.Events.SELECTED) this.lookSoon();
+      if (!event.isUiEvent || event.type === Blockly.Events.SELECTED) this.scheduleUpdate();
     });
   }
 
   /** Looks again before the next picture. */
-  lookSoon(): void {
-    this.waiting ||= window.requestAnimationFrame(() => this.look());
+  scheduleUpdate(): void {
+    this.waiting ||= window.requestAnimationFrame(() => this.update());
   }
 
   /** Leaves these out until `look`: what is being loaded is drawn once its place is known. */
   hide(blocks: Iterable<Blockly.BlockSvg>): void {
-    for (const block of blocks) this.show(block, false);
+    for (const block of blocks) this.setDrawn(block, false);
   }
 
-  look(): void {
+  update(): void {
     window.cancelAnimationFrame(this.waiting);
     this.waiting = 0;
     const view = this.workspace.getMetricsManager().getViewMetrics(true);
     const margin = MARGIN / this.workspace.scale;
-    const near = new Blockly.utils.Rect(view.top - margin, view.top + view.height + margin,
+    const renderRect = new Blockly.utils.Rect(view.top - margin, view.top + view.height + margin,
       view.left - margin, view.left + view.width + margin);
     const focused = document.activeElement;
     const tops = new Set(this.workspace.getTopBlocks(false));
@@ -46,23 +46,23 @@ export class Culling {
     for (const block of tops) {
       // A script in the hand goes where it likes, one that loses its picture would lose the keys, a note is put
       // beside the picture of its block.
-      this.show(block, near.intersects(block.getBoundingRectangle()) || block.isDragging() ||
-        block.getSvgRoot().contains(focused) || block.getDescendants(false).some((each) => each.getIcons().length));
+      this.setDrawn(block, renderRect.intersects(block.getBoundingRectangle()) || block.isDragging() ||
+        block.getSvgRoot().contains(focused) || block.getDescendants(false).some((descendant) => descendant.getIcons().length));
     }
   }
 
-  private show(block: Blockly.BlockSvg, shown: boolean): void {
+  private setDrawn(block: Blockly.BlockSvg, drawn: boolean): void {
     const root = block.getSvgRoot();
     const wrapping = this.hidden.get(block);
     const hidden = wrapping !== undefined && root.parentNode === wrapping;
-    if (hidden !== shown) return;
+    if (hidden !== drawn) return;
     if (wrapping) this.unwrap(block, wrapping);
-    if (shown) return;
-    const made = document.createElementNS(SVG, 'svg');
-    made.setAttribute('class', FAR);
-    root.replaceWith(made);
-    made.append(root);
-    this.hidden.set(block, made);
+    if (drawn) return;
+    const wrapper = document.createElementNS(SVG_NS, 'svg');
+    wrapper.setAttribute('class', CULLED_CLASS);
+    root.replaceWith(wrapper);
+    wrapper.append(root);
+    this.hidden.set(block, wrapper);
   }
 
   /** In the place of the wrapping, so that what lies over what stays; Blockly may have taken the script out of it. */
@@ -73,7 +73,7 @@ export class Culling {
 }
 
 /** Draws the script that holds this element, at once. */
-export function drawNow(element: Element | null | undefined): void {
-  const wrapping = element?.closest(`.${FAR}`);
+export function ensureDrawn(element: Element | null | undefined): void {
+  const wrapping = element?.closest(`.${CULLED_CLASS}`);
   wrapping?.replaceWith(...wrapping.childNodes);
 }

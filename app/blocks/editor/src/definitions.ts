@@ -20,17 +20,17 @@ export interface BlockDefinition {
   [other: string]: unknown;
 }
 
-const known = new Map<string, {definition: BlockDefinition; key: string}>();
+const definitionsByType = new Map<string, {definition: BlockDefinition; key: string}>();
 
 /** The types whose blocks show a live value. */
 export function sensorTypes(): ReadonlySet<string> {
-  return live;
+  return liveTypes;
 }
 
-const live = new Set<string>();
+const liveTypes = new Set<string>();
 
 export function definitionOf(type: string): BlockDefinition | null {
-  return known.get(type)?.definition ?? null;
+  return definitionsByType.get(type)?.definition ?? null;
 }
 
 /** All args of all message rows. */
@@ -54,7 +54,7 @@ export function fieldNames(definition: BlockDefinition): Set<string> {
 }
 
 /** Registers all definitions; says which types are new or differ, and whether a source's options changed. */
-export function define(definitions: BlockDefinition[]): {changed: Set<string>; sources: boolean} {
+export function defineBlocks(definitions: BlockDefinition[]): {changed: Set<string>; sources: boolean} {
   const changed = new Set<string>();
   let sources = false;
   for (const definition of definitions) {
@@ -65,10 +65,10 @@ export function define(definitions: BlockDefinition[]): {changed: Set<string>; s
       }
     }
     const key = keyOf(definition);
-    if (known.get(definition.type)?.key === key) continue;
-    known.set(definition.type, {definition, key});
+    if (definitionsByType.get(definition.type)?.key === key) continue;
+    definitionsByType.set(definition.type, {definition, key});
     changed.add(definition.type);
-    if (argsOf(definition).some((arg) => arg.type === 'field_live')) live.add(definition.type);
+    if (argsOf(definition).some((arg) => arg.type === 'field_live')) liveTypes.add(definition.type);
     register(withQuotes(definition));
   }
   return {changed, sources};
@@ -94,18 +94,18 @@ function keyOf(definition: BlockDefinition): string {
 function register(definition: BlockDefinition): void {
   const usable = {...definition};
   if (!usable.mutator || !Blockly.Extensions.isRegistered(usable.mutator)) delete usable.mutator;
-  const comingAndGoing = argsOf(definition).filter((arg) => Array.isArray(arg['only']));
-  usable.extensions = (definition.extensions ?? []).filter((each) => Blockly.Extensions.isRegistered(each));
+  const conditionalArgs = argsOf(definition).filter((arg) => Array.isArray(arg['only']));
+  usable.extensions = (definition.extensions ?? []).filter((extension) => Blockly.Extensions.isRegistered(extension));
   Blockly.Blocks[definition.type] = {
     init(this: Blockly.Block) {
       this.jsonInit(usable);
-      for (const arg of comingAndGoing) showOnly(this, arg.name ?? '', arg['only'] as [string, string]);
+      for (const arg of conditionalArgs) showInputWhen(this, arg.name ?? '', arg['only'] as [string, string]);
     },
   };
 }
 
 /** Lets a gap be there only while a field has one value. */
-function showOnly(block: Blockly.Block, name: string, [fieldName, wanted]: [string, string]): void {
+function showInputWhen(block: Blockly.Block, name: string, [fieldName, wanted]: [string, string]): void {
   const field = block.getField(fieldName);
   const show = (value: unknown) => {
     const input = block.getInput(name);
@@ -124,8 +124,8 @@ function showOnly(block: Blockly.Block, name: string, [fieldName, wanted]: [stri
 function withQuotes(definition: BlockDefinition): BlockDefinition {
   const args = definition['args0'] as BlockArg[] | undefined;
   const only = args?.length === 1 ? args[0] : undefined;
-  const words = String(definition['message0']).replace(/[“”\s]/g, '');
-  if (!('output' in definition) || words !== '%1' || only?.type !== 'field_input') return definition;
+  const message = String(definition['message0']).replace(/[“”\s]/g, '');
+  if (!('output' in definition) || message !== '%1' || only?.type !== 'field_input') return definition;
   const quote = (icon: string): BlockArg => ({type: 'field_icon', icon, size: 12});
   return {...definition, message0: '%1 %2 %3', args0: [quote('quote-open'), only, quote('quote-close')]};
 }

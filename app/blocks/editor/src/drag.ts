@@ -1,15 +1,15 @@
 // A block in the hand: how near is near, where letting go deletes, and how it leaves the flyout.
 import * as Blockly from 'blockly/core';
-import {aimAtBackpack, isOverBackpack, isPacked, pack} from './backpack';
-import {Carried} from './carry';
-import {type Item, chosenWith, isNote, notesChosenWith, runsOf} from './selection';
+import {highlightBackpack, isOverBackpack, isInBackpack, addToBackpack} from './backpack';
+import {DraggedGroup} from './carry';
+import {type Item, getSelectedBlocksWith, isNote, getSelectedNotesWith, groupIntoStacks} from './selection';
 import {sheetOf} from './sheet';
-import {type Leaving, isOutside, leaving, leavingTogether} from './carrying';
+import {type OutgoingDrag, isOutsideViewport, createOutgoingDrag, createOutgoingGroupDrag} from './carrying';
 
 /** How near a gap has to be, in pixels of the screen; one that is offered already holds a little further. */
-const NEAR = 28;
-const HOLDS = 36;
-const USUAL = {...Blockly.config};
+const SNAP_RADIUS = 28;
+const CONNECTING_SNAP_RADIUS = 36;
+const DEFAULT_CONFIG = {...Blockly.config};
 
 export interface DragListener {
   /** Letting go of a block of the canvas here, on the page, would delete it; null: it would not. */
@@ -17,142 +17,142 @@ export interface DragListener {
   /** A block was let go on the canvas and joined nothing; where the mouse was on the page. */
   letGo(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void;
   /** A block was put down with the keys and joined nothing; what had them when it was taken from the toolbox. */
-  putDown(block: Blockly.BlockSvg, meant: Blockly.IFocusableNode): void;
+  putDown(block: Blockly.BlockSvg, insertionTarget: Blockly.IFocusableNode): void;
   /** Where the mouse is with these in the hand while it is outside of the page; null: it is not. */
   outside(mouse: Blockly.utils.Coordinate | null, items?: readonly Item[]): void;
   /** It was let go there, and went back to where it was. */
-  letGoOutside(what: Leaving, mouse: Blockly.utils.Coordinate): void;
+  letGoOutside(drag: OutgoingDrag, mouse: Blockly.utils.Coordinate): void;
   /** The drag is over; `placed`: something lies or hangs where it was let go. `copies`: Ctrl was held. */
-  ended(placed: boolean, copies: boolean): void;
+  ended(isPlaced: boolean, copies: boolean): void;
 }
 
 /** What comes from another behaviour with the mouse, which is still pressed: over the toolbox it goes back there. */
-const visitors = new WeakSet<object>();
+const visitingItems = new WeakSet<object>();
 
 const listeners = new WeakMap<Blockly.Workspace, DragListener>();
 
-export function listenToDrags(workspace: Blockly.WorkspaceSvg, listener: DragListener): void {
+export function setDragListener(workspace: Blockly.WorkspaceSvg, listener: DragListener): void {
   listeners.set(workspace, listener);
 }
 
 /** How far a mouse moves at least, in pixels, that drags; far enough for any radius of Blockly's. */
-const FAR = 60;
+const DRAG_DISTANCE = 60;
 
 /** Lets the mouse, which is pressed already, hold this as if it had been pressed on it `at` that place of the page. */
-export function takeInHand(item: Item, at: Blockly.utils.Coordinate, {pointerId, pointerType}: PointerEvent): void {
+export function startDragAt(item: Item, position: Blockly.utils.Coordinate, {pointerId, pointerType}: PointerEvent): void {
   const like = (type: string, x: number) => new PointerEvent(type,
-    {clientX: x, clientY: at.y, pointerId, pointerType, isPrimary: true, button: 0, buttons: 1, cancelable: true});
-  const down = like('pointerdown', at.x);
-  visitors.add(item);
+    {clientX: x, clientY: position.y, pointerId, pointerType, isPrimary: true, button: 0, buttons: 1, cancelable: true});
+  const downEvent = like('pointerdown', position.x);
+  visitingItems.add(item);
   Blockly.Touch.clearTouchIdentifier();
-  Blockly.Touch.checkTouchIdentifier(down);  // Blockly listens to the pointer that was pressed
-  const gesture = item.workspace.getGesture(down);
-  if (item instanceof Blockly.BlockSvg) gesture?.handleBlockStart(down, item);
-  else gesture?.handleCommentStart(down, item);
-  gesture?.handleWsStart(down, item.workspace);
-  gesture?.handleMove(like('pointermove', at.x + FAR));
+  Blockly.Touch.checkTouchIdentifier(downEvent);  // Blockly listens to the pointer that was pressed
+  const gesture = item.workspace.getGesture(downEvent);
+  if (item instanceof Blockly.BlockSvg) gesture?.handleBlockStart(downEvent, item);
+  else gesture?.handleCommentStart(downEvent, item);
+  gesture?.handleWsStart(downEvent, item.workspace);
+  gesture?.handleMove(like('pointermove', position.x + DRAG_DISTANCE));
 }
 
 /** Blockly keeps what a drag would join to itself. */
-interface Strategy {
+interface HasDragStrategy {
   dragStrategy?: {connectionCandidate?: unknown};
 }
 
 class Dragger extends Blockly.dragging.Dragger {
   /** The zoom of the flyout that the block came from; 0: it was on the canvas. */
-  private readonly cameFrom = this.draggable instanceof Blockly.BlockSvg && this.draggable.workspace.isFlyout ?
+  private readonly flyoutScale = this.draggable instanceof Blockly.BlockSvg && this.draggable.workspace.isFlyout ?
     this.draggable.workspace.scale : 0;
   /** What it came out of: it closes, so that all of the canvas is there for it. */
   private readonly sheet = this.draggable instanceof Blockly.BlockSvg ? sheetOf(this.draggable) : null;
-  private readonly wasPacked = this.draggable instanceof Blockly.BlockSvg && isPacked(this.draggable);
-  private readonly isVisitor = visitors.has(this.draggable);
-  private placed = false;
+  private readonly wasPacked = this.draggable instanceof Blockly.BlockSvg && isInBackpack(this.draggable);
+  private readonly isVisitor = visitingItems.has(this.draggable);
+  private isGripAdjusted = false;
   private hasEnded = false;
   /** What had the keys on the canvas when a block was taken from the toolbox with them. */
-  private meant: Blockly.IFocusableNode | null = null;
+  private insertionTarget: Blockly.IFocusableNode | null = null;
   /** The other blocks and notes that were chosen go along. */
-  private carried: Carried | null = null;
+  private carried: DraggedGroup | null = null;
 
   override onDragStart(event?: PointerEvent | KeyboardEvent): Blockly.IDraggable {
-    this.takeChosen();
-    if (this.cameFrom && event instanceof KeyboardEvent) this.meant = waiting(this.draggable.workspace);
+    this.attachSelection();
+    if (this.flyoutScale && event instanceof KeyboardEvent) this.insertionTarget = passivelyFocusedNode(this.draggable.workspace);
     // Ctrl takes one block out of its script; of several each is out already.
     const dragged = super.onDragStart(this.carried && event instanceof PointerEvent ? undefined : event);
     this.carried?.start();
     this.sheet?.hide();
-    this.setRadius();
+    this.setSnapRadius();
     return dragged;
   }
 
-  private takeChosen(): void {
-    const held: Item | null = this.draggable instanceof Blockly.BlockSvg || isNote(this.draggable) ? this.draggable : null;
-    const chosen = chosenWith(held).filter((each) => each.isMovable());
-    const notes = notesChosenWith(held).filter((each) => each.isMovable());
-    if (!held || !(chosen.length || notes.length)) return;
+  private attachSelection(): void {
+    const item: Item | null = this.draggable instanceof Blockly.BlockSvg || isNote(this.draggable) ? this.draggable : null;
+    const blocks = getSelectedBlocksWith(item).filter((block) => block.isMovable());
+    const notes = getSelectedNotesWith(item).filter((note) => note.isMovable());
+    if (!item || !(blocks.length || notes.length)) return;
     if (!Blockly.Events.getGroup()) Blockly.Events.setGroup(true);
-    this.carried = new Carried(runsOf(chosen), notes, held);
+    this.carried = new DraggedGroup(groupIntoStacks(blocks), notes, item);
     this.draggable = this.carried.head;
   }
 
   /** How far the one in the hand is from where it was taken, in units of the canvas. */
-  private get way(): Blockly.utils.Coordinate {
+  private get offset(): Blockly.utils.Coordinate {
     const {draggable, startLoc} = this;
-    const at = draggable.getRelativeToSurfaceXY();
+    const position = draggable.getRelativeToSurfaceXY();
     // Blockly moves what was let go onto the grid only after the next picture.
     const grid = draggable instanceof Blockly.BlockSvg && !draggable.isDragging() && !draggable.getParent() ?
       draggable.workspace.getGrid() : null;
-    return Blockly.utils.Coordinate.difference(grid?.shouldSnap() ? grid.alignXY(at) : at, startLoc);
+    return Blockly.utils.Coordinate.difference(grid?.shouldSnap() ? grid.alignXY(position) : position, startLoc);
   }
 
   override onDrag(event: PointerEvent | KeyboardEvent | undefined, delta: Blockly.utils.Coordinate): void {
-    this.setRadius();
-    if (event instanceof PointerEvent) this.holdWhereHeld(event, delta);
+    this.setSnapRadius();
+    if (event instanceof PointerEvent) this.compensateFlyoutScale(event, delta);
     super.onDrag(event, delta);
     this.carried?.move(this.pixelsToWorkspaceUnits(delta));
     if (!(event instanceof PointerEvent)) return;
-    this.tellDelete(this.wouldDelete(event) ? mouseOf(event) : null);
-    if (this.isOut(mouseOf(event))) this.listener?.outside(mouseOf(event), this.items);
+    this.notifyOverDelete(this.wouldDelete(event) ? mousePosition(event) : null);
+    if (this.isDraggedOutside(mousePosition(event))) this.listener?.outside(mousePosition(event), this.items);
     else this.listener?.outside(null);
-    aimAtBackpack(this.goesIntoBackpack(mouseOf(event)));
+    highlightBackpack(this.canDropIntoBackpack(mousePosition(event)));
   }
 
   override onDragEnd(event?: PointerEvent | KeyboardEvent): void {
     if (this.hasEnded) return;  // the block that goes with the end of a gesture ends the gesture once more
     this.hasEnded = true;
     const {listener} = this;
-    const mouse = event instanceof PointerEvent ? mouseOf(event) : null;
-    const placed = !mouse || !(this.leaves(mouse) || this.goesBack(mouse));
+    const mouse = event instanceof PointerEvent ? mousePosition(event) : null;
+    const isPlaced = !mouse || !(this.isDroppedElsewhere(mouse) || this.isVisitorOverDeleteArea(mouse));
     this.endDrag(event);
-    visitors.delete(this.draggable);
-    listener?.ended(placed, Boolean(event?.ctrlKey || event?.metaKey));
+    visitingItems.delete(this.draggable);
+    listener?.ended(isPlaced, Boolean(event?.ctrlKey || event?.metaKey));
   }
 
   private endDrag(event?: PointerEvent | KeyboardEvent): void {
     const {draggable} = this;
-    const mouse = event instanceof PointerEvent ? mouseOf(event) : null;
+    const mouse = event instanceof PointerEvent ? mousePosition(event) : null;
     const {listener} = this;
-    const leaves = mouse && this.leaves(mouse) ? this.leaving(event as PointerEvent) : null;
-    const joins = Boolean((draggable as unknown as Strategy).dragStrategy?.connectionCandidate);
-    const loose = mouse && !joins && !this.wouldDelete(event as PointerEvent) && !this.goesBack(mouse);
+    const leaves = mouse && this.isDroppedElsewhere(mouse) ? this.createOutgoing(event as PointerEvent) : null;
+    const joins = Boolean((draggable as unknown as HasDragStrategy).dragStrategy?.connectionCandidate);
+    const loose = mouse && !joins && !this.wouldDelete(event as PointerEvent) && !this.isVisitorOverDeleteArea(mouse);
     const group = Blockly.Events.getGroup();
-    const {carried, way, meant} = this;
-    const free = leaves ? keepPlace(draggable) : null;
+    const {carried, offset: way, insertionTarget: meant} = this;
+    const free = leaves ? suspendGridSnap(draggable) : null;
     super.onDragEnd(event);
-    this.end();
+    this.resetDragFeedback();
     free?.();
     if (carried && leaves) {
       Blockly.Events.setGroup(group || true);
       carried.revert();
-      forgetSoon(draggable.workspace, Blockly.Events.getGroup());
+      discardUndoGroup(draggable.workspace, Blockly.Events.getGroup());
       Blockly.Events.setGroup(false);
     }
-    if (leaves && mouse && isOutside(mouse)) listener?.letGoOutside(leaves, mouse);
-    else if (leaves && !this.wasPacked) pack(leaves.copied);
+    if (leaves && mouse && isOutsideViewport(mouse)) listener?.letGoOutside(leaves, mouse);
+    else if (leaves && !this.wasPacked) addToBackpack(leaves.copied);
     if (leaves) return;
     if (carried) {
       Blockly.Events.setGroup(group);
       if (draggable.workspace && (draggable as Blockly.BlockSvg).isDeadOrDying()) carried.remove();
-      else carried.end(joins ? way : this.way);
+      else carried.end(joins ? way : this.offset);
       Blockly.Events.setGroup(false);
       return;
     }
@@ -170,30 +170,30 @@ class Dragger extends Blockly.dragging.Dragger {
     const group = Blockly.Events.getGroup();
     const {listener} = this;
     super.onDragRevert(event);
-    this.end();
+    this.resetDragFeedback();
     if (this.carried) {
       Blockly.Events.setGroup(group || true);
       this.carried.revert();
-      forgetSoon(this.draggable.workspace, Blockly.Events.getGroup());
+      discardUndoGroup(this.draggable.workspace, Blockly.Events.getGroup());
       Blockly.Events.setGroup(group);
     }
-    visitors.delete(this.draggable);
+    visitingItems.delete(this.draggable);
     listener?.ended(false, false);
   }
 
   /** Outside of the page, and on the backpack, nothing is deleted: it goes back to where it was, to the toolbox if it came from there. */
   protected override wouldDeleteDraggable(mouse: Blockly.utils.Coordinate,
     draggable: Blockly.IDraggable & Blockly.IDeletable): boolean {
-    if (this.leaves(mouse)) return this.cameFrom > 0;
+    if (this.isDroppedElsewhere(mouse)) return this.flyoutScale > 0;
     return !this.isVisitor && super.wouldDeleteDraggable(mouse, draggable);
   }
 
   protected override shouldReturnToStart(mouse: Blockly.utils.Coordinate, draggable: Blockly.IDraggable): boolean {
-    return this.leaves(mouse) ? !this.cameFrom : this.goesBack(mouse) || super.shouldReturnToStart(mouse, draggable);
+    return this.isDroppedElsewhere(mouse) ? !this.flyoutScale : this.isVisitorOverDeleteArea(mouse) || super.shouldReturnToStart(mouse, draggable);
   }
 
   /** Whether what came from another behaviour is over what deletes: it was never here, so it goes back there. */
-  private goesBack(mouse: Blockly.utils.Coordinate): boolean {
+  private isVisitorOverDeleteArea(mouse: Blockly.utils.Coordinate): boolean {
     return this.isVisitor && Blockly.isDeletable(this.draggable) && super.wouldDeleteDraggable(mouse, this.draggable);
   }
 
@@ -204,26 +204,26 @@ class Dragger extends Blockly.dragging.Dragger {
   }
 
   /** Whether what is let go there goes elsewhere, and back to where it was here. */
-  private leaves(mouse: Blockly.utils.Coordinate): boolean {
-    return this.isOut(mouse) || this.goesIntoBackpack(mouse);
+  private isDroppedElsewhere(mouse: Blockly.utils.Coordinate): boolean {
+    return this.isDraggedOutside(mouse) || this.canDropIntoBackpack(mouse);
   }
 
-  private goesIntoBackpack(mouse: Blockly.utils.Coordinate): boolean {
+  private canDropIntoBackpack(mouse: Blockly.utils.Coordinate): boolean {
     return (this.draggable instanceof Blockly.BlockSvg || Boolean(this.carried?.runs.length)) && isOverBackpack(mouse);
   }
 
   /** Whether it is outside of the page there, as blocks and notes may be. */
-  private isOut(mouse: Blockly.utils.Coordinate): boolean {
-    return isOutside(mouse) && (this.draggable instanceof Blockly.BlockSvg ||
+  private isDraggedOutside(mouse: Blockly.utils.Coordinate): boolean {
+    return isOutsideViewport(mouse) && (this.draggable instanceof Blockly.BlockSvg ||
       this.draggable instanceof Blockly.comments.RenderedWorkspaceComment);
   }
 
-  private leaving(event: PointerEvent): Leaving | null {
+  private createOutgoing(event: PointerEvent): OutgoingDrag | null {
     const copies = event.ctrlKey || event.metaKey;
     const {workspace} = this.draggable;
-    const mouse = Blockly.utils.svgMath.screenToWsCoordinates(workspace, mouseOf(event));
-    return this.carried ? leavingTogether(this.carried.runs, this.carried.notes, copies, mouse) :
-      leaving(this.draggable, this.cameFrom > 0, copies, mouse);
+    const mouse = Blockly.utils.svgMath.screenToWsCoordinates(workspace, mousePosition(event));
+    return this.carried ? createOutgoingGroupDrag(this.carried.runs, this.carried.notes, copies, mouse) :
+      createOutgoingDrag(this.draggable, this.flyoutScale > 0, copies, mouse);
   }
 
   private get listener(): DragListener | undefined {
@@ -231,51 +231,51 @@ class Dragger extends Blockly.dragging.Dragger {
   }
 
   /** The radius is the screen's, whatever the zoom. */
-  private setRadius(): void {
+  private setSnapRadius(): void {
     const {scale} = this.draggable.workspace;
-    Blockly.config.snapRadius = NEAR / scale;
-    Blockly.config.connectingSnapRadius = HOLDS / scale;
+    Blockly.config.snapRadius = SNAP_RADIUS / scale;
+    Blockly.config.connectingSnapRadius = CONNECTING_SNAP_RADIUS / scale;
   }
 
-  private end(): void {
-    Object.assign(Blockly.config, USUAL);
-    this.tellDelete(null);
+  private resetDragFeedback(): void {
+    Object.assign(Blockly.config, DEFAULT_CONFIG);
+    this.notifyOverDelete(null);
     this.listener?.outside(null);
-    aimAtBackpack(false);
+    highlightBackpack(false);
     // How it is moved by keys is said no longer than it is moved.
     document.querySelector('.blocklyToast[data-toast-id$="MoveHint"]')?.remove();
   }
 
   /** The flyout has a zoom of its own: what is under the mouse there is under it here. */
-  private holdWhereHeld(event: PointerEvent, delta: Blockly.utils.Coordinate): void {
-    if (this.placed || !this.cameFrom || !(this.draggable instanceof Blockly.BlockSvg)) return;
-    this.placed = true;
+  private compensateFlyoutScale(event: PointerEvent, delta: Blockly.utils.Coordinate): void {
+    if (this.isGripAdjusted || !this.flyoutScale || !(this.draggable instanceof Blockly.BlockSvg)) return;
+    this.isGripAdjusted = true;
     const {workspace} = this.draggable;
     const corner = Blockly.utils.svgMath.wsToScreenCoordinates(workspace, this.startLoc.clone());  // it scales what it is given
-    const ratio = workspace.scale / this.cameFrom;
+    const ratio = workspace.scale / this.flyoutScale;
     const shift = (mouse: number, from: number) => (mouse - from) * (1 - ratio) / workspace.scale;
     this.startLoc = Blockly.utils.Coordinate.sum(this.startLoc, new Blockly.utils.Coordinate(
       shift(event.clientX - delta.x, corner.x), shift(event.clientY - delta.y, corner.y)));
   }
 
   private wouldDelete(event: PointerEvent): boolean {
-    return Blockly.isDeletable(this.draggable) && this.wouldDeleteDraggable(mouseOf(event), this.draggable);
+    return Blockly.isDeletable(this.draggable) && this.wouldDeleteDraggable(mousePosition(event), this.draggable);
   }
 
   /** What comes from the flyout and goes back there was never on the canvas. */
-  private tellDelete(mouse: Blockly.utils.Coordinate | null): void {
-    this.listener?.overDelete(this.cameFrom || this.isVisitor ? null : mouse);
+  private notifyOverDelete(mouse: Blockly.utils.Coordinate | null): void {
+    this.listener?.overDelete(this.flyoutScale || this.isVisitor ? null : mouse);
   }
 }
 
 /** What has the keys on the canvas of a flyout as soon as they come back to it. */
-function waiting(flyout: Blockly.WorkspaceSvg): Blockly.IFocusableNode | null {
+function passivelyFocusedNode(flyout: Blockly.WorkspaceSvg): Blockly.IFocusableNode | null {
   const canvas = flyout.targetWorkspace;
   return canvas && Blockly.FocusableTreeTraverser.findFocusedNode(canvas);
 }
 
 /** What was put back is nothing to undo. Blockly lists edits after the next frame. */
-export function forgetSoon(workspace: Blockly.WorkspaceSvg, group: string): void {
+export function discardUndoGroup(workspace: Blockly.WorkspaceSvg, group: string): void {
   window.requestAnimationFrame(() => window.setTimeout(() => {
     const steps = workspace.getUndoStack();
     while (steps.length && steps[steps.length - 1]?.group === group) steps.pop();
@@ -283,13 +283,13 @@ export function forgetSoon(workspace: Blockly.WorkspaceSvg, group: string): void
 }
 
 /** Blockly moves what was let go onto the grid, some only after the next picture: not what is where it was. */
-function keepPlace(item: Blockly.IDraggable): () => void {
-  const kept = item as {snapToGrid?: () => void};
-  kept.snapToGrid = () => undefined;
-  return () => void Blockly.renderManagement.finishQueuedRenders().then(() => delete kept.snapToGrid);
+function suspendGridSnap(item: Blockly.IDraggable): () => void {
+  const snappable = item as {snapToGrid?: () => void};
+  snappable.snapToGrid = () => undefined;
+  return () => void Blockly.renderManagement.finishQueuedRenders().then(() => delete snappable.snapToGrid);
 }
 
-function mouseOf(event: PointerEvent): Blockly.utils.Coordinate {
+function mousePosition(event: PointerEvent): Blockly.utils.Coordinate {
   return new Blockly.utils.Coordinate(event.clientX, event.clientY);
 }
 

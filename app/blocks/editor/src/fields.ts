@@ -3,9 +3,9 @@ import * as Blockly from 'blockly/core';
 import {drawIcon, iconName} from './icons';
 import {lazy, t} from './words';
 
-const SVG = 'http://www.w3.org/2000/svg';
-const BUTTON = 24;
-const BLANK = 'data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAA=';
+const SVG_NS = 'http://www.w3.org/2000/svg';
+const BUTTON_SIZE = 24;
+const BLANK_IMAGE = 'data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAA=';
 
 interface IconConfig extends Blockly.FieldConfig {
   name?: string;
@@ -17,7 +17,7 @@ interface IconConfig extends Blockly.FieldConfig {
 /** A Lucide icon, white on the block; the category's icon when the name is not one of ours. */
 export class FieldIcon extends Blockly.FieldImage {
   constructor(private readonly icon: string, private readonly side: number, alt: string) {
-    super(BLANK, side, side, alt);
+    super(BLANK_IMAGE, side, side, alt);
   }
 
   override initView(): void {
@@ -45,9 +45,9 @@ export class FieldIcon extends Blockly.FieldImage {
 
 /** A small round button on a block, such as “+”. */
 export class FieldButton extends Blockly.FieldImage {
-  constructor(private readonly icon: string, words: string, action: () => void) {
-    super(BLANK, BUTTON, BUTTON, words, action);
-    this.setTooltip(words);
+  constructor(private readonly icon: string, label: string, action: () => void) {
+    super(BLANK_IMAGE, BUTTON_SIZE, BUTTON_SIZE, label, action);
+    this.setTooltip(label);
   }
 
   /** In the flyout it is part of the block: what is dragged out can be changed. */
@@ -58,14 +58,14 @@ export class FieldButton extends Blockly.FieldImage {
   override initView(): void {
     if (!this.fieldGroup_) return;
     this.fieldGroup_.classList.add('nepButton');
-    const ring = document.createElementNS(SVG, 'circle');
-    for (const [name, value] of Object.entries({cx: BUTTON / 2, cy: BUTTON / 2, r: BUTTON / 2})) {
+    const ring = document.createElementNS(SVG_NS, 'circle');
+    for (const [name, value] of Object.entries({cx: BUTTON_SIZE / 2, cy: BUTTON_SIZE / 2, r: BUTTON_SIZE / 2})) {
       ring.setAttribute(name, String(value));
     }
-    const glyph = document.createElementNS(SVG, 'g');
+    const glyph = document.createElementNS(SVG_NS, 'g');
     glyph.setAttribute('transform', 'translate(4, 4)');
-    const inner = document.createElementNS(SVG, 'g');
-    drawIcon(inner, this.icon, BUTTON - 8);
+    const inner = document.createElementNS(SVG_NS, 'g');
+    drawIcon(inner, this.icon, BUTTON_SIZE - 8);
     glyph.append(inner);
     this.fieldGroup_.append(ring, glyph);
     this.recomputeAriaContext();
@@ -84,10 +84,10 @@ export class FieldLive extends Blockly.FieldLabel {
   show(text: string, old = false): void {
     this.fieldGroup_?.classList.toggle('nepOld', old);
     if (text === this.value_) return;
-    const wide = (words: string) => words.replace(/\d/g, '0');
-    const fits = wide(text) === wide(String(this.value_ ?? ''));  // figures are all as wide
+    const normalizeDigits = (value: string) => value.replace(/\d/g, '0');
+    const hasSameWidth = normalizeDigits(text) === normalizeDigits(String(this.value_ ?? ''));  // figures are all as wide
     this.value_ = text;
-    if (fits && this.textContent_) this.textContent_.nodeValue = this.getDisplayText_();
+    if (hasSameWidth && this.textContent_) this.textContent_.nodeValue = this.getDisplayText_();
     else this.forceRerender();
   }
 
@@ -113,15 +113,15 @@ const PALETTE: readonly [string, string][] = [
   [lazy('pink'), '#ff5fa2'], [lazy('off'), '#000000'],
 ];
 const COLUMNS = 5;
-const CHIP = {width: 39, height: 23};
+const CHIP_SIZE = {width: 39, height: 23};
 
 /** The name of the palette's colour that is most like this one. */
-function nearest(colour: string): string {
-  const parts = (hex: string) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
-  const wanted = parts(colour);
-  const far = ([, hex]: readonly [string, string]) =>
-    parts(hex).reduce((sum, value, at) => sum + (value - (wanted[at] ?? 0)) ** 2, 0);
-  return PALETTE.reduce((one, other) => (far(other) < far(one) ? other : one))[0];
+function nearestColourName(colour: string): string {
+  const parts = (hex: string) => [1, 3, 5].map((start) => parseInt(hex.slice(start, start + 2), 16));
+  const target = parts(colour);
+  const distance = ([, hex]: readonly [string, string]) =>
+    parts(hex).reduce((sum, value, index) => sum + (value - (target[index] ?? 0)) ** 2, 0);
+  return PALETTE.reduce((best, other) => (distance(other) < distance(best) ? other : best))[0];
 }
 
 /** A colour "#rrggbb" as a chip; clicking it opens a small palette with a field for any other. */
@@ -137,11 +137,11 @@ export class FieldColourChip extends Blockly.Field {
   }
 
   protected override initView(): void {
-    this.size_ = new Blockly.utils.Size(CHIP.width, CHIP.height);
+    this.size_ = new Blockly.utils.Size(CHIP_SIZE.width, CHIP_SIZE.height);
     this.fieldGroup_?.classList.add('nepColour');
-    this.chip = document.createElementNS(SVG, 'rect');
+    this.chip = document.createElementNS(SVG_NS, 'rect');
     this.chip.setAttribute('class', 'nepChip');
-    for (const [name, value] of Object.entries({x: 1, y: 1, width: CHIP.width - 2, height: CHIP.height - 2, rx: 10.5})) {
+    for (const [name, value] of Object.entries({x: 1, y: 1, width: CHIP_SIZE.width - 2, height: CHIP_SIZE.height - 2, rx: 10.5})) {
       this.chip.setAttribute(name, String(value));
     }
     this.fieldGroup_?.append(this.chip);
@@ -154,12 +154,12 @@ export class FieldColourChip extends Blockly.Field {
   }
 
   override getAriaValue(): string {
-    const words = this.getText();
-    return words.startsWith('#') ? `like ${nearest(words)}` : words;
+    const text = this.getText();
+    return text.startsWith('#') ? `like ${nearestColourName(text)}` : text;
   }
 
   protected override updateSize_(): void {
-    this.size_ = new Blockly.utils.Size(CHIP.width, CHIP.height);
+    this.size_ = new Blockly.utils.Size(CHIP_SIZE.width, CHIP_SIZE.height);
   }
 
   protected override render_(): void {
@@ -179,8 +179,8 @@ export class FieldColourChip extends Blockly.Field {
   }
 
   protected override getText_(): string {
-    const known = PALETTE.find(([, value]) => value === this.value_);
-    return known ? t(known[0]) : this.value_ ?? '';
+    const paletteEntry = PALETTE.find(([, value]) => value === this.value_);
+    return paletteEntry ? t(paletteEntry[0]) : this.value_ ?? '';
   }
 
   protected override showEditor_(): void {
@@ -221,11 +221,11 @@ export class FieldColourChip extends Blockly.Field {
     event.stopPropagation();
     const swatches = [...box.querySelectorAll('button')];
     const other = box.querySelector('input');
-    const at = swatches.indexOf(document.activeElement as HTMLButtonElement);
+    const index = swatches.indexOf(document.activeElement as HTMLButtonElement);
     const by = {ArrowRight: 1, ArrowLeft: -1, ArrowDown: COLUMNS, ArrowUp: -COLUMNS}[event.key];
     if (event.key === 'Escape') Blockly.DropDownDiv.hideIfOwner(this, true);
-    else if (event.key === 'Tab') (at < 0 ? swatches[0] : other)?.focus();
-    else if (by !== undefined && at >= 0) swatches[(at + by + swatches.length) % swatches.length]?.focus();
+    else if (event.key === 'Tab') (index < 0 ? swatches[0] : other)?.focus();
+    else if (by !== undefined && index >= 0) swatches[(index + by + swatches.length) % swatches.length]?.focus();
     else return;
     event.preventDefault();
   }

@@ -2,13 +2,13 @@
 import * as Blockly from 'blockly/core';
 
 /** Whether folding shows less: the block holds others, or has room for some. */
-export function canFold(block: Blockly.BlockSvg): boolean {
+export function canCollapse(block: Blockly.BlockSvg): boolean {
   const below = block.getNextBlock();
-  return block.getChildren(false).some((each) => !each.isShadow() && each !== below) ||
+  return block.getChildren(false).some((child) => !child.isShadow() && child !== below) ||
     block.inputList.some((input) => input.type === Blockly.inputs.inputTypes.STATEMENT);
 }
 
-export function fold(block: Blockly.BlockSvg, folded: boolean): void {
+export function setCollapsed(block: Blockly.BlockSvg, folded: boolean): void {
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
   block.setCollapsed(folded);
@@ -16,24 +16,24 @@ export function fold(block: Blockly.BlockSvg, folded: boolean): void {
 }
 
 /** The block that is seen in the place of this one: itself, or the outermost folded one around it. */
-export function seenInPlaceOf(block: Blockly.BlockSvg): Blockly.BlockSvg {
-  let seen = block;
-  for (let each = block.getSurroundParent(); each; each = each.getSurroundParent()) if (each.isCollapsed()) seen = each;
-  return seen;
+export function visibleBlockOf(block: Blockly.BlockSvg): Blockly.BlockSvg {
+  let visible = block;
+  for (let ancestor = block.getSurroundParent(); ancestor; ancestor = ancestor.getSurroundParent()) if (ancestor.isCollapsed()) visible = ancestor;
+  return visible;
 }
 
-const DOUBLE_MS = 450;
+const DOUBLE_CLICK_MS = 450;
 
 /** Fields, buttons and notes have clicks of their own: only what is clicked beside them is told as the block's. */
-export function foldOnDoubleClick(workspace: Blockly.WorkspaceSvg): void {
+export function collapseOnDoubleClick(workspace: Blockly.WorkspaceSvg): void {
   let [id, at] = ['', 0];
   workspace.addChangeListener((event) => {
     if (!(event instanceof Blockly.Events.Click)) return;
     const now = performance.now();
-    const again = event.targetType === 'block' && event.blockId === id && now - at < DOUBLE_MS;
-    [id, at] = again ? ['', 0] : [event.blockId ?? '', now];
-    const block = again ? workspace.getBlockById(event.blockId ?? '') : null;
-    if (block?.isCollapsed()) fold(block, false);
-    else if (block && canFold(block)) fold(block, true);
+    const isDoubleClick = event.targetType === 'block' && event.blockId === id && now - at < DOUBLE_CLICK_MS;
+    [id, at] = isDoubleClick ? ['', 0] : [event.blockId ?? '', now];
+    const block = isDoubleClick ? workspace.getBlockById(event.blockId ?? '') : null;
+    if (block?.isCollapsed()) setCollapsed(block, false);
+    else if (block && canCollapse(block)) setCollapsed(block, true);
   });
 }

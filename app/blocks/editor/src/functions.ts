@@ -8,65 +8,65 @@ export const FUNCTIONS = 'functions';
 
 export class Functions {
   /** What there was when it was last looked at: ids, names, inputs. */
-  private known = '';
+  private snapshot = '';
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg) {
     workspace.addChangeListener((event) => this.onEvent(event));
-    workspace.registerToolboxCategoryCallback(FUNCTIONS, () => this.offered());
+    workspace.registerToolboxCategoryCallback(FUNCTIONS, () => this.flyoutContents());
   }
 
   /** Another program is here. */
   refresh(): void {
-    this.known = this.look();
+    this.snapshot = this.takeSnapshot();
     this.renameInputs();
   }
 
-  private look(): string {
-    return JSON.stringify(definitionsOf(this.workspace).map((each) => [each.id, functionName(each), each.own]));
+  private takeSnapshot(): string {
+    return JSON.stringify(definitionsOf(this.workspace).map((definition) => [definition.id, functionName(definition), definition.own]));
   }
 
   private onEvent(event: Blockly.Events.Abstract): void {
     const creates = event.type === Blockly.Events.BLOCK_CREATE;
     if (!creates && event.type !== Blockly.Events.BLOCK_CHANGE && event.type !== Blockly.Events.BLOCK_DELETE) return;
-    const now = this.look();
-    if (now === this.known && !(creates && this.calls().length)) return;
+    const now = this.takeSnapshot();
+    if (now === this.snapshot && !(creates && this.callBlocks().length)) return;
     // What follows from an undo is no step of its own.
     const recording = Blockly.Events.getRecordUndo();
     const group = Blockly.Events.getGroup();
     Blockly.Events.setRecordUndo(event.recordUndo);
     Blockly.Events.setGroup(event.group || true);
-    if (creates && event.recordUndo) this.nameAnew(event as Blockly.Events.BlockCreate);
-    this.followAll();
+    if (creates && event.recordUndo) this.makeNamesUnique(event as Blockly.Events.BlockCreate);
+    this.updateCalls();
     Blockly.Events.setGroup(group);
     Blockly.Events.setRecordUndo(recording);
-    if (now === this.known) return;
-    this.known = this.look();
+    if (now === this.snapshot) return;
+    this.snapshot = this.takeSnapshot();
     this.renameInputs();
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.refreshDynamic(FUNCTIONS);
   }
 
-  private calls(): CallBlock[] {
+  private callBlocks(): CallBlock[] {
     return CALLS.flatMap((type) => this.workspace.getBlocksByType(type, false)) as CallBlock[];
   }
 
   /** A copy of a function gets a name of its own. */
-  private nameAnew(event: Blockly.Events.BlockCreate): void {
-    const made = new Set(event.ids ?? []);
+  private makeNamesUnique(event: Blockly.Events.BlockCreate): void {
+    const createdIds = new Set(event.ids ?? []);
     const all = definitionsOf(this.workspace);
-    for (const each of all) {
-      if (!made.has(each.id)) continue;
-      const others = all.filter((other) => other !== each).map(functionName);
-      const name = freshName(functionName(each), others);
-      if (name !== functionName(each)) each.setFieldValue(name, 'NAME');
+    for (const definition of all) {
+      if (!createdIds.has(definition.id)) continue;
+      const others = all.filter((other) => other !== definition).map(functionName);
+      const name = freshName(functionName(definition), others);
+      if (name !== functionName(definition)) definition.setFieldValue(name, 'NAME');
     }
   }
 
-  private followAll(): void {
+  private updateCalls(): void {
     const definitions = definitionsOf(this.workspace);
-    const byName = new Map(definitions.map((each) => [functionName(each), each]));
-    const byId = new Map(definitions.map((each) => [each.id, each]));
-    for (const call of this.calls()) {
+    const byName = new Map(definitions.map((definition) => [functionName(definition), definition]));
+    const byId = new Map(definitions.map((definition) => [definition.id, definition]));
+    for (const call of this.callBlocks()) {
       const definition = byId.get(call.target) ?? byName.get(call.called);
       if (definition) updateCall(call, definition);
     }
@@ -83,18 +83,18 @@ export class Functions {
   }
 
   /** The uses of each function, and its inputs. */
-  private offered(): Blockly.utils.toolbox.FlyoutItemInfoArray {
+  private flyoutContents(): Blockly.utils.toolbox.FlyoutItemInfoArray {
     const toolbox = this.workspace.getToolbox();
-    const given = toolbox instanceof Toolbox ? toolbox.contentsOf(FUNCTIONS) : [];
-    return [...given, ...definitionsOf(this.workspace).flatMap(offer)] as Blockly.utils.toolbox.FlyoutItemInfoArray;
+    const staticItems = toolbox instanceof Toolbox ? toolbox.contentsOf(FUNCTIONS) : [];
+    return [...staticItems, ...definitionsOf(this.workspace).flatMap(flyoutItemsFor)] as Blockly.utils.toolbox.FlyoutItemInfoArray;
   }
 }
 
-function offer(definition: DefinitionBlock): unknown[] {
+function flyoutItemsFor(definition: DefinitionBlock): unknown[] {
   const extraState = {function: definition.id, name: functionName(definition), inputs: definition.own};
   const uses = definition.type === 'functions_define_result' ? ['functions_result', 'functions_call'] : ['functions_call'];
   return [
     ...uses.map((type) => ({kind: 'block', type, extraState})),
-    ...definition.own.map((each) => ({kind: 'block', type: 'functions_input', fields: {INPUT: each.id}})),
+    ...definition.own.map((input) => ({kind: 'block', type: 'functions_input', fields: {INPUT: input.id}})),
   ];
 }

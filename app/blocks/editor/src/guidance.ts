@@ -1,90 +1,90 @@
 // What helps a person begin: the words on an empty canvas, and a ring round the block that comes next.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
-import {keyWords} from './keys';
+import {formatShortcut} from './keys';
 import {isKeyboardLed} from './modality';
 import {t} from './words';
 
-const LOOK_MS = 120;
-const FIRST = 'events_started';
-const TOUCHING = new Set<string>([
+const POLL_MS = 120;
+const FIRST_BLOCK_TYPE = 'events_started';
+const RELEVANT_EVENTS = new Set<string>([
   Blockly.Events.BLOCK_CREATE, Blockly.Events.BLOCK_DELETE, Blockly.Events.BLOCK_DRAG,
   Blockly.Events.COMMENT_CREATE, Blockly.Events.COMMENT_DELETE, Blockly.Events.FINISHED_LOADING,
   Blockly.Events.TOOLBOX_ITEM_SELECT,
 ]);
 
 /** What the window knows: the words of "when started", and whether there is a robot. */
-export interface Begin {
+export interface EmptyCanvasInfo {
   first: string;
   robot: boolean;
 }
 
 /** A block to take, by its type; its name, and where to put it, in the person's words. */
-export interface Wanted {
+export interface PointerTarget {
   block: string;
   name: string;
   then: string;
 }
 
-function element<K extends keyof HTMLElementTagNameMap>(tag: K, className: string, text = ''): HTMLElementTagNameMap[K] {
-  const made = document.createElement(tag);
-  made.className = className;
-  made.textContent = text;
-  return made;
+function createElement<K extends keyof HTMLElementTagNameMap>(tag: K, className: string, text = ''): HTMLElementTagNameMap[K] {
+  const node = document.createElement(tag);
+  node.className = className;
+  node.textContent = text;
+  return node;
 }
 
-function isSeen(rect: DOMRect): boolean {
+function isVisible(rect: DOMRect): boolean {
   return rect.width > 0 && rect.height > 0;
 }
 
 /** The words on an empty canvas. Only its buttons take the mouse: a block can be dropped anywhere on it. */
 export class EmptyCanvas {
-  private readonly box = element('aside', 'nepBegin');
-  private readonly place = element('div', 'nepBeginPlace');
-  private readonly where = element('p', '');
-  private readonly byKeys = element('p', 'nepBeginKeys');
+  private readonly box = createElement('aside', 'nepBegin');
+  private readonly dropTarget = createElement('div', 'nepBeginPlace');
+  private readonly categoryHint = createElement('p', '');
+  private readonly byKeys = createElement('p', 'nepBeginKeys');
   private readonly robot: HTMLButtonElement;
-  private begin: Begin | null = null;
+  private begin: EmptyCanvasInfo | null = null;
   private frame = 0;
 
-  constructor(private readonly shown: () => Blockly.WorkspaceSvg, private readonly pointer: Pointer,
-    ask: (what: string) => void) {
-    const buttons = element('div', 'nepBeginButtons');
-    this.robot = this.button(buttons, 'bot', t('Use the virtual robot'), () => ask('robot'));
+  constructor(private readonly getWorkspace: () => Blockly.WorkspaceSvg, private readonly pointer: BlockPointer,
+    sendCommand: (command: string) => void) {
+    const buttons = createElement('div', 'nepBeginButtons');
+    this.robot = this.addButton(buttons, 'bot', t('Use the virtual robot'), () => sendCommand('robot'));
     this.robot.classList.add('primary');
-    this.button(buttons, 'lightbulb', t('Show me'), (event) => this.showMe(event.detail === 0));
-    this.button(buttons, 'blocks', t('Open an example'), () => ask('examples'));
+    this.addButton(buttons, 'lightbulb', t('Show me'), (event) => this.showFirstBlock(event.detail === 0));
+    this.addButton(buttons, 'blocks', t('Open an example'), () => sendCommand('examples'));
     this.byKeys.textContent = t('With the keyboard: press {toolbox}, choose it with the arrow keys, press Enter to pick it up and Enter again to place it.',
-      {toolbox: keyWords(Blockly.ShortcutItems.names.FOCUS_TOOLBOX)});
-    this.box.append(this.place, this.where, this.byKeys, buttons);
+      {toolbox: formatShortcut(Blockly.ShortcutItems.names.FOCUS_TOOLBOX)});
+    this.box.append(this.dropTarget, this.categoryHint, this.byKeys, buttons);
     this.box.hidden = true;
     document.body.append(this.box);
-    window.addEventListener('resize', () => this.lookSoon());
+    window.addEventListener('resize', () => this.scheduleUpdate());
   }
 
-  tell(begin: Begin): void {
+  setInfo(begin: EmptyCanvasInfo): void {
     this.begin = begin;
-    this.place.textContent = t('Drag “{block}” here', {block: begin.first});
+    this.dropTarget.textContent = t('Drag “{block}” here', {block: begin.first});
     this.robot.hidden = begin.robot;
-    this.lookSoon();
+    this.scheduleUpdate();
   }
 
   /** Looks after what may have made the canvas empty, or ended that; once a frame at most. */
   watch(workspace: Blockly.WorkspaceSvg): void {
     const toolbox = workspace.getInjectionDiv().querySelector('.blocklyToolbox');
-    if (toolbox) new ResizeObserver(() => this.lookSoon()).observe(toolbox);
+    if (toolbox) new ResizeObserver(() => this.scheduleUpdate()).observe(toolbox);
     workspace.addChangeListener((event) => {
-      if (TOUCHING.has(event.type)) this.lookSoon();
+      if (RELEVANT_EVENTS.has(event.type)) this.scheduleUpdate();
     });
   }
 
-  lookSoon(): void {
-    if (!this.frame) this.frame = window.requestAnimationFrame(() => this.look());
+  scheduleUpdate(): void {
+    if (!this.frame) this.frame = window.requestAnimationFrame(() => this.update());
   }
 
-  private look(): void {
+  private update(): void {
     this.frame = 0;
-    const workspace = this.shown();
+    const workspace = this.getWorkspace();
     const dragged = workspace.isDragging() ? 1 : 0;
     const empty = workspace.getTopBlocks(false).length <= dragged && !workspace.getTopComments().length;
     document.body.classList.toggle('nepEmpty', empty);
@@ -97,122 +97,122 @@ export class EmptyCanvas {
     const left = (toolbox?.offsetWidth ?? 0) + open;
     this.box.style.left = `${left}px`;
     this.box.classList.toggle('narrow', document.body.clientWidth - left < 320);
-    const events = categoryOf(workspace, FIRST);
-    this.where.textContent = events ? t('You\'ll find it under {category}, on the left.', {category: events.getName()}) : '';
+    const events = findCategory(workspace, FIRST_BLOCK_TYPE);
+    this.categoryHint.textContent = events ? t('You\'ll find it under {category}, on the left.', {category: events.getName()}) : '';
   }
 
-  private showMe(byKey: boolean): void {
-    this.pointer.show({block: FIRST, name: this.begin?.first ?? '', then: t('Drag it onto the page')});
-    if (byKey) this.pointer.lead();
+  private showFirstBlock(byKey: boolean): void {
+    this.pointer.show({block: FIRST_BLOCK_TYPE, name: this.begin?.first ?? '', then: t('Drag it onto the page')});
+    if (byKey) this.pointer.focusCategory();
   }
 
-  private button(place: HTMLElement, icon: string, words: string, action: (event: MouseEvent) => void): HTMLButtonElement {
-    const made = element('button', '');
-    made.type = 'button';
-    made.append(iconElement(icon, 16), element('span', '', words));
-    made.onclick = action;
-    place.append(made);
-    return made;
+  private addButton(container: HTMLElement, icon: string, label: string, action: (event: MouseEvent) => void): HTMLButtonElement {
+    const button = createElement('button', '');
+    button.type = 'button';
+    button.append(iconElement(icon, 16), createElement('span', '', label));
+    button.onclick = action;
+    container.append(button);
+    return button;
   }
 }
 
 /** A ring round the category that has a block, then round the block itself, until it is on the canvas. */
-export class Pointer {
-  private readonly ring = element('div', 'nepRing');
-  private readonly bubble = element('div', 'nepRingBubble');
-  private wanted: Wanted | null = null;
+export class BlockPointer {
+  private readonly ring = createElement('div', 'nepRing');
+  private readonly bubble = createElement('div', 'nepRingBubble');
+  private target: PointerTarget | null = null;
   private before = 0;
   private timer = 0;
 
-  constructor(private readonly shown: () => Blockly.WorkspaceSvg) {
+  constructor(private readonly getWorkspace: () => Blockly.WorkspaceSvg) {
     this.bubble.setAttribute('role', 'status');
     document.addEventListener('keydown', (event) => {
       if (event.key === 'Escape') this.show(null);
     }, true);
   }
 
-  show(wanted: Wanted | null): void {
+  show(target: PointerTarget | null): void {
     window.clearInterval(this.timer);
-    this.wanted = wanted;
-    if (!wanted) {
+    this.target = target;
+    if (!target) {
       this.ring.remove();
       this.bubble.remove();
       return;
     }
-    this.before = this.count(wanted.block);
+    this.before = this.countBlocks(target.block);
     document.body.append(this.ring, this.bubble);
-    this.timer = window.setInterval(() => this.look(), LOOK_MS);
-    this.look();
+    this.timer = window.setInterval(() => this.update(), POLL_MS);
+    this.update();
   }
 
   /** The keys go to the category that has it. */
-  lead(): void {
-    const category = this.wanted && categoryOf(this.shown(), this.wanted.block);
+  focusCategory(): void {
+    const category = this.target && findCategory(this.getWorkspace(), this.target.block);
     if (!category) return;
     Blockly.keyboardNavigationController.setIsActive(true);
     Blockly.getFocusManager().focusNode(category);
   }
 
-  private count(type: string): number {
-    return this.shown().getBlocksByType(type, false).length;
+  private countBlocks(type: string): number {
+    return this.getWorkspace().getBlocksByType(type, false).length;
   }
 
-  private look(): void {
-    const wanted = this.wanted;
-    if (!wanted) return;
-    const workspace = this.shown();
+  private update(): void {
+    const target = this.target;
+    if (!target) return;
+    const workspace = this.getWorkspace();
     const dragging = workspace.isDragging();
-    if (!dragging && this.count(wanted.block) > this.before) return this.show(null);
-    const block = blockIn(workspace, wanted.block);
-    const category = block ? null : categoryOf(workspace, wanted.block);
-    const found = block ?? category?.getClickTarget() ?? null;
-    const rect = found?.getBoundingClientRect();
-    const seen = !dragging && rect !== undefined && isSeen(rect);
-    this.ring.hidden = this.bubble.hidden = !seen;
-    if (!seen) return;
-    this.put(rect);
-    const words = this.words(block !== null, wanted, category?.getName() ?? '');
-    if (this.bubble.textContent !== words) this.bubble.textContent = words;
+    if (!dragging && this.countBlocks(target.block) > this.before) return this.show(null);
+    const block = findFlyoutBlock(workspace, target.block);
+    const category = block ? null : findCategory(workspace, target.block);
+    const highlighted = block ?? category?.getClickTarget() ?? null;
+    const rect = highlighted?.getBoundingClientRect();
+    const isTargetVisible = !dragging && rect !== undefined && isVisible(rect);
+    this.ring.hidden = this.bubble.hidden = !isTargetVisible;
+    if (!isTargetVisible) return;
+    this.positionAround(rect);
+    const text = this.hintText(block !== null, target, category?.getName() ?? '');
+    if (this.bubble.textContent !== text) this.bubble.textContent = text;
   }
 
   /** Who uses the keys is told of keys. */
-  private words(isOpen: boolean, {name, then}: Wanted, category: string): string {
+  private hintText(isOpen: boolean, {name, then}: PointerTarget, category: string): string {
     const byKeys = isKeyboardLed();
     if (isOpen) return byKeys ? t('Press Enter to pick it up and Enter again to place it') : then;
-    const where = t('You\'ll find “{block}” under {category}', {block: name, category});
-    return byKeys ? `${where} (${keyWords(Blockly.ShortcutItems.names.FOCUS_TOOLBOX)})` : where;
+    const hint = t('You\'ll find “{block}” under {category}', {block: name, category});
+    return byKeys ? `${hint} (${formatShortcut(Blockly.ShortcutItems.names.FOCUS_TOOLBOX)})` : hint;
   }
 
-  private put(rect: DOMRect): void {
+  private positionAround(rect: DOMRect): void {
     const out = 4;
     Object.assign(this.ring.style, {
       left: `${rect.left - out}px`, top: `${rect.top - out}px`,
       width: `${rect.width + 2 * out}px`, height: `${rect.height + 2 * out}px`,
     });
     const room = document.body.clientWidth - rect.right - 24;
-    const beside = room >= 160;
-    this.bubble.classList.toggle('below', !beside);
+    const fitsRight = room >= 160;
+    this.bubble.classList.toggle('below', !fitsRight);
     Object.assign(this.bubble.style, {
-      left: `${beside ? rect.right + 18 : rect.left}px`,
-      top: `${beside ? rect.top + rect.height / 2 : rect.bottom + 16}px`,
-      maxWidth: `${Math.max(160, Math.min(300, beside ? room : document.body.clientWidth - rect.left - 16))}px`,
+      left: `${fitsRight ? rect.right + 18 : rect.left}px`,
+      top: `${fitsRight ? rect.top + rect.height / 2 : rect.bottom + 16}px`,
+      maxWidth: `${Math.max(160, Math.min(300, fitsRight ? room : document.body.clientWidth - rect.left - 16))}px`,
     });
   }
 }
 
 /** The block of this type in the open category. */
-function blockIn(workspace: Blockly.WorkspaceSvg, type: string): Element | null {
+function findFlyoutBlock(workspace: Blockly.WorkspaceSvg, type: string): Element | null {
   const flyout = workspace.getFlyout();
   if (!flyout?.isVisible()) return null;
-  return flyout.getWorkspace().getTopBlocks(false).find((each) => each.type === type)?.pathObject.svgPath ?? null;
+  return flyout.getWorkspace().getTopBlocks(false).find((block) => block.type === type)?.pathObject.svgPath ?? null;
 }
 
 /** The category that has a block of this type. */
-function categoryOf(workspace: Blockly.WorkspaceSvg, type: string): Blockly.ToolboxCategory | null {
+function findCategory(workspace: Blockly.WorkspaceSvg, type: string): Blockly.ToolboxCategory | null {
   for (const item of workspace.getToolbox()?.getToolboxItems() ?? []) {
     if (!(item instanceof Blockly.ToolboxCategory)) continue;
     const contents: unknown = item.getContents();
-    if (Array.isArray(contents) && contents.some((each: {type?: string}) => each.type === type)) return item;
+    if (Array.isArray(contents) && contents.some((entry: {type?: string}) => entry.type === type)) return item;
   }
   return null;
 }

@@ -19,14 +19,14 @@ export interface BlockHelp {
   choices: string[];
 }
 
-let all: Record<string, BlockHelp> = {};
+let helpByType: Record<string, BlockHelp> = {};
 
-export function useHelp(help: Record<string, BlockHelp>): void {
-  all = help;
+export function setHelp(help: Record<string, BlockHelp>): void {
+  helpByType = help;
 }
 
 export function helpFor(type: string): BlockHelp | null {
-  return Object.hasOwn(all, type) ? all[type] ?? null : null;
+  return Object.hasOwn(helpByType, type) ? helpByType[type] ?? null : null;
 }
 
 /** The block that the keys go to: selected, or in the toolbox, or the one of a field or gap. */
@@ -46,11 +46,11 @@ export class HelpCard {
 
   /** Shows the help of this block; false when there is none. */
   show(block: Blockly.BlockSvg | null): boolean {
-    const help = block ? isUnknown(block) ? keptHelp(block) : helpFor(block.type) : null;
+    const help = block ? isUnknown(block) ? unknownBlockHelp(block) : helpFor(block.type) : null;
     if (!block || !help) return false;
     this.close();
     this.back = Blockly.getFocusManager().getFocusedNode();
-    this.card = this.make(help, block);
+    this.card = this.createCard(help, block);
     document.body.append(this.card);
     this.card.querySelector<HTMLElement>('button')?.focus();
     return true;
@@ -65,12 +65,12 @@ export class HelpCard {
     this.back = null;
   }
 
-  private make(help: BlockHelp, block: Blockly.BlockSvg): HTMLElement {
-    const card = element('aside', 'nepHelp');
+  private createCard(help: BlockHelp, block: Blockly.BlockSvg): HTMLElement {
+    const card = createElement('aside', 'nepHelp');
     card.setAttribute('role', 'dialog');
     card.setAttribute('aria-label', t('Help: {block}', {block: help.title}));
-    const head = element('header', '');
-    const tile = element('span', 'nepTile');
+    const header = createElement('header', '');
+    const tile = createElement('span', 'nepTile');
     tile.style.background = block.getColour();
     const style = block.getStyleName();
     const first = definitionOf(block.type)?.['args0'] as {icon?: string}[] | undefined;
@@ -81,15 +81,15 @@ export class HelpCard {
     close.setAttribute('aria-label', t('Close help'));
     close.append(iconElement('x', 16));
     close.onclick = () => this.close();
-    head.append(tile, element('h2', '', help.title), close);
-    card.append(head, element('p', '', help.does));
-    if (help.more) card.append(element('p', '', help.more));
+    header.append(tile, createElement('h2', '', help.title), close);
+    card.append(header, createElement('p', '', help.does));
+    if (help.more) card.append(createElement('p', '', help.more));
     if (help.gaps.length) {
-      const list = element('dl', '');
-      for (const [name, words] of help.gaps) list.append(element('dt', '', name), element('dd', '', words));
+      const list = createElement('dl', '');
+      for (const [name, words] of help.gaps) list.append(createElement('dt', '', name), createElement('dd', '', words));
       card.append(list);
     }
-    card.append(element('p', 'nepExample', help.example));
+    card.append(createElement('p', 'nepExample', help.example));
     card.onkeydown = (event) => {
       event.stopPropagation();
       if (event.key === 'Escape') this.close();
@@ -98,17 +98,17 @@ export class HelpCard {
   }
 }
 
-function keptHelp(block: Blockly.BlockSvg): BlockHelp {
+function unknownBlockHelp(block: Blockly.BlockSvg): BlockHelp {
   return {title: t('Unknown block'), name: '', does: String(block.getTooltip()),
     more: t('It may belong to a robot that was never connected here, or to a newer version of Studio. It stays in the file unchanged.'),
     gaps: [], example: t('If the block belongs to a robot, connect that robot.'), words: '', english: '', choices: []};
 }
 
-function element(tag: string, name: string, words = ''): HTMLElement {
-  const made = document.createElement(tag);
-  if (name) made.className = name;
-  if (words) made.textContent = words;
-  return made;
+function createElement(tag: string, name: string, text = ''): HTMLElement {
+  const node = document.createElement(tag);
+  if (name) node.className = name;
+  if (text) node.textContent = text;
+  return node;
 }
 
 /** “Help” in the context menu of every block that has some. */

@@ -1,8 +1,8 @@
 // A sentence in a box next to a place on the canvas; it goes after some seconds, at the next click or when the view moves.
 import * as Blockly from 'blockly/core';
 
-const SHOWN_MS = 6000;
-const EDGE = 12;
+const DISPLAY_MS = 6000;
+const MARGIN = 12;
 const GAP = 26;
 const hints = new WeakMap<Blockly.Workspace, Hint>();
 
@@ -31,17 +31,17 @@ export class Hint {
   }
 
   /** Shows a sentence below this place of the page, or above it where there is no room. */
-  show(sentence: string, at: Blockly.utils.Coordinate): void {
+  show(text: string, position: Blockly.utils.Coordinate): void {
     window.clearTimeout(this.timer);
-    this.box.textContent = sentence;
+    this.box.textContent = text;
     const frame = this.workspace.getInjectionDiv().getBoundingClientRect();
     const {offsetWidth, offsetHeight} = this.box;
-    const left = Math.max(EDGE, Math.min(at.x - frame.left, frame.width - offsetWidth - EDGE));
-    const below = at.y - frame.top + GAP;
-    const top = below + offsetHeight + EDGE < frame.height ? below : at.y - frame.top - offsetHeight - GAP;
+    const left = Math.max(MARGIN, Math.min(position.x - frame.left, frame.width - offsetWidth - MARGIN));
+    const below = position.y - frame.top + GAP;
+    const top = below + offsetHeight + MARGIN < frame.height ? below : position.y - frame.top - offsetHeight - GAP;
     this.box.style.left = `${left}px`;
-    this.box.style.top = `${Math.max(EDGE, top)}px`;
-    this.timer = window.setTimeout(() => this.hide(), SHOWN_MS);
+    this.box.style.top = `${Math.max(MARGIN, top)}px`;
+    this.timer = window.setTimeout(() => this.hide(), DISPLAY_MS);
   }
 
   hide(): void {

@@ -2,10 +2,10 @@
 import lucide from 'virtual:icons';
 import {categoryIcon} from './tokens';
 
-const SVG = 'http://www.w3.org/2000/svg';
+const SVG_NS = 'http://www.w3.org/2000/svg';
 
 /** Filled glyphs of our own, on the same 24 x 24 grid. */
-const FILLED: Readonly<Record<string, string>> = {
+const FILLED_ICONS: Readonly<Record<string, string>> = {
   'quote-open':
     '<path d="M10.6 5.2C6 6.6 3 10 3 14.3 3 17 4.600 18.800 6.900 18.800c2.100 0 3.600-1.500 3.600-3.500' +
     ' 0-1.900-1.300-3.200-3.100-3.300.2-1.900 1.700-3.400 4-4.200zM21 5.200c-4.600 1.400-7.600 4.800-7.600 9.100' +
@@ -20,34 +20,34 @@ const FILLED: Readonly<Record<string, string>> = {
 
 /** The name itself if there is such an icon, else the icon of the category (block style). */
 export function iconName(name: string, style: string): string {
-  if (Object.hasOwn(lucide, name) || Object.hasOwn(FILLED, name)) return name;
+  if (Object.hasOwn(lucide, name) || Object.hasOwn(FILLED_ICONS, name)) return name;
   const fallback = categoryIcon(style);
   return Object.hasOwn(lucide, fallback) ? fallback : 'circle-dot';
 }
 
 /** Each icon is parsed once; a page with a thousand blocks copies it. */
-const drawings = new Map<string, SVGElement>();
+const iconCache = new Map<string, SVGElement>();
 
 /** Fills `group` with the icon, scaled to `size` units; colours come from CSS. */
 export function drawIcon(group: Element, name: string, size: number): void {
   const key = `${size} ${name}`;
-  let drawn = drawings.get(key);
+  let drawn = iconCache.get(key);
   if (!drawn) {
-    const filled = FILLED[name];
-    const whole = document.createElementNS(SVG, 'g');
-    whole.innerHTML = filled ?? lucide[name] ?? '';
-    const only = whole.childElementCount === 1 ? whole.firstElementChild : null;
-    drawn = only instanceof SVGElement ? only : whole;
+    const filled = FILLED_ICONS[name];
+    const wrapper = document.createElementNS(SVG_NS, 'g');
+    wrapper.innerHTML = filled ?? lucide[name] ?? '';
+    const only = wrapper.childElementCount === 1 ? wrapper.firstElementChild : null;
+    drawn = only instanceof SVGElement ? only : wrapper;
     drawn.setAttribute('transform', `scale(${size / 24})`);
     drawn.setAttribute('class', filled ? 'nepGlyph' : 'nepLines');
-    drawings.set(key, drawn);
+    iconCache.set(key, drawn);
   }
   group.replaceChildren(drawn.cloneNode(true));
 }
 
 /** A free-standing <svg> of the icon for HTML (toolbox, buttons). */
 export function iconElement(name: string, size: number, stroke = 2): SVGSVGElement {
-  const svg = document.createElementNS(SVG, 'svg');
+  const svg = document.createElementNS(SVG_NS, 'svg');
   svg.setAttribute('viewBox', '0 0 24 24');
   svg.setAttribute('width', String(size));
   svg.setAttribute('height', String(size));

@@ -3,9 +3,9 @@
 import {t} from './words';
 
 /** A program as long as this may take longer than an eye blinks. */
-const LONG_CHARACTERS = 12_000;
+const LARGE_PAYLOAD_LENGTH = 12_000;
 /** A page that nobody sees paints nothing: it waits no longer than this. */
-const UNSEEN_MS = 100;
+const HIDDEN_PAGE_TIMEOUT_MS = 100;
 
 export class Inbox {
   private waiting: [name: string, payload: string][] | null = null;
@@ -16,13 +16,13 @@ export class Inbox {
     this.cover.setAttribute('role', 'status');
   }
 
-  take(name: string, payload: string): void {
+  dispatch(name: string, payload: string): void {
     if (this.waiting) this.waiting.push([name, payload]);
-    else if (name === 'tab' && payload.length >= LONG_CHARACTERS) this.takeAfterPaint(name, payload);
+    else if (name === 'tab' && payload.length >= LARGE_PAYLOAD_LENGTH) this.dispatchAfterPaint(name, payload);
     else this.receive(name, payload);
   }
 
-  private takeAfterPaint(name: string, payload: string): void {
+  private dispatchAfterPaint(name: string, payload: string): void {
     this.waiting = [[name, payload]];
     this.cover.textContent = t('Opening…');
     document.body.append(this.cover);
@@ -30,15 +30,15 @@ export class Inbox {
     const go = () => {
       if (isDone) return;
       isDone = true;
-      const told = this.waiting ?? [];
+      const queued = this.waiting ?? [];
       this.waiting = null;
       try {
-        for (const [each, its] of told) this.receive(each, its);
+        for (const [each, its] of queued) this.receive(each, its);
       } finally {
         this.cover.remove();
       }
     };
     window.requestAnimationFrame(() => window.setTimeout(go));
-    window.setTimeout(go, UNSEEN_MS);
+    window.setTimeout(go, HIDDEN_PAGE_TIMEOUT_MS);
   }
 }

@@ -1,112 +1,112 @@
 // What is inside a folded block and must not be forgotten there: notes, and "Pause here". The folded block has a small
 // mark for each kind; the mark unfolds it and leads to the first block that is meant.
 import * as Blockly from 'blockly/core';
-import {pausesHere} from './breakpoints';
-import {fold, seenInPlaceOf} from './folding';
+import {hasBreakpoint} from './breakpoints';
+import {setCollapsed, visibleBlockOf} from './folding';
 import {drawIcon} from './icons';
-import {hasNote, showNote, wordsOfNote} from './notes';
+import {hasNote, setNoteVisible, getNoteText} from './notes';
 import {t} from './words';
 
 type Block = Blockly.BlockSvg;
 
-const SVG = 'http://www.w3.org/2000/svg';
-const SIZE = 22;
+const SVG_NS = 'http://www.w3.org/2000/svg';
+const MARK_SIZE = 22;
 /** Right of the block; of a value, which has another block there, over its corner. */
-const BESIDE = 6;
-const BETWEEN = 4;
+const MARK_MARGIN = 6;
+const MARK_SPACING = 4;
 
-interface Kind {
+interface MarkKind {
   name: 'note' | 'pause';
   icon: string;
   is(block: Block): boolean;
-  words(inside: Block[]): string;
+  words(blocks: Block[]): string;
 }
 
-const KINDS: readonly Kind[] = [
-  {name: 'pause', icon: 'pause', is: pausesHere, words: () => t('The program pauses inside this block. Click to see where')},
+const MARK_KINDS: readonly MarkKind[] = [
+  {name: 'pause', icon: 'pause', is: hasBreakpoint, words: () => t('The program pauses inside this block. Click to see where')},
   {name: 'note', icon: 'sticky-note', is: hasNote,
-    words: (inside) => t('Contains a note: {text}', {text: inside.map(wordsOfNote).filter(Boolean).join(' · ')})},
+    words: (blocks) => t('Contains a note: {text}', {text: blocks.map(getNoteText).filter(Boolean).join(' · ')})},
 ];
 
 /** Folded blocks, each with the marks that it shows. */
-const folded = new Map<Block, SVGElement[]>();
+const marksByBlock = new Map<Block, SVGElement[]>();
 
 /** All that is hidden inside of a folded block, in the order of reading; not what hangs below it. */
-function inside(block: Block): Block[] {
+function hiddenBlocks(block: Block): Block[] {
   const below = new Set(block.getNextBlock()?.getDescendants(false) ?? []);
-  return block.getDescendants(true).filter((each) => each !== block && !below.has(each));
+  return block.getDescendants(true).filter((descendant) => descendant !== block && !below.has(descendant));
 }
 
 /** The first block of this kind that is hidden in a folded one. */
-export function hiddenIn(block: Block, name: Kind['name']): Block | null {
-  const kind = KINDS.find((each) => each.name === name)!;
-  return block.isCollapsed() ? inside(block).find(kind.is) ?? null : null;
+export function findHidden(block: Block, name: MarkKind['name']): Block | null {
+  const kind = MARK_KINDS.find((candidate) => candidate.name === name)!;
+  return block.isCollapsed() ? hiddenBlocks(block).find(kind.is) ?? null : null;
 }
 
 /** Unfolds whatever hides it, as one step, and gives it the keys. */
-export function leadTo(block: Block): void {
+export function revealBlock(block: Block): void {
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
-  for (let each = block.getSurroundParent(); each; each = each.getSurroundParent()) if (each.isCollapsed()) fold(each, false);
+  for (let ancestor = block.getSurroundParent(); ancestor; ancestor = ancestor.getSurroundParent()) if (ancestor.isCollapsed()) setCollapsed(ancestor, false);
   Blockly.Events.setGroup(group);
   Blockly.renderManagement.triggerQueuedRenders(block.workspace);
   Blockly.getFocusManager().focusNode(block);
 }
 
-function refresh(block: Block): void {
-  for (const mark of folded.get(block) ?? []) mark.remove();
-  folded.delete(block);
+function updateMarks(block: Block): void {
+  for (const mark of marksByBlock.get(block) ?? []) mark.remove();
+  marksByBlock.delete(block);
   if (block.isDeadOrDying()) return;
-  const all = inside(block);
-  for (const each of all) showNote(each, seenInPlaceOf(each) === each);
+  const all = hiddenBlocks(block);
+  for (const hidden of all) setNoteVisible(hidden, visibleBlockOf(hidden) === hidden);
   if (!block.isCollapsed()) return;
-  const kinds = KINDS.filter((kind) => all.some(kind.is));
-  folded.set(block, kinds.map((kind, number) => {
-    const mark = draw(block, kind, all.filter(kind.is));
-    const [x, y] = block.outputConnection ? [block.childlessWidth - SIZE, -SIZE / 2] :
-      [block.childlessWidth + BESIDE, (block.height - SIZE) / 2];
-    mark.setAttribute('transform', `translate(${x + number * (SIZE + BETWEEN)}, ${y})`);
+  const kinds = MARK_KINDS.filter((kind) => all.some(kind.is));
+  marksByBlock.set(block, kinds.map((kind, number) => {
+    const mark = createMark(block, kind, all.filter(kind.is));
+    const [x, y] = block.outputConnection ? [block.childlessWidth - MARK_SIZE, -MARK_SIZE / 2] :
+      [block.childlessWidth + MARK_MARGIN, (block.height - MARK_SIZE) / 2];
+    mark.setAttribute('transform', `translate(${x + number * (MARK_SIZE + MARK_SPACING)}, ${y})`);
     return mark;
   }));
 }
 
-function draw(block: Block, kind: Kind, meant: Block[]): SVGElement {
-  const make = (name: string, given: Record<string, string | number>) => {
-    const made = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(given)) made.setAttribute(key, String(value));
-    return made;
+function createMark(block: Block, kind: MarkKind, targets: Block[]): SVGElement {
+  const make = (name: string, attributes: Record<string, string | number>) => {
+    const element = document.createElementNS(SVG_NS, name);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+    return element;
   };
-  const words = kind.words(meant);
-  const mark = make('g', {'class': `nepInsideMark nepInside-${kind.name}`, 'role': 'button', 'aria-label': words});
+  const label = kind.words(targets);
+  const mark = make('g', {'class': `nepInsideMark nepInside-${kind.name}`, 'role': 'button', 'aria-label': label});
   const title = make('title', {});
-  title.textContent = words;
+  title.textContent = label;
   const picture = make('g', {transform: 'translate(4, 4)'});
-  drawIcon(picture as SVGGElement, kind.icon, SIZE - 8);
-  mark.append(title, make('circle', {cx: SIZE / 2, cy: SIZE / 2, r: SIZE / 2}), picture);
+  drawIcon(picture as SVGGElement, kind.icon, MARK_SIZE - 8);
+  mark.append(title, make('circle', {cx: MARK_SIZE / 2, cy: MARK_SIZE / 2, r: MARK_SIZE / 2}), picture);
   mark.addEventListener('pointerdown', (event) => event.stopPropagation());
   mark.addEventListener('click', (event) => {
     event.stopPropagation();
-    const first = hiddenIn(block, kind.name);
-    if (first) leadTo(first);
+    const first = findHidden(block, kind.name);
+    if (first) revealBlock(first);
   });
   block.getSvgRoot().append(mark);
   return mark;
 }
 
-const render = Blockly.BlockSvg.prototype.renderEfficiently;
+const originalRenderEfficiently = Blockly.BlockSvg.prototype.renderEfficiently;
 Blockly.BlockSvg.prototype.renderEfficiently = function (this: Block) {
-  render.call(this);
-  if (this.isCollapsed() || folded.has(this)) refresh(this);
+  originalRenderEfficiently.call(this);
+  if (this.isCollapsed() || marksByBlock.has(this)) updateMarks(this);
 };
 
 /** Keeps the marks true while what is inside of folded blocks changes. */
-export function keepInsideMarks(workspace: Blockly.WorkspaceSvg): void {
+export function registerInsideMarks(workspace: Blockly.WorkspaceSvg): void {
   let waiting = 0;
   workspace.addChangeListener((event) => {
-    if (event.isUiEvent || !folded.size) return;
+    if (event.isUiEvent || !marksByBlock.size) return;
     waiting ||= window.requestAnimationFrame(() => {
       waiting = 0;
-      for (const block of [...folded.keys()]) if (block.workspace === workspace || block.isDeadOrDying()) refresh(block);
+      for (const block of [...marksByBlock.keys()]) if (block.workspace === workspace || block.isDeadOrDying()) updateMarks(block);
     });
   });
 }

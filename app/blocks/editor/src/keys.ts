@@ -22,7 +22,7 @@ function alt(key: number, ...more: number[]): string {
   return registry.createSerializedKey(key, [KeyCodes.ALT, ...more]);
 }
 
-const KEYS: Readonly<Record<string, Keys>> = {
+const SHORTCUT_KEYS: Readonly<Record<string, Keys>> = {
   [names.START_MOVE]: [ctrl(KeyCodes.M)],
   [names.START_MOVE_STACK]: [ctrl(KeyCodes.M, KeyCodes.SHIFT)],
   [names.DISCONNECT]: [ctrl(KeyCodes.X, KeyCodes.SHIFT)],
@@ -42,12 +42,12 @@ const KEYS: Readonly<Record<string, Keys>> = {
 };
 
 /** Whether a person presses it while typing: a letter or a digit, alone or with Shift. */
-function isTyped(key: string): boolean {
+function isTypingKey(key: string): boolean {
   const code = Number(key.replace(/^Shift\+/, ''));
   return (code >= KeyCodes.ZERO && code <= KeyCodes.NINE) || (code >= KeyCodes.A && code <= KeyCodes.Z);
 }
 
-function give(name: string, keyCodes: Keys, changes: Partial<Shortcut> = {}): void {
+function overrideShortcut(name: string, keyCodes: Keys, changes: Partial<Shortcut> = {}): void {
   const shortcut = registry.getRegistry()[name];
   if (!shortcut) throw new Error(`Blockly has no shortcut ${name}`);
   registry.unregister(name);
@@ -55,7 +55,7 @@ function give(name: string, keyCodes: Keys, changes: Partial<Shortcut> = {}): vo
 }
 
 /** Takes the one block out of its stack, which closes behind it; Blockly takes all below along when Shift is held. */
-function takeOut(): boolean {
+function unplugFocusedBlock(): boolean {
   const block = Blockly.getFocusManager().getFocusedNode();
   if (!(block instanceof Blockly.BlockSvg)) return false;
   Blockly.keyboardNavigationController.setIsActive(true);
@@ -65,32 +65,32 @@ function takeOut(): boolean {
   return true;
 }
 
-const NAMES: Readonly<Record<number, string>> = {
+const KEY_NAMES: Readonly<Record<number, string>> = {
   [KeyCodes.DELETE]: lazy('Del'), [KeyCodes.ENTER]: '↵', [KeyCodes.UP]: '↑', [KeyCodes.DOWN]: '↓', [KeyCodes.SLASH]: '/',
 };
 
 /** The first key of a command as menus show it: Ctrl+D, on a Mac ⌘D. */
-export function keyWords(name: string): string {
+export function formatShortcut(name: string): string {
   const [key] = registry.getKeyCodesByShortcutName(name);
   if (!key) return '';
   const parts = key.split('+');
   const code = Number(parts.pop());
-  const last = NAMES[code];
+  const last = KEY_NAMES[code];
   const isMac = parts.includes('Meta');
-  const words = isMac ? [['Control', '⌃'], ['Alt', '⌥'], ['Shift', '⇧'], ['Meta', '⌘']] as const :
+  const modifierNames = isMac ? [['Control', '⌃'], ['Alt', '⌥'], ['Shift', '⇧'], ['Meta', '⌘']] as const :
     [['Control', t('Ctrl')], ['Alt', t('Alt')], ['Shift', t('Shift')]] as const;
-  const held = words.filter(([each]) => parts.includes(each)).map(([, word]) => word);
-  return [...held, last ? t(last) : String.fromCharCode(code)].join(isMac ? '' : '+');
+  const modifiers = modifierNames.filter(([each]) => parts.includes(each)).map(([, word]) => word);
+  return [...modifiers, last ? t(last) : String.fromCharCode(code)].join(isMac ? '' : '+');
 }
 
 /** Copy, cut, paste and duplicate as our clipboard does them. */
-export function useClipboard(clipboard: Clipboard): void {
-  const may = (workspace: Blockly.WorkspaceSvg) =>
+export function registerClipboardShortcuts(clipboard: Clipboard): void {
+  const canRun = (workspace: Blockly.WorkspaceSvg) =>
     !workspace.isDragging() && !Blockly.getFocusManager().ephemeralFocusTaken();
-  const does = (name: string, run: () => unknown) => {
+  const setCallback = (name: string, run: () => unknown) => {
     const keyCodes = registry.getKeyCodesByShortcutName(name);
-    give(name, keyCodes, {
-      preconditionFn: may,
+    overrideShortcut(name, keyCodes, {
+      preconditionFn: canRun,
       callback: (_workspace, event) => {
         event.preventDefault();
         run();
@@ -98,26 +98,26 @@ export function useClipboard(clipboard: Clipboard): void {
       },
     });
   };
-  does(names.COPY, () => clipboard.copy());
-  does(names.CUT, () => clipboard.cut());
-  does(names.PASTE, () => void clipboard.paste());
-  does(names.DUPLICATE, () => clipboard.duplicate());
+  setCallback(names.COPY, () => clipboard.copy());
+  setCallback(names.CUT, () => clipboard.cut());
+  setCallback(names.PASTE, () => void clipboard.paste());
+  setCallback(names.DUPLICATE, () => clipboard.duplicate());
 }
 
 /** Call it once, after everybody has registered their shortcuts. */
-export function useOwnKeys(): void {
-  for (const [name, keys] of Object.entries(KEYS)) {
-    give(name, keys, name === names.DISCONNECT ? {callback: takeOut} : {});
+export function applyShortcutKeys(): void {
+  for (const [name, keys] of Object.entries(SHORTCUT_KEYS)) {
+    overrideShortcut(name, keys, name === names.DISCONNECT ? {callback: unplugFocusedBlock} : {});
   }
   const {callback} = registry.getRegistry()[names.DELETE]!;
-  give(names.DELETE, registry.getKeyCodesByShortcutName(names.DELETE), {
+  overrideShortcut(names.DELETE, registry.getKeyCodesByShortcutName(names.DELETE), {
     callback: (workspace, event, ...more) => {
       event.preventDefault();
       return deleteByKey() || (callback?.(workspace, event, ...more) ?? false);
     },
   });
   for (const [key, commands] of Object.entries(registry.getKeyMap())) {
-    if (!isTyped(key)) continue;
+    if (!isTypingKey(key)) continue;
     for (const name of commands) {
       console.warn(`${name} would be done by typing: it has no key`);
       registry.removeKeyMapping(key, name);

@@ -2,29 +2,29 @@
 // Who adds entries registers them with Blockly and names an icon with `menuIcon`. Weights: 0 to 9 what runs, 10 to 49
 // copying, 50 to 79 how the block is, 80 to 89 parts of it, 90 help, 99 deleting; the canvas has room from 70 on.
 import * as Blockly from 'blockly/core';
-import {canPause, pausesHere, togglePause} from './breakpoints';
+import {canHaveBreakpoint, hasBreakpoint, toggleBreakpoint} from './breakpoints';
 import {type Clipboard} from './clipboard';
 import {focusedBlock} from './help';
-import {canFold, fold} from './folding';
-import {CHOOSE_ALL_SHORTCUT, chooseAll, registerChooseAll} from './frame';
+import {canCollapse, setCollapsed} from './folding';
+import {SELECT_ALL_SHORTCUT, selectAll, registerSelectAll} from './frame';
 import {iconElement} from './icons';
-import {ctrl, keyWords} from './keys';
-import {hiddenIn, leadTo} from './inside_marks';
+import {ctrl, formatShortcut} from './keys';
+import {findHidden, revealBlock} from './inside_marks';
 import {addCanvasNote, addNote, hasNote, removeNote} from './notes';
 import {registerRemoveMenu} from './remove_menu';
-import {allChosenWith, chosenWith, countIn, notesChosenWith, removeChosenWith} from './selection';
+import {getSelectedItemsWith, getSelectedBlocksWith, countBlocks, getSelectedNotesWith, deleteSelectionWith} from './selection';
 import {t} from './words';
 
 const {names} = Blockly.ShortcutItems;
 const {ScopeType} = Blockly.ContextMenuRegistry;
-const OFF = 'MANUALLY_DISABLED';
-const SWITCH = 'nepSwitch';
+const DISABLED_REASON = 'MANUALLY_DISABLED';
+const TOGGLE_DISABLED = 'nepSwitch';
 
-const REMOVED = ['collapseWorkspace', 'expandWorkspace', 'blockInline', 'blockHelp', 'commentCreate', 'commentDelete',
+const REMOVED_ITEMS = ['collapseWorkspace', 'expandWorkspace', 'blockInline', 'blockHelp', 'commentCreate', 'commentDelete',
   'commentDuplicate', 'blockDuplicate', 'blockCollapseExpand', 'blockDisable', 'blockDelete', 'blockComment'];
 
 /** Blockly's own entries that stay: their weight here, and their icon. */
-const KEPT: Readonly<Record<string, [weight: number, icon: string]>> = {
+const KEPT_ITEMS: Readonly<Record<string, [weight: number, icon: string]>> = {
   undoWorkspace: [20, 'undo-2'],
   redoWorkspace: [21, 'redo-2'],
   cleanWorkspace: [40, 'list-checks'],
@@ -34,31 +34,31 @@ const KEPT: Readonly<Record<string, [weight: number, icon: string]>> = {
 const icons = new Map<string, string>();
 
 /** The icon of an entry, by the entry's id. */
-export function menuIcon(id: string, icon: string): void {
+export function setMenuIcon(id: string, icon: string): void {
   icons.set(id, icon);
 }
 
 /** Before anything is made. */
-export function trimMenu(): void {
+export function configureMenu(): void {
   registerRemoveMenu();
   const registry = Blockly.ContextMenuRegistry.registry;
-  for (const id of REMOVED) if (registry.getItem(id)) registry.unregister(id);
-  for (const [id, [weight, icon]] of Object.entries(KEPT)) {
+  for (const id of REMOVED_ITEMS) if (registry.getItem(id)) registry.unregister(id);
+  for (const [id, [weight, icon]] of Object.entries(KEPT_ITEMS)) {
     const item = registry.getItem(id);
     if (item) item.weight = weight;
-    menuIcon(id, icon);
+    setMenuIcon(id, icon);
   }
-  menuIcon('nepHelp', 'circle-question-mark');
-  menuIcon('nepRemoveItem', 'list-minus');
-  menuIcon('nepAddElseIf', 'split');
-  menuIcon('nepAddElse', 'split');
+  setMenuIcon('nepHelp', 'circle-question-mark');
+  setMenuIcon('nepRemoveItem', 'list-minus');
+  setMenuIcon('nepAddElseIf', 'split');
+  setMenuIcon('nepAddElse', 'split');
   // Nothing asks: deleting can be undone.
   Blockly.dialog.setConfirm((_message, callback) => callback(true));
 }
 
 type Scope = Blockly.ContextMenuRegistry.Scope;
 
-interface Entry {
+interface MenuEntry {
   id: string;
   weight: number;
   icon: string;
@@ -66,12 +66,12 @@ interface Entry {
   /** The shortcut that does the same. */
   shortcut?: string;
   when(scope: Scope): boolean | 'disabled';
-  run(scope: Scope, place: {x: number; y: number}): unknown;
+  run(scope: Scope, location: {x: number; y: number}): unknown;
 }
 
-function add(scopeType: Blockly.ContextMenuRegistry.ScopeType, entry: Entry): void {
+function addMenuEntry(scopeType: Blockly.ContextMenuRegistry.ScopeType, entry: MenuEntry): void {
   const {id, weight, icon, words, shortcut} = entry;
-  menuIcon(id, icon);
+  setMenuIcon(id, icon);
   Blockly.ContextMenuRegistry.registry.register({
     id, weight, scopeType,
     displayText: typeof words === 'string' ? words : (scope) => words(scope),
@@ -80,97 +80,97 @@ function add(scopeType: Blockly.ContextMenuRegistry.ScopeType, entry: Entry): vo
       const when = entry.when(scope);
       return when === 'disabled' ? when : when ? 'enabled' : 'hidden';
     },
-    callback: (scope, _opened, _chosen, place) => void entry.run(scope, place),
+    callback: (scope, _opened, _chosen, location) => void entry.run(scope, location),
   });
 }
 
-function line(scopeType: Blockly.ContextMenuRegistry.ScopeType, weight: number): void {
+function addSeparator(scopeType: Blockly.ContextMenuRegistry.ScopeType, weight: number): void {
   Blockly.ContextMenuRegistry.registry.register({id: `nepLine${scopeType}${weight}`, weight, scopeType, separator: true});
 }
 
 /** Whether a person may change the block of this menu. */
-function own({block}: Scope): boolean {
+function isEditable({block}: Scope): boolean {
   return block !== undefined && !block.isInFlyout && !block.isShadow();
 }
 
 export function registerMenu(clipboard: Clipboard): void {
-  const block = (entry: Entry) => add(ScopeType.BLOCK, entry);
+  const block = (entry: MenuEntry) => addMenuEntry(ScopeType.BLOCK, entry);
   block({id: 'nepDuplicate', weight: 10, icon: 'copy-plus', words: t('Duplicate'), shortcut: names.DUPLICATE,
-    when: own, run: (it) => clipboard.duplicate(it.block)});
+    when: isEditable, run: (scope) => clipboard.duplicate(scope.block)});
   block({id: 'nepCopy', weight: 11, icon: 'copy', words: t('Copy'), shortcut: names.COPY,
-    when: ({block: it}) => it !== undefined, run: (it) => clipboard.copy(it.block)});
+    when: ({block: target}) => target !== undefined, run: (scope) => clipboard.copy(scope.block)});
   block({id: 'nepCut', weight: 12, icon: 'scissors', words: t('Cut'), shortcut: names.CUT,
-    when: (it) => own(it) && it.block!.isDeletable(), run: (it) => clipboard.cut(it.block)});
+    when: (scope) => isEditable(scope) && scope.block!.isDeletable(), run: (scope) => clipboard.cut(scope.block)});
   block({id: 'nepPaste', weight: 13, icon: 'clipboard-paste', words: t('Paste'), shortcut: names.PASTE,
-    when: own, run: (_it, place) => clipboard.paste(place)});
-  line(ScopeType.BLOCK, 50);
+    when: isEditable, run: (_it, location) => clipboard.paste(location)});
+  addSeparator(ScopeType.BLOCK, 50);
   block({id: 'nepCollapse', weight: 51, icon: 'fold-vertical', words: t('Collapse'),
-    when: (it) => own(it) && all(it.block!).some((each) => !each.isCollapsed() && canFold(each)),
-    run: (it) => step(() => all(it.block!).filter(canFold).forEach((each) => fold(each, true)))});
+    when: (scope) => isEditable(scope) && targetBlocks(scope.block!).some((target) => !target.isCollapsed() && canCollapse(target)),
+    run: (scope) => withUndoGroup(() => targetBlocks(scope.block!).filter(canCollapse).forEach((target) => setCollapsed(target, true)))});
   block({id: 'nepExpand', weight: 52, icon: 'unfold-vertical', words: t('Expand'),
-    when: (it) => own(it) && all(it.block!).some((each) => each.isCollapsed()),
-    run: (it) => step(() => all(it.block!).forEach((each) => fold(each, false)))});
-  block({id: 'nepOff', weight: 53, icon: 'power-off', words: t('Disable block'), shortcut: SWITCH,
-    when: (it) => own(it) && all(it.block!).some((each) => !each.hasDisabledReason(OFF) && !each.getInheritedDisabled()),
-    run: (it) => switchOff(it.block!, true)});
-  block({id: 'nepOn', weight: 54, icon: 'power', words: t('Enable block'), shortcut: SWITCH,
-    when: (it) => own(it) && all(it.block!).some((each) => each.hasDisabledReason(OFF)), run: (it) => switchOff(it.block!, false)});
+    when: (scope) => isEditable(scope) && targetBlocks(scope.block!).some((target) => target.isCollapsed()),
+    run: (scope) => withUndoGroup(() => targetBlocks(scope.block!).forEach((target) => setCollapsed(target, false)))});
+  block({id: 'nepOff', weight: 53, icon: 'power-off', words: t('Disable block'), shortcut: TOGGLE_DISABLED,
+    when: (scope) => isEditable(scope) && targetBlocks(scope.block!).some((target) => !target.hasDisabledReason(DISABLED_REASON) && !target.getInheritedDisabled()),
+    run: (scope) => setDisabled(scope.block!, true)});
+  block({id: 'nepOn', weight: 54, icon: 'power', words: t('Enable block'), shortcut: TOGGLE_DISABLED,
+    when: (scope) => isEditable(scope) && targetBlocks(scope.block!).some((target) => target.hasDisabledReason(DISABLED_REASON)), run: (scope) => setDisabled(scope.block!, false)});
   block({id: 'nepNote', weight: 70, icon: 'sticky-note', words: t('Add a note'),
-    when: (it) => own(it) && !hasNote(it.block!) && !it.block!.isCollapsed(), run: (it) => addNote(it.block!)});
+    when: (scope) => isEditable(scope) && !hasNote(scope.block!) && !scope.block!.isCollapsed(), run: (scope) => addNote(scope.block!)});
   block({id: 'nepNoNote', weight: 70, icon: 'sticky-note', words: t('Remove the note'),
-    when: (it) => own(it) && hasNote(it.block!), run: (it) => removeNote(it.block!)});
+    when: (scope) => isEditable(scope) && hasNote(scope.block!), run: (scope) => removeNote(scope.block!)});
   block({id: 'nepPause', weight: 75, icon: 'circle-pause',
-    words: (it) => it.block && pausesHere(it.block) ? t('Don\'t pause here') : t('Pause here'),
-    when: (it) => own(it) && canPause(it.block!), run: (it) => togglePause(it.block!)});
+    words: (scope) => scope.block && hasBreakpoint(scope.block) ? t('Don\'t pause here') : t('Pause here'),
+    when: (scope) => isEditable(scope) && canHaveBreakpoint(scope.block!), run: (scope) => toggleBreakpoint(scope.block!)});
   block({id: 'nepShowNote', weight: 71, icon: 'sticky-note', words: t('Show the note inside this block'),
-    when: (it) => own(it) && hiddenIn(it.block!, 'note') !== null, run: (it) => leadTo(hiddenIn(it.block!, 'note')!)});
+    when: (scope) => isEditable(scope) && findHidden(scope.block!, 'note') !== null, run: (scope) => revealBlock(findHidden(scope.block!, 'note')!)});
   block({id: 'nepShowPause', weight: 76, icon: 'circle-pause', words: t('Show where the program pauses inside'),
-    when: (it) => own(it) && hiddenIn(it.block!, 'pause') !== null, run: (it) => leadTo(hiddenIn(it.block!, 'pause')!)});
-  line(ScopeType.BLOCK, 80);
-  line(ScopeType.BLOCK, 98);
+    when: (scope) => isEditable(scope) && findHidden(scope.block!, 'pause') !== null, run: (scope) => revealBlock(findHidden(scope.block!, 'pause')!)});
+  addSeparator(ScopeType.BLOCK, 80);
+  addSeparator(ScopeType.BLOCK, 98);
   block({id: 'nepDelete', weight: 99, icon: 'trash-2', shortcut: names.DELETE,
-    words: (it) => it.block ? deleteWords(it.block) : '',
-    when: (it) => own(it) && it.block!.isDeletable(), run: (it) => remove(it.block!)});
+    words: (scope) => scope.block ? deleteLabel(scope.block) : '',
+    when: (scope) => isEditable(scope) && scope.block!.isDeletable(), run: (scope) => deleteBlock(scope.block!)});
 
   Blockly.ShortcutRegistry.registry.register({
-    name: SWITCH, keyCodes: [ctrl(Blockly.utils.KeyCodes.E)], displayText: () => t('Disable or enable the block'),
+    name: TOGGLE_DISABLED, keyCodes: [ctrl(Blockly.utils.KeyCodes.E)], displayText: () => t('Disable or enable the block'),
     preconditionFn: (workspace) => !workspace.isDragging() && !workspace.isFlyout,
     callback: () => {
-      const it = focusedBlock();
-      if (!it || it.isInFlyout || it.getInheritedDisabled()) return false;
-      switchOff(it, !it.hasDisabledReason(OFF));
+      const focused = focusedBlock();
+      if (!focused || focused.isInFlyout || focused.getInheritedDisabled()) return false;
+      setDisabled(focused, !focused.hasDisabledReason(DISABLED_REASON));
       return true;
     },
   });
 
-  registerChooseAll();
-  add(ScopeType.WORKSPACE, {id: 'nepChooseAll', weight: 12, icon: 'square-dashed-mouse-pointer', words: t('Select all'),
-    shortcut: CHOOSE_ALL_SHORTCUT,
+  registerSelectAll();
+  addMenuEntry(ScopeType.WORKSPACE, {id: 'nepChooseAll', weight: 12, icon: 'square-dashed-mouse-pointer', words: t('Select all'),
+    shortcut: SELECT_ALL_SHORTCUT,
     when: ({workspace}) => (workspace ? workspace.getTopBlocks(false).length + workspace.getTopComments().length : 0) > 0,
-    run: ({workspace}) => workspace && chooseAll(workspace)});
-  add(ScopeType.WORKSPACE, {id: 'nepPasteHere', weight: 10, icon: 'clipboard-paste', words: t('Paste'),
-    shortcut: names.PASTE, when: () => true, run: (_it, place) => clipboard.paste(place)});
-  line(ScopeType.WORKSPACE, 15);
-  line(ScopeType.WORKSPACE, 35);
-  add(ScopeType.WORKSPACE, {id: 'nepNoteHere', weight: 50, icon: 'sticky-note', words: t('Add a note here'),
-    when: () => true, run: (it, place) => it.workspace && addCanvasNote(it.workspace, place)});
-  line(ScopeType.WORKSPACE, 98);
+    run: ({workspace}) => workspace && selectAll(workspace)});
+  addMenuEntry(ScopeType.WORKSPACE, {id: 'nepPasteHere', weight: 10, icon: 'clipboard-paste', words: t('Paste'),
+    shortcut: names.PASTE, when: () => true, run: (_it, location) => clipboard.paste(location)});
+  addSeparator(ScopeType.WORKSPACE, 15);
+  addSeparator(ScopeType.WORKSPACE, 35);
+  addMenuEntry(ScopeType.WORKSPACE, {id: 'nepNoteHere', weight: 50, icon: 'sticky-note', words: t('Add a note here'),
+    when: () => true, run: (scope, location) => scope.workspace && addCanvasNote(scope.workspace, location)});
+  addSeparator(ScopeType.WORKSPACE, 98);
 
-  const note = (entry: Entry) => add(ScopeType.COMMENT, entry);
+  const note = (entry: MenuEntry) => addMenuEntry(ScopeType.COMMENT, entry);
   note({id: 'nepNoteDuplicate', weight: 10, icon: 'copy-plus', words: t('Duplicate'), shortcut: names.DUPLICATE,
-    when: () => true, run: (it) => clipboard.duplicate(it.comment)});
+    when: () => true, run: (scope) => clipboard.duplicate(scope.comment)});
   note({id: 'nepNoteCopy', weight: 11, icon: 'copy', words: t('Copy'), shortcut: names.COPY,
-    when: () => true, run: (it) => clipboard.copy(it.comment)});
+    when: () => true, run: (scope) => clipboard.copy(scope.comment)});
   note({id: 'nepNoteDelete', weight: 99, icon: 'trash-2', shortcut: names.DELETE,
-    words: (it) => allChosenWith(it.comment).length ? t('Delete the selection') : t('Remove the note'),
-    when: () => true, run: (it) => it.comment && !removeChosenWith(it.comment) && step(() => it.comment!.dispose())});
+    words: (scope) => getSelectedItemsWith(scope.comment).length ? t('Delete the selection') : t('Remove the note'),
+    when: () => true, run: (scope) => scope.comment && !deleteSelectionWith(scope.comment) && withUndoGroup(() => scope.comment!.dispose())});
 }
 
 /** The shortcut that puts blocks into the backpack. */
-export const PACK = 'nepPack';
+export const ADD_TO_BACKPACK = 'nepPack';
 
 /** What the menus need of the backpack. */
-interface BackpackMenu {
+interface BackpackActions {
   may(block: Blockly.BlockSvg | undefined): boolean;
   pack(block: Blockly.BlockSvg): void;
   isPacked(block: Blockly.BlockSvg): boolean;
@@ -180,23 +180,23 @@ interface BackpackMenu {
   empty(): void;
 }
 
-export function addToMenus(backpack: BackpackMenu): void {
-  add(ScopeType.BLOCK, {id: 'nepPack', weight: 14, icon: 'backpack', words: t('Add to backpack'), shortcut: PACK,
+export function registerBackpackMenu(backpack: BackpackActions): void {
+  addMenuEntry(ScopeType.BLOCK, {id: 'nepPack', weight: 14, icon: 'backpack', words: t('Add to backpack'), shortcut: ADD_TO_BACKPACK,
     when: ({block}) => backpack.may(block), run: ({block}) => block && backpack.pack(block)});
-  add(ScopeType.BLOCK, {id: 'nepUnpack', weight: 99, icon: 'trash-2', words: t('Remove from backpack'),
+  addMenuEntry(ScopeType.BLOCK, {id: 'nepUnpack', weight: 99, icon: 'trash-2', words: t('Remove from backpack'),
     shortcut: names.DELETE, when: ({block}) => block !== undefined && backpack.isPacked(block),
     run: ({block}) => block && backpack.remove(block)});
-  add(ScopeType.WORKSPACE, {id: 'nepOpenBackpack', weight: 13, icon: 'backpack',
+  addMenuEntry(ScopeType.WORKSPACE, {id: 'nepOpenBackpack', weight: 13, icon: 'backpack',
     words: () => t('Open the backpack ({count})', {count: backpack.count()}),
     when: () => backpack.count() > 0, run: () => backpack.open()});
-  add(ScopeType.WORKSPACE, {id: 'nepEmptyBackpack', weight: 14, icon: 'trash-2', words: t('Empty the backpack'),
+  addMenuEntry(ScopeType.WORKSPACE, {id: 'nepEmptyBackpack', weight: 14, icon: 'trash-2', words: t('Empty the backpack'),
     when: () => backpack.count() > 0, run: () => backpack.empty()});
 }
 
 export function registerPictureMenu(command: (name: string) => void): void {
-  const canvas = (entry: Omit<Entry, 'when'>) => add(ScopeType.WORKSPACE,
+  const canvas = (entry: Omit<MenuEntry, 'when'>) => addMenuEntry(ScopeType.WORKSPACE,
     {...entry, when: ({workspace}) => (workspace?.getTopBlocks(false).length ?? 0) > 0});
-  line(ScopeType.WORKSPACE, 60);
+  addSeparator(ScopeType.WORKSPACE, 60);
   canvas({id: 'nepPicture', weight: 61, icon: 'image-down', words: t('Save as image'), run: () => command('picture.save')});
   canvas({id: 'nepCopyPicture', weight: 62, icon: 'image', words: t('Copy as image'), run: () => command('picture.copy')});
   canvas({id: 'nepPrintBlocks', weight: 63, icon: 'printer', words: t('Print'), run: () => command('print.ask')});
@@ -205,87 +205,87 @@ export function registerPictureMenu(command: (name: string) => void): void {
 // ---- how a block is
 
 /** A block that is off is skipped; with the block that starts a script, all of the script. */
-export function switchOff(block: Blockly.BlockSvg, off: boolean): void {
-  const chosen = chosenWith(block);
-  step(() => {
-    for (const each of chosen) each.setDisabledReason(off, OFF);
-    if (chosen.length) return;
+export function setDisabled(block: Blockly.BlockSvg, off: boolean): void {
+  const selected = getSelectedBlocksWith(block);
+  withUndoGroup(() => {
+    for (const selectedBlock of selected) selectedBlock.setDisabledReason(off, DISABLED_REASON);
+    if (selected.length) return;
     const starts = !block.previousConnection && !block.outputConnection;
-    for (let each: Blockly.BlockSvg | null = block; each; each = starts ? each.getNextBlock() : null) {
-      each.setDisabledReason(off, OFF);
+    for (let current: Blockly.BlockSvg | null = block; current; current = starts ? current.getNextBlock() : null) {
+      current.setDisabledReason(off, DISABLED_REASON);
     }
   });
 }
 
-function step(change: () => void): void {
+function withUndoGroup(change: () => void): void {
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
   change();
   Blockly.Events.setGroup(group);
 }
 
-function deleteWords(block: Blockly.BlockSvg): string {
-  if (notesChosenWith(block).length) return t('Delete the selection');
-  const count = countIn(all(block));
+function deleteLabel(block: Blockly.BlockSvg): string {
+  if (getSelectedNotesWith(block).length) return t('Delete the selection');
+  const count = countBlocks(targetBlocks(block));
   return count === 1 ? Blockly.Msg['DELETE_BLOCK'] ?? '' :
     (Blockly.Msg['DELETE_X_BLOCKS'] ?? '').replace('%1', String(count));
 }
 
 /** The block of a menu, or all that are chosen with it. */
-function all(block: Blockly.BlockSvg): Blockly.BlockSvg[] {
-  const chosen = chosenWith(block);
-  return chosen.length ? chosen : [block];
+function targetBlocks(block: Blockly.BlockSvg): Blockly.BlockSvg[] {
+  const selected = getSelectedBlocksWith(block);
+  return selected.length ? selected : [block];
 }
 
 /** Where several blocks are chosen, only what is done to all of them. */
-const FOR_SEVERAL = new Set(['nepDuplicate', 'nepCopy', 'nepCut', 'nepPaste', 'nepCollapse', 'nepExpand', 'nepOff', 'nepOn', 'nepDelete', 'nepPack']);
+const MULTI_BLOCK_ITEMS = new Set(['nepDuplicate', 'nepCopy', 'nepCut', 'nepPaste', 'nepCollapse', 'nepExpand', 'nepOff', 'nepOn', 'nepDelete', 'nepPack']);
 
 /** Who adds an entry that is done to all chosen blocks says so. */
-export function forSeveral(id: string): void {
-  FOR_SEVERAL.add(id);
+export function enableForMultiSelection(id: string): void {
+  MULTI_BLOCK_ITEMS.add(id);
 }
 
-function remove(block: Blockly.BlockSvg): void {
+function deleteBlock(block: Blockly.BlockSvg): void {
   Blockly.getFocusManager().focusNode(block);
   block.checkAndDelete();
 }
 
 // ---- how a row looks
 
-function row(icon: string, words: string, keys: string): HTMLElement {
-  const made = document.createElement('div');
-  made.className = 'nepMenuRow';
+function createRow(icon: string, text: string, keys: string): HTMLElement {
+  const element = document.createElement('div');
+  element.className = 'nepMenuRow';
   const label = document.createElement('span');
-  label.textContent = words;
+  label.textContent = text;
   const picture = document.createElement('i');
   if (icon) picture.append(iconElement(icon, 18, 1.75));
-  made.append(picture, label);
+  element.append(picture, label);
   if (keys) {
     const hint = document.createElement('kbd');
     hint.textContent = keys;
-    made.append(hint);
+    element.append(hint);
   }
-  return made;
+  return element;
 }
 
 type Option = Blockly.ContextMenuRegistry.ContextMenuOption;
 
 /** No line at an end, and one where all between two is hidden. */
-function withoutSpareLines(options: Option[]): Option[] {
-  const first = options.findIndex((each) => !each.separator);
-  const ends = (at: number) => at + 1 === options.length || options[at + 1]?.separator === true;
-  return options.filter((each, at) => !each.separator || (at > first && !ends(at)));
+function withoutExtraSeparators(options: Option[]): Option[] {
+  const first = options.findIndex((option) => !option.separator);
+  const isBeforeSeparator = (index: number) => index + 1 === options.length || options[index + 1]?.separator === true;
+  return options.filter((option, index) => !option.separator || (index > first && !isBeforeSeparator(index)));
 }
 
-const registryOf = Blockly.ContextMenuRegistry.prototype;
-const optionsOf = registryOf.getContextMenuOptions;
-registryOf.getContextMenuOptions = function (scope, event) {
-  const several = allChosenWith(scope.block as Blockly.BlockSvg | undefined).length > 0;
-  const options = optionsOf.call(this, scope, event).filter((each) => each.separator || !several || FOR_SEVERAL.has(each.id));
-  for (const each of options) {
-    if (each.separator || typeof each.text !== 'string') continue;
-    const {associatedKeyboardShortcut: shortcut} = each;
-    each.text = row(icons.get(each.id) ?? '', each.text, shortcut ? keyWords(shortcut) : '');
+const registryPrototype = Blockly.ContextMenuRegistry.prototype;
+const originalGetContextMenuOptions = registryPrototype.getContextMenuOptions;
+registryPrototype.getContextMenuOptions = function (scope, event) {
+  const several = getSelectedItemsWith(scope.block as Blockly.BlockSvg | undefined).length > 0;
+  const options = originalGetContextMenuOptions.call(this, scope, event).filter((option) => option.separator || !several || MULTI_BLOCK_ITEMS.has(option.id));
+  for (const option of options) {
+    if (option.separator || typeof option.text !== 'string') continue;
+    const {associatedKeyboardShortcut: shortcut} = option;
+    option.text = createRow(icons.get(option.id) ?? '', option.text, shortcut ? formatShortcut(shortcut) : '');
   }
-  return withoutSpareLines(options);
+  return withoutExtraSeparators(options);
 };

@@ -1,11 +1,11 @@
 // Blocks whose gaps people make themselves: items of a list, branches of an "if", inputs of a function.
 import * as Blockly from 'blockly/core';
 import {FieldButton} from './fields';
-import {freePlace, inSight, obstacles} from './free_place';
+import {findFreePosition, visibleArea, obstacles} from './free_place';
 import {t} from './words';
 
-const MOST_ITEMS = 50;
-export const MOST_INPUTS = 12;
+const MAX_ITEMS = 50;
+export const MAX_INPUTS = 12;
 
 /** An input of a function: its id stays, its name changes. */
 export interface FunctionInput {
@@ -29,10 +29,10 @@ function reshape(block: Blockly.Block, change: () => void): void {
   if (!group) Blockly.Events.setGroup(false);
 }
 
-function buttons(block: Blockly.Block, input: Blockly.Input, take: string, add: string, change: (by: number) => void): void {
-  const button = (icon: string, words: string, by: number) =>
-    new FieldButton(icon, words, () => reshape(block, () => change(by)));
-  input.appendField(button('minus', take, -1), 'LESS');
+function appendButtons(block: Blockly.Block, input: Blockly.Input, remove: string, add: string, change: (by: number) => void): void {
+  const button = (icon: string, label: string, by: number) =>
+    new FieldButton(icon, label, () => reshape(block, () => change(by)));
+  input.appendField(button('minus', remove, -1), 'LESS');
   input.appendField(button('plus', add, 1), 'MORE');
 }
 
@@ -52,22 +52,22 @@ const ITEMS = {
     this.showItems(typeof count === 'number' && Number.isInteger(count) ? count : this.items);
   },
   showItems(this: ItemsBlock, count: number) {
-    const wanted = Math.min(Math.max(count, 0), MOST_ITEMS);
-    for (let number = this.items; number > wanted; number -= 1) this.removeInput(`ITEM${number - 1}`);
-    for (let number = this.items; number < wanted; number += 1) {
+    const targetCount = Math.min(Math.max(count, 0), MAX_ITEMS);
+    for (let number = this.items; number > targetCount; number -= 1) this.removeInput(`ITEM${number - 1}`);
+    for (let number = this.items; number < targetCount; number += 1) {
       const gap = this.appendValueInput(`ITEM${number}`);
       this.moveInputBefore('BUTTONS', null);
       if (!Blockly.Events.isEnabled()) continue;
       gap.connection?.setShadowState({type: 'values_text', fields: {TEXT: ''}});
     }
-    this.items = wanted;
+    this.items = targetCount;
   },
 };
 
-function startItems(this: ItemsBlock): void {
+function initItems(this: ItemsBlock): void {
   this.items = 0;
   const row = this.appendDummyInput('BUTTONS');
-  buttons(this, row, t('remove the last slot'), t('add a slot'), (by) => this.showItems(this.items + by));
+  appendButtons(this, row, t('remove the last slot'), t('add a slot'), (by) => this.showItems(this.items + by));
   const recording = Blockly.Events.isEnabled();
   if (recording) Blockly.Events.disable();
   this.showItems(3);
@@ -76,7 +76,7 @@ function startItems(this: ItemsBlock): void {
 
 // ---- the branches of an "if"
 
-const MOST_ELSE_IFS = 20;
+const MAX_ELSE_IFS = 20;
 
 interface BranchesBlock extends Blockly.Block {
   elseIfs: number;
@@ -96,21 +96,21 @@ const BRANCHES = {
       typeof state?.else === 'boolean' ? state.else : this.beginsWithElse);
   },
   showBranches(this: BranchesBlock, elseIfs: number, hasElse: boolean) {
-    const wanted = Math.min(Math.max(elseIfs, 0), MOST_ELSE_IFS);
-    for (let number = this.elseIfs; number > wanted; number -= 1) {
+    const targetCount = Math.min(Math.max(elseIfs, 0), MAX_ELSE_IFS);
+    for (let number = this.elseIfs; number > targetCount; number -= 1) {
       for (const name of ['CONDITION', 'LESS', 'BODY']) this.removeInput(`${name}${number}`);
     }
-    for (let number = this.elseIfs + 1; number <= wanted; number += 1) {
+    for (let number = this.elseIfs + 1; number <= targetCount; number += 1) {
       this.appendValueInput(`CONDITION${number}`).setCheck('Boolean').appendField(t('else if'));
-      this.appendDummyInput(`LESS${number}`).appendField(lessButton(this, number));
+      this.appendDummyInput(`LESS${number}`).appendField(createRemoveButton(this, number));
       this.appendStatementInput(`BODY${number}`);
       if (this.hasElse) for (const name of ['CONDITION', 'LESS', 'BODY']) this.moveInputBefore(`${name}${number}`, 'LESS_ELSE');
     }
-    this.elseIfs = wanted;
+    this.elseIfs = targetCount;
     if (hasElse === this.hasElse) return;
     this.hasElse = hasElse;
     if (hasElse) {
-      this.appendDummyInput('LESS_ELSE').appendField(t('else')).appendField(lessButton(this, 0));
+      this.appendDummyInput('LESS_ELSE').appendField(t('else')).appendField(createRemoveButton(this, 0));
       this.appendStatementInput('ELSE');
     } else {
       this.removeInput('LESS_ELSE');
@@ -119,19 +119,19 @@ const BRANCHES = {
   },
 };
 
-function lessButton(block: BranchesBlock, number: number): FieldButton {
+function createRemoveButton(block: BranchesBlock, number: number): FieldButton {
   return new FieldButton('minus', t('remove this branch'), () => removeBranch(block, number));
 }
 
-function startBranches(this: BranchesBlock): void {
+function initBranches(this: BranchesBlock): void {
   this.elseIfs = 0;
   this.hasElse = this.beginsWithElse = this.getInput('ELSE') !== null;
   this.appendDummyInput('MORE').appendField(new FieldButton('plus', t('add a branch'), () => addBranch(this)));
   this.moveInputBefore('MORE', 'BODY');
-  const row = this.inputList[this.inputList.findIndex((each) => each.name === 'ELSE') - 1];
+  const row = this.inputList[this.inputList.findIndex((input) => input.name === 'ELSE') - 1];
   if (!this.hasElse || !row) return;
   row.name = 'LESS_ELSE';
-  row.appendField(lessButton(this, 0));
+  row.appendField(createRemoveButton(this, 0));
 }
 
 /** First an "else", then an "else if" above it. */
@@ -142,38 +142,38 @@ export function addBranch(block: BranchesBlock, elseIf = block.hasElse): void {
 /** Takes the "else if" of that number away, 0: the "else". What was in it lies free. */
 function removeBranch(block: BranchesBlock, number: number): void {
   reshape(block, () => {
-    const inside = (name: string) => block.getInput(name)?.connection?.targetBlock() ?? null;
+    const childOf = (name: string) => block.getInput(name)?.connection?.targetBlock() ?? null;
     const freed: Blockly.Block[] = [];
     for (const name of number ? [`CONDITION${number}`, `BODY${number}`] : ['ELSE']) {
-      const held = inside(name);
-      held?.unplug(false);
-      if (held?.isShadow()) held.dispose(false);
-      else if (held) freed.push(held);
+      const child = childOf(name);
+      child?.unplug(false);
+      if (child?.isShadow()) child.dispose(false);
+      else if (child) freed.push(child);
     }
     // The branches below move up.
     for (let next = number + 1; number && next <= block.elseIfs; next += 1) {
       for (const name of ['CONDITION', 'BODY']) {
-        const moved = inside(`${name}${next}`);
-        const own = moved?.outputConnection ?? moved?.previousConnection;
+        const moved = childOf(`${name}${next}`);
+        const connection = moved?.outputConnection ?? moved?.previousConnection;
         moved?.unplug(false);
-        if (own) block.getInput(`${name}${next - 1}`)?.connection?.connect(own);
+        if (connection) block.getInput(`${name}${next - 1}`)?.connection?.connect(connection);
       }
     }
     block.showBranches(block.elseIfs - (number ? 1 : 0), block.hasElse && number > 0);
-    if (block instanceof Blockly.BlockSvg) for (const each of freed) layBeside(each as Blockly.BlockSvg, block);
+    if (block instanceof Blockly.BlockSvg) for (const freedBlock of freed) moveBeside(freedBlock as Blockly.BlockSvg, block);
   });
 }
 
 /** Where it can be seen and covers nothing. */
-function layBeside(freed: Blockly.BlockSvg, block: Blockly.BlockSvg): void {
+function moveBeside(freed: Blockly.BlockSvg, block: Blockly.BlockSvg): void {
   const {workspace} = block;
   Blockly.renderManagement.triggerQueuedRenders(workspace);
   const {right} = block.getRootBlock().getBoundingRectangle();
   const {width, height} = freed.getHeightWidth();
-  const wanted = new Blockly.utils.Coordinate(right, freed.getRelativeToSurfaceXY().y);
-  const place = freePlace(wanted, {width, height}, obstacles(workspace, new Set([freed])), inSight(workspace));
+  const requested = new Blockly.utils.Coordinate(right, freed.getRelativeToSurfaceXY().y);
+  const position = findFreePosition(requested, {width, height}, obstacles(workspace, new Set([freed])), visibleArea(workspace));
   const {x, y} = freed.getRelativeToSurfaceXY();
-  freed.moveBy(place.x - x, place.y - y);
+  freed.moveBy(position.x - x, position.y - y);
 }
 
 /** An "if" that has branches; null: it is another block. */
@@ -198,17 +198,17 @@ export interface DefinitionBlock extends Blockly.Block {
 }
 
 export function readInputs(saved: unknown): FunctionInput[] {
-  const found = new Map<string, FunctionInput>();
-  for (const each of Array.isArray(saved) ? saved : []) {
-    const {id, name} = (each ?? {}) as Partial<FunctionInput>;
-    if (typeof id === 'string' && id && !found.has(id)) found.set(id, {id, name: String(name || 'input').slice(0, 60)});
+  const inputsById = new Map<string, FunctionInput>();
+  for (const entry of Array.isArray(saved) ? saved : []) {
+    const {id, name} = (entry ?? {}) as Partial<FunctionInput>;
+    if (typeof id === 'string' && id && !inputsById.has(id)) inputsById.set(id, {id, name: String(name || 'input').slice(0, 60)});
   }
-  return [...found.values()].slice(0, MOST_INPUTS);
+  return [...inputsById.values()].slice(0, MAX_INPUTS);
 }
 
 /** A name that no other has: "input", "input 2". */
-export function freshName(stem: string, taken: Iterable<string>): string {
-  const all = new Set(taken);
+export function freshName(stem: string, usedNames: Iterable<string>): string {
+  const all = new Set(usedNames);
   let name = stem;
   for (let number = 2; all.has(name); number += 1) name = `${stem} ${number}`;
   return name;
@@ -216,7 +216,7 @@ export function freshName(stem: string, taken: Iterable<string>): string {
 
 const FUNCTION = {
   saveExtraState(this: DefinitionBlock) {
-    return this.own.length ? {inputs: this.own.map((each) => ({...each}))} : null;
+    return this.own.length ? {inputs: this.own.map((input) => ({...input}))} : null;
   },
   loadExtraState(this: DefinitionBlock, state: {inputs?: unknown} | null) {
     this.showInputs(readInputs(state?.inputs));
@@ -225,19 +225,19 @@ const FUNCTION = {
     const row = this.getInput('INPUTS');
     if (!row) return;
     for (const field of [...row.fieldRow]) if (/^(WITH|INPUT\d+|LESS|MORE)$/.test(field.name ?? '')) row.removeField(field.name!);
-    this.own = inputs.map((each) => ({...each}));
+    this.own = inputs.map((input) => ({...input}));
     if (inputs.length) row.appendField(t('with'), 'WITH');
-    this.own.forEach((each, number) => row.appendField(nameField(this, each), `INPUT${number}`));
-    buttons(this, row, t('remove the last input'), t('add an input'), (by) => shapeInputs(this, by, this.own.length - 1));
+    this.own.forEach((input, number) => row.appendField(nameField(this, input), `INPUT${number}`));
+    appendButtons(this, row, t('remove the last input'), t('add an input'), (by) => shapeInputs(this, by, this.own.length - 1));
   },
 };
 
 function nameField(block: DefinitionBlock, input: FunctionInput): Blockly.Field {
-  const field = new FieldInputName(input.name, (words: string) => {
-    const name = words.replace(/\s+/g, ' ').trim().slice(0, 60);
+  const field = new FieldInputName(input.name, (text: string) => {
+    const name = text.replace(/\s+/g, ' ').trim().slice(0, 60);
     if (!name) return null;
-    const own = block.own.find((each) => each.id === input.id);
-    if (own) own.name = name;
+    const ownInput = block.own.find((candidate) => candidate.id === input.id);
+    if (ownInput) ownInput.name = name;
     return name;
   });
   field.setTooltip(t('input name'));
@@ -245,30 +245,30 @@ function nameField(block: DefinitionBlock, input: FunctionInput): Blockly.Field 
 }
 
 /** One input more, or without the one at this place, as one step that can be undone. */
-export function changeInputs(block: DefinitionBlock, by: number, place: number): void {
-  reshape(block, () => shapeInputs(block, by, place));
+export function changeInputs(block: DefinitionBlock, by: number, index: number): void {
+  reshape(block, () => shapeInputs(block, by, index));
 }
 
-function shapeInputs(block: DefinitionBlock, by: number, place: number): void {
+function shapeInputs(block: DefinitionBlock, by: number, index: number): void {
   if (by < 0) {
-    block.showInputs(block.own.filter((_each, number) => number !== place));
-  } else if (block.own.length < MOST_INPUTS) {
-    const name = freshName(t('input'), block.own.map((each) => each.name));
+    block.showInputs(block.own.filter((_each, number) => number !== index));
+  } else if (block.own.length < MAX_INPUTS) {
+    const name = freshName(t('input'), block.own.map((input) => input.name));
     block.showInputs([...block.own, {id: Blockly.utils.idGenerator.genUid(), name}]);
   }
 }
 
-function startFunction(this: DefinitionBlock): void {
+function initFunction(this: DefinitionBlock): void {
   this.showInputs([]);
-  this.getField('NAME')?.setValidator((words: string) => {
-    const name = words.replace(/\s+/g, ' ').trim().slice(0, 60);
-    return name ? freshName(name, others(this)) : null;
+  this.getField('NAME')?.setValidator((text: string) => {
+    const name = text.replace(/\s+/g, ' ').trim().slice(0, 60);
+    return name ? freshName(name, otherFunctionNames(this)) : null;
   });
 }
 
-function others(block: Blockly.Block): string[] {
+function otherFunctionNames(block: Blockly.Block): string[] {
   if (block.isInFlyout) return [];
-  return definitionsOf(block.workspace).filter((each) => each.id !== block.id).map(functionName);
+  return definitionsOf(block.workspace).filter((definition) => definition.id !== block.id).map(functionName);
 }
 
 export function definitionsOf(workspace: Blockly.Workspace): DefinitionBlock[] {
@@ -290,7 +290,7 @@ export interface CallBlock extends Blockly.Block {
 
 const CALL = {
   saveExtraState(this: CallBlock) {
-    return {function: this.target, name: this.called, inputs: this.own.map((each) => ({...each}))};
+    return {function: this.target, name: this.called, inputs: this.own.map((input) => ({...input}))};
   },
   loadExtraState(this: CallBlock, state: {function?: unknown; name?: unknown; inputs?: unknown} | null) {
     const target = typeof state?.function === 'string' ? state.function : '';
@@ -300,20 +300,20 @@ const CALL = {
     this.target = target;
     this.called = name;
     this.setFieldValue(name, 'NAME');
-    for (const each of this.own) {
-      if (!inputs.some((other) => other.id === each.id)) this.removeInput(`IN_${each.id}`);
+    for (const input of this.own) {
+      if (!inputs.some((other) => other.id === input.id)) this.removeInput(`IN_${input.id}`);
     }
-    for (const each of inputs) {
-      const gap = this.getInput(`IN_${each.id}`);
-      if (gap) gap.fieldRow[0]?.setValue(each.name);
-      else this.appendValueInput(`IN_${each.id}`).appendField(new Blockly.FieldLabel(each.name));
-      this.moveInputBefore(`IN_${each.id}`, null);
+    for (const input of inputs) {
+      const gap = this.getInput(`IN_${input.id}`);
+      if (gap) gap.fieldRow[0]?.setValue(input.name);
+      else this.appendValueInput(`IN_${input.id}`).appendField(new Blockly.FieldLabel(input.name));
+      this.moveInputBefore(`IN_${input.id}`, null);
     }
-    this.own = inputs.map((each) => ({...each}));
+    this.own = inputs.map((input) => ({...input}));
   },
 };
 
-function startCall(this: CallBlock): void {
+function initCall(this: CallBlock): void {
   this.own = [];
   this.target = '';
   this.called = 'function';
@@ -330,7 +330,7 @@ export function updateCall(call: CallBlock, definition: DefinitionBlock): void {
 // ---- an input inside its function
 
 /** The function whose blocks hold this one. */
-function holderOf(block: Blockly.Block): DefinitionBlock | null {
+function enclosingDefinition(block: Blockly.Block): DefinitionBlock | null {
   const root = block.getRootBlock();
   return DEFINITIONS.includes(root.type) ? root as DefinitionBlock : null;
 }
@@ -342,9 +342,9 @@ export class FieldFunctionInput extends Blockly.FieldLabelSerializable {
     const id = String(this.value_ ?? '');
     if (!block) return id;
     const main = (block.workspace as Blockly.WorkspaceSvg).targetWorkspace ?? block.workspace;
-    const holder = holderOf(block);
-    const all = [...(holder ? [holder] : []), ...definitionsOf(main)].flatMap((each) => each.own ?? []);
-    return all.find((each) => each.id === id)?.name ?? 'input';
+    const enclosing = enclosingDefinition(block);
+    const all = [...(enclosing ? [enclosing] : []), ...definitionsOf(main)].flatMap((definition) => definition.own ?? []);
+    return all.find((input) => input.id === id)?.name ?? 'input';
   }
 
   static override fromJson(_config: Blockly.FieldConfig): FieldFunctionInput {
@@ -353,7 +353,7 @@ export class FieldFunctionInput extends Blockly.FieldLabelSerializable {
 }
 
 Blockly.fieldRegistry.register('field_function_input', FieldFunctionInput);
-Blockly.Extensions.registerMutator('nep_items', ITEMS, startItems);
-Blockly.Extensions.registerMutator('nep_branches', BRANCHES, startBranches);
-Blockly.Extensions.registerMutator('nep_function', FUNCTION, startFunction);
-Blockly.Extensions.registerMutator('nep_call', CALL, startCall);
+Blockly.Extensions.registerMutator('nep_items', ITEMS, initItems);
+Blockly.Extensions.registerMutator('nep_branches', BRANCHES, initBranches);
+Blockly.Extensions.registerMutator('nep_function', FUNCTION, initFunction);
+Blockly.Extensions.registerMutator('nep_call', CALL, initCall);

@@ -19,44 +19,44 @@ export class NamelessVariables {
     const variables = this.workspace.getVariableMap();
     const waiting = tops.filter(isState);
     for (let state = waiting.pop(); state; state = waiting.pop()) {
-      for (const id of unnamed(state)) {
+      for (const id of unnamedVariableIds(state)) {
         if (variables.getVariableById(id)) continue;
         const name = this.freeName(t('unnamed variable'));
         this.placeholders.set(id, name);
         variables.createVariable(name, '', id);
       }
-      for (const each of [...Object.values(state.inputs ?? {}), state.next]) {
-        waiting.push(...[each?.block, each?.shadow].filter(isState));
+      for (const connectionState of [...Object.values(state.inputs ?? {}), state.next]) {
+        waiting.push(...[connectionState?.block, connectionState?.shadow].filter(isState));
       }
     }
   }
 
   private freeName(words: string): string {
-    const taken = this.workspace.getVariableMap().getAllVariables().map((each) => each.getName());
+    const usedNames = this.workspace.getVariableMap().getAllVariables().map((variable) => variable.getName());
     let name = words;
-    for (let number = 2; taken.includes(name); number++) name = `${words} ${number}`;
+    for (let number = 2; usedNames.includes(name); number++) name = `${words} ${number}`;
     return name;
   }
 
   /** What is saved, without variables that nobody has named. */
-  withoutThem(state: Json): Json {
+  omitPlaceholders(state: Json): Json {
     const {variables, ...others} = state;
     if (!this.placeholders.size || !Array.isArray(variables)) return state;
-    const named = (variables as Blockly.IVariableState[]).filter(({id, name}) => this.placeholders.get(id ?? '') !== name);
-    return named.length ? {...others, variables: named} : others;
+    const namedVariables = (variables as Blockly.IVariableState[]).filter(({id, name}) => this.placeholders.get(id ?? '') !== name);
+    return namedVariables.length ? {...others, variables: namedVariables} : others;
   }
 }
 
 /** The ids in a block's variable fields that stand there without a name. */
-function unnamed(state: BlockState): string[] {
+function unnamedVariableIds(state: BlockState): string[] {
   const definition = definitionOf(state.type);
-  const names = definition ? argsOf(definition).filter((each) => each.type === 'field_variable').map((each) => each.name ?? '') : [];
+  const names = definition ? argsOf(definition).filter((arg) => arg.type === 'field_variable').map((arg) => arg.name ?? '') : [];
   return names.flatMap((name) => {
-    const {id, name: said} = (state.fields?.[name] ?? {}) as {id?: unknown; name?: unknown};
-    return typeof id === 'string' && id && typeof said !== 'string' ? [id] : [];
+    const {id, name: savedName} = (state.fields?.[name] ?? {}) as {id?: unknown; name?: unknown};
+    return typeof id === 'string' && id && typeof savedName !== 'string' ? [id] : [];
   });
 }
 
-function isState(each: unknown): each is BlockState {
-  return typeof each === 'object' && each !== null;
+function isState(value: unknown): value is BlockState {
+  return typeof value === 'object' && value !== null;
 }

@@ -29,49 +29,49 @@ interface Strategy {
  * The preview of a gap on the way pushes apart what lies below it. A fast hand is past it before that can be seen, and
  * what it let go would join the block above the one it was let go at.
  */
-const places = new WeakMap<Strategy, Map<Blockly.RenderedConnection, Point>>();
+const connectionPositions = new WeakMap<Strategy, Map<Blockly.RenderedConnection, Point>>();
 
-function placesFor(strategy: Strategy): Map<Blockly.RenderedConnection, Point> {
-  const known = places.get(strategy);
-  if (known) return known;
+function getConnectionPositions(strategy: Strategy): Map<Blockly.RenderedConnection, Point> {
+  const cached = connectionPositions.get(strategy);
+  if (cached) return cached;
   // What the block was taken out of closes up first.
   Blockly.renderManagement.triggerQueuedRenders(strategy.workspace);
-  const found = new Map<Blockly.RenderedConnection, Point>();
+  const positions = new Map<Blockly.RenderedConnection, Point>();
   for (const {neighbour} of strategy.allConnectionPairs) {
-    if (!found.has(neighbour)) found.set(neighbour, new Blockly.utils.Coordinate(neighbour.x, neighbour.y));
+    if (!positions.has(neighbour)) positions.set(neighbour, new Blockly.utils.Coordinate(neighbour.x, neighbour.y));
   }
-  places.set(strategy, found);
-  return found;
+  connectionPositions.set(strategy, positions);
+  return positions;
 }
 
-function distance({local, neighbour}: Pair, delta: Point, at: Map<Blockly.RenderedConnection, Point>): number {
-  const place = at.get(neighbour) ?? neighbour;
-  return Math.hypot(local.x + delta.x - place.x, local.y + delta.y - place.y);
+function distance({local, neighbour}: Pair, delta: Point, positions: Map<Blockly.RenderedConnection, Point>): number {
+  const position = positions.get(neighbour) ?? neighbour;
+  return Math.hypot(local.x + delta.x - position.x, local.y + delta.y - position.y);
 }
 
 const strategy = Blockly.dragging.BlockDragStrategy.prototype as unknown as Strategy;
 
-const cache = strategy.cacheAllConnectionPairs;
+const baseCacheAllConnectionPairs = strategy.cacheAllConnectionPairs;
 strategy.cacheAllConnectionPairs = function () {
-  places.delete(this);
-  cache.call(this);
+  connectionPositions.delete(this);
+  baseCacheAllConnectionPairs.call(this);
 };
 
-const closest = strategy.getClosestCandidate;
+const baseGetClosestCandidate = strategy.getClosestCandidate;
 strategy.getClosestCandidate = function (block, delta) {
   const radius = this.getSearchRadius();
-  if (radius === Infinity) return closest.call(this, block, delta);  // the keys go from gap to gap
-  const at = placesFor(this);
+  if (radius === Infinity) return baseGetClosestCandidate.call(this, block, delta);  // the keys go from gap to gap
+  const positions = getConnectionPositions(this);
   let best: Candidate | null = null;
   for (const pair of this.allConnectionPairs) {
-    const far = distance(pair, delta, at);
-    if (far > radius || (best && far >= best.distance) || pair.neighbour.getSourceBlock().isDeadOrDying()) continue;
-    best = {...pair, distance: far};
+    const candidateDistance = distance(pair, delta, positions);
+    if (candidateDistance > radius || (best && candidateDistance >= best.distance) || pair.neighbour.getSourceBlock().isDeadOrDying()) continue;
+    best = {...pair, distance: candidateDistance};
   }
   return best;
 };
 
 strategy.currCandidateIsBetter = function (current, delta, other) {
   if (this.getSearchRadius() === Infinity) return false;
-  return other.distance > distance(current, delta, placesFor(this)) - Blockly.config.currentConnectionPreference;
+  return other.distance > distance(current, delta, getConnectionPositions(this)) - Blockly.config.currentConnectionPreference;
 };

@@ -1,38 +1,38 @@
 // Notes: sheets of text beside a block, or anywhere on the canvas. They are Blockly's comments and are saved as such;
 // here they get our look, take the keys when they are made, and keep what is typed.
 import * as Blockly from 'blockly/core';
-import {seenInPlaceOf} from './folding';
-import {freePlace, inSight, obstacles} from './free_place';
+import {visibleBlockOf} from './folding';
+import {findFreePosition, visibleArea, obstacles} from './free_place';
 import {drawIcon} from './icons';
 import {t} from './words';
 
 const {Coordinate, Rect, Size} = Blockly.utils;
-const SVG = 'http://www.w3.org/2000/svg';
-const SIGN = 20;
-const HEAD = 26;
-const BORDER = 6;
-const FROM_BLOCK = 26;
+const SVG_NS = 'http://www.w3.org/2000/svg';
+const ICON_SIZE = 20;
+const HEADER_HEIGHT = 26;
+const BORDER_WIDTH = 6;
+const BLOCK_DISTANCE = 26;
 const GAP = 12;
 /** From a new note to the edge of what can be seen, beside a scrollbar. */
-const IN_SIGHT = 24;
-const FIRST_SIZE = [230, 128] as const;
-const TYPED_MS = 200;
-const FONT = 14;
+const VIEW_MARGIN = 24;
+const DEFAULT_SIZE = [230, 128] as const;
+const TYPING_DEBOUNCE_MS = 200;
+const FONT_SIZE = 14;
 /** On the screen no letter is smaller, however far away the canvas is; up to a size that still fits into a sheet. */
-const SMALLEST = 12;
-const LARGEST = 30;
+const MIN_FONT_SIZE = 12;
+const MAX_FONT_SIZE = 30;
 
 // ---- what is typed
 
 /** Where something was typed that Blockly does not know yet: it asks only when the field is left. */
-const typed = new Set<HTMLTextAreaElement>();
-let telling = 0;
+const dirtyTextAreas = new Set<HTMLTextAreaElement>();
+let flushTimer = 0;
 
 /** Tells Blockly what was typed so far; before anything is saved, and when the person rests. */
-export function keepTyped(): void {
-  window.clearTimeout(telling);
-  for (const area of [...typed]) {
-    typed.delete(area);
+export function flushTypedText(): void {
+  window.clearTimeout(flushTimer);
+  for (const area of [...dirtyTextAreas]) {
+    dirtyTextAreas.delete(area);
     area.dispatchEvent(new Event('change'));
   }
 }
@@ -40,9 +40,9 @@ export function keepTyped(): void {
 document.addEventListener('input', (event) => {
   const area = event.target;
   if (!(area instanceof HTMLTextAreaElement) || !area.classList.contains('blocklyCommentText')) return;
-  typed.add(area);
-  window.clearTimeout(telling);
-  telling = window.setTimeout(keepTyped, TYPED_MS);
+  dirtyTextAreas.add(area);
+  window.clearTimeout(flushTimer);
+  flushTimer = window.setTimeout(flushTypedText, TYPING_DEBOUNCE_MS);
 }, true);
 
 /** Esc leaves the words of a note on the canvas for the note. Blockly forgets to make it ready for the keys. */
@@ -53,29 +53,29 @@ document.addEventListener('keydown', (event) => {
   const comment = note && workspace.getCommentById(note.dataset['id'] ?? '');
   if (!(comment instanceof Blockly.comments.RenderedWorkspaceComment)) return;
   event.stopPropagation();
-  keepTyped();
+  flushTypedText();
   Blockly.getFocusManager().focusNode(comment);
 }, true);
 
 // ---- the sheet of a block
 
-class Sheet extends Blockly.bubbles.TextInputBubble {
+class NoteBubble extends Blockly.bubbles.TextInputBubble {
   private buttons: SVGGElement[] | undefined;
   /** Before the person took it into the hand. */
   private before: Shape | null = null;
 
   /** A head to take it by, with its buttons; made before the first size is set, which the parent does. */
-  addHead(buttons: [icon: string, words: string, run: () => void][]): void {
+  addHeader(buttons: [icon: string, words: string, run: () => void][]): void {
     this.svgRoot.classList.add('nepNote');
     this.buttons = buttons.map(([icon, words, run]) => {
-      const button = element('g', 'nepNoteButton');
+      const button = createSvgElement('g', 'nepNoteButton');
       button.setAttribute('role', 'button');
       button.setAttribute('aria-label', words);
-      const title = element('title', '');
+      const title = createSvgElement('title', '');
       title.textContent = words;
-      const ground = element('rect', '');
+      const ground = createSvgElement('rect', '');
       for (const [name, value] of [['width', 22], ['height', 22], ['rx', 5]] as const) ground.setAttribute(name, `${value}`);
-      const picture = element('g', '');
+      const picture = createSvgElement('g', '');
       picture.setAttribute('transform', 'translate(4, 4)');
       drawIcon(picture, icon, 14);
       button.append(title, ground, picture);
@@ -87,12 +87,12 @@ class Sheet extends Blockly.bubbles.TextInputBubble {
     this.setSize(this.getSize());
   }
 
-  set isSeen(seen: boolean) {
-    this.svgRoot.style.display = seen ? '' : 'none';
+  set isSeen(visible: boolean) {
+    this.svgRoot.style.display = visible ? '' : 'none';
   }
 
-  private get sign(): NoteSign {
-    return this.getOwner() as NoteSign;
+  private get sign(): NoteIcon {
+    return this.getOwner() as NoteIcon;
   }
 
   override startDrag(): Blockly.IBubble {
@@ -102,42 +102,42 @@ class Sheet extends Blockly.bubbles.TextInputBubble {
 
   override endDrag(): void {
     super.endDrag();
-    this.tell();
+    this.fireChange();
   }
 
   /** The corner is in the hand until the button is let go, wherever that is. */
-  watchCorner(): void {
+  listenForResize(): void {
     this.svgRoot.querySelector('.blocklyResizeHandle')?.addEventListener('pointerdown', () => {
       this.before = this.sign.shape;
       const end = new AbortController();
       for (const name of ['pointerup', 'pointercancel']) {
         window.addEventListener(name, () => {
           end.abort();
-          this.tell();
+          this.fireChange();
         }, {signal: end.signal});
       }
     });
   }
 
-  private tell(): void {
-    if (this.before && !this.disposed) this.sign.tellChange(this.before);
+  private fireChange(): void {
+    if (this.before && !this.disposed) this.sign.fireNoteChange(this.before);
     this.before = null;
   }
 
   protected override onKeyDown(event: KeyboardEvent): void {
     const before = this.sign.shape;
     super.onKeyDown(event);
-    this.sign.tellChange(before);
+    this.sign.fireNoteChange(before);
   }
 
   override setSize(size: Blockly.utils.Size, relayout = false): void {
     super.setSize(size, relayout);
     const {width, height} = this.getSize();
     const text = this.getEditor().getDom();
-    text.setAttribute('y', `${HEAD}`);
-    text.setAttribute('height', `${Math.max(10, height - HEAD - BORDER)}`);
-    this.buttons?.forEach((button, at) =>
-      button.setAttribute('transform', `translate(${width - 26 - 24 * at}, 3)`));
+    text.setAttribute('y', `${HEADER_HEIGHT}`);
+    text.setAttribute('height', `${Math.max(10, height - HEADER_HEIGHT - BORDER_WIDTH)}`);
+    this.buttons?.forEach((button, index) =>
+      button.setAttribute('transform', `translate(${width - 26 - 24 * index}, 3)`));
   }
 }
 
@@ -165,71 +165,71 @@ class NoteChange extends Blockly.Events.BlockBase {
   override run(forward: boolean): void {
     const block = this.getEventWorkspace_().getBlockById(this.blockId ?? '') ?? this.block;
     const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
-    if (!(sign instanceof NoteSign)) return;
+    if (!(sign instanceof NoteIcon)) return;
     // A sign that was made just now takes its sheet along when it comes to its place.
     Blockly.renderManagement.triggerQueuedRenders(block.workspace as Blockly.WorkspaceSvg);
     const before = sign.shape;
     sign.shape = forward ? this.to : this.from;
-    sign.tellChange(before);  // undo itself is told to nobody, what it does is
+    sign.fireNoteChange(before);  // undo itself is told to nobody, what it does is
   }
 }
 
 /** Blockly's own names of where the sheet is, and of what draws from it to the block. */
-interface Drawn {
+interface BubbleInternals {
   tail: SVGPathElement;
   renderTail(): void;
 }
 
 /** A thin line between block and sheet, in the place of a wedge over the block's words. */
-(Sheet.prototype as unknown as Drawn).renderTail = function (this: Drawn) {
-  const sheet = this as unknown as Sheet;
-  const block = (sheet.getOwner() as NoteSign | undefined)?.getSourceBlock();
+(NoteBubble.prototype as unknown as BubbleInternals).renderTail = function (this: BubbleInternals) {
+  const sheet = this as unknown as NoteBubble;
+  const block = (sheet.getOwner() as NoteIcon | undefined)?.getSourceBlock();
   if (!(block instanceof Blockly.BlockSvg)) return;
   this.tail.dataset['of'] = block.id;
-  const at = sheet.getRelativeToSurfaceXY();
+  const position = sheet.getRelativeToSurfaceXY();
   const {left, right, top} = block.getBoundingRectangleWithoutChildren();
-  const middle = top + HEAD / 2 - at.y;
+  const middle = top + HEADER_HEIGHT / 2 - position.y;
   const {width} = sheet.getSize();
-  const isRight = at.x >= right;
-  const from = isRight ? right - at.x : at.x + width <= left ? left - at.x : (left + right) / 2 - at.x;
-  const to = isRight ? 0 : at.x + width <= left ? width : width / 2;
-  this.tail.setAttribute('d', `M${from},${middle}L${to},${HEAD / 2}`);
+  const isRight = position.x >= right;
+  const from = isRight ? right - position.x : position.x + width <= left ? left - position.x : (left + right) / 2 - position.x;
+  const to = isRight ? 0 : position.x + width <= left ? width : width / 2;
+  this.tail.setAttribute('d', `M${from},${middle}L${to},${HEADER_HEIGHT / 2}`);
 };
 
 /** The id of the block whose note this sheet is. */
-export function ownerOf(sheet: Element): string {
+export function blockIdOf(sheet: Element): string {
   return sheet.querySelector<SVGElement>('[data-of]')?.dataset['of'] ?? '';
 }
 
-function element(name: string, kind: string): SVGElement {
-  const made = document.createElementNS(SVG, name);
-  if (kind) made.setAttribute('class', kind);
-  return made;
+function createSvgElement(name: string, kind: string): SVGElement {
+  const node = document.createElementNS(SVG_NS, name);
+  if (kind) node.setAttribute('class', kind);
+  return node;
 }
 
 /** The sign on a block that has a note: shows and hides it. */
-class NoteSign extends Blockly.icons.CommentIcon {
+class NoteIcon extends Blockly.icons.CommentIcon {
   private wasHidden = false;
 
   constructor(block: Blockly.Block) {
     super(block);
-    this.setBubbleSize(new Size(...FIRST_SIZE));
+    this.setBubbleSize(new Size(...DEFAULT_SIZE));
   }
 
   override initView(pressed: (event: PointerEvent) => void): void {
     if (this.svgRoot) return;
     super.initView(pressed);
-    const ground = element('rect', '');
-    for (const [name, value] of [['width', SIGN], ['height', SIGN], ['rx', 5]] as const) ground.setAttribute(name, `${value}`);
-    const picture = element('g', '');
+    const ground = createSvgElement('rect', '');
+    for (const [name, value] of [['width', ICON_SIZE], ['height', ICON_SIZE], ['rx', 5]] as const) ground.setAttribute(name, `${value}`);
+    const picture = createSvgElement('g', '');
     picture.setAttribute('transform', 'translate(3, 3)');
-    drawIcon(picture, 'sticky-note', SIGN - 6);
+    drawIcon(picture, 'sticky-note', ICON_SIZE - 6);
     this.svgRoot!.replaceChildren(ground, picture);
     this.svgRoot!.classList.add('nepNoteSign');
   }
 
   override getSize(): Blockly.utils.Size {
-    return new Size(SIGN, SIGN);
+    return new Size(ICON_SIZE, ICON_SIZE);
   }
 
   /** A folded block still has its own note. */
@@ -240,13 +240,13 @@ class NoteSign extends Blockly.icons.CommentIcon {
   override updateCollapsed(): void {}
 
   /** Its sheet is seen, or not, as its block is. */
-  set isSeen(seen: boolean) {
+  set isSeen(visible: boolean) {
     const sheet = this.getBubble();
-    if (sheet instanceof Sheet) sheet.isSeen = seen;
+    if (sheet instanceof NoteBubble) sheet.isSeen = visible;
   }
 
   override async setBubbleVisible(visible: boolean): Promise<void> {
-    keepTyped();
+    flushTypedText();
     // A block that is folded up closes all sheets inside it: they are only not seen until it is unfolded.
     if (!visible && this.getBubble() && this.isHidden()) return;
     await super.setBubbleVisible(visible);
@@ -254,29 +254,29 @@ class NoteSign extends Blockly.icons.CommentIcon {
 
   private isHidden(): boolean {
     const block = this.sourceBlock;
-    return block instanceof Blockly.BlockSvg && !block.isDeadOrDying() && seenInPlaceOf(block) !== block;
+    return block instanceof Blockly.BlockSvg && !block.isDeadOrDying() && visibleBlockOf(block) !== block;
   }
 
   /** What is folded up has no place of its own: the sheet stays where it was until its block has one again. */
   override onLocationChange(corner: Blockly.utils.Coordinate): void {
-    const kept = this.getBubbleLocation();
+    const previousLocation = this.getBubbleLocation();
     const unfolded = this.wasHidden && !this.isHidden();
     this.wasHidden = this.isHidden();
     super.onLocationChange(corner);
-    if (unfolded && kept) this.setBubbleLocation(kept);
+    if (unfolded && previousLocation) this.setBubbleLocation(previousLocation);
   }
 
   override onClick(): void {
     const before = this.shape;
     super.onClick();
-    this.tellChange(before);
+    this.fireNoteChange(before);
   }
 
   get shape(): Shape {
     const {width, height} = this.getBubbleSize();
-    const at = this.getBubbleLocation();
+    const location = this.getBubbleLocation();
     const corner = (this.sourceBlock as Blockly.BlockSvg).getRelativeToSurfaceXY();
-    return {open: this.bubbleIsVisible(), width, height, at: at ? {x: at.x - corner.x, y: at.y - corner.y} : null};
+    return {open: this.bubbleIsVisible(), width, height, at: location ? {x: location.x - corner.x, y: location.y - corner.y} : null};
   }
 
   set shape({open, width, height, at}: Shape) {
@@ -287,65 +287,65 @@ class NoteSign extends Blockly.icons.CommentIcon {
   }
 
   /** The file is another one now, and undo brings back how the sheet was. */
-  tellChange(before: Shape, now = this.shape): void {
+  fireNoteChange(before: Shape, now = this.shape): void {
     // A sheet that was never open has found its place: that alone is nothing to undo.
     Blockly.Events.fire(new NoteChange(this.sourceBlock, before.at ? before : {...before, at: now.at}, now));
   }
 
   protected override createBubble(): void {
     const block = this.sourceBlock as Blockly.BlockSvg;
-    const anchor = Coordinate.sum(this.workspaceLocation, new Coordinate(SIGN / 2, SIGN / 2));
-    const sheet = new Sheet(block.workspace, anchor, block.getBoundingRectangleWithoutChildren(), this);
-    (this as unknown as {textInputBubble: Sheet}).textInputBubble = sheet;
+    const anchor = Coordinate.sum(this.workspaceLocation, new Coordinate(ICON_SIZE / 2, ICON_SIZE / 2));
+    const sheet = new NoteBubble(block.workspace, anchor, block.getBoundingRectangleWithoutChildren(), this);
+    (this as unknown as {textInputBubble: NoteBubble}).textInputBubble = sheet;
     sheet.getEditor().setParent(block);
     sheet.setText(this.getText());
     sheet.setSize(this.getBubbleSize(), true);
-    sheet.addHead([
+    sheet.addHeader([
       ['x', t('Hide the note'), () => this.onClick()],
       ['trash-2', t('Remove the note'), () => removeNote(block)],
     ]);
-    sheet.moveDuringDrag(this.getBubbleLocation() ?? placeOf(sheet, block));
+    sheet.moveDuringDrag(this.getBubbleLocation() ?? getInitialLocation(sheet, block));
     this.setBubbleLocation(sheet.getRelativeToSurfaceXY());
     // The first two listeners of Blockly's own kind are added by the parent.
     sheet.addLocationChangeListener(() => this.onBubbleLocationChange());
     sheet.setAriaLabelProvider(() => t('Note: {text}', {text: this.getText()}));
-    this.watchKeys(sheet, block);
-    sheet.watchCorner();
-    sheet.isSeen = seenInPlaceOf(block) === block;
+    this.addKeyListeners(sheet, block);
+    sheet.listenForResize();
+    sheet.isSeen = visibleBlockOf(block) === block;
   }
 
-  private watchKeys(sheet: Sheet, block: Blockly.BlockSvg): void {
+  private addKeyListeners(sheet: NoteBubble, block: Blockly.BlockSvg): void {
     const text = sheet.getEditor().getDom();
     text.addEventListener('keydown', (event) => {
       if (event.key !== 'Escape') return;
       event.stopPropagation();
-      keepTyped();
+      flushTypedText();
       Blockly.getFocusManager().focusNode(block);
     }, true);
     // A note in which nothing was written would not be saved: it goes when it is left.
     text.addEventListener('focusout', () => window.setTimeout(() => {
-      keepTyped();
+      flushTypedText();
       if (!text.contains(document.activeElement) && !block.isDeadOrDying() && this.getText() === '') removeNote(block);
     }));
   }
 }
 
 /** Beside the block: on no other block of its stack, on no other stack, in sight. */
-function placeOf(sheet: Sheet, block: Blockly.BlockSvg): Blockly.utils.Coordinate {
+function getInitialLocation(sheet: NoteBubble, block: Blockly.BlockSvg): Blockly.utils.Coordinate {
   const {workspace} = block;
   const root = block.getRootBlock();
-  const rows = root.getDescendants(false).filter((each) => !each.outputConnection)
-    .map((each) => each.getBoundingRectangleWithoutChildren());
+  const rows = root.getDescendants(false).filter((descendant) => !descendant.outputConnection)
+    .map((descendant) => descendant.getBoundingRectangleWithoutChildren());
   const {right, top} = block.getBoundingRectangle();
-  const wanted = new Coordinate(right + FROM_BLOCK, top);
+  const requested = new Coordinate(right + BLOCK_DISTANCE, top);
   const {width, height} = sheet.getSize();
-  return freePlace(wanted, {width, height}, [...obstacles(workspace, new Set([root])), ...rows], inSight(workspace), GAP);
+  return findFreePosition(requested, {width, height}, [...obstacles(workspace, new Set([root])), ...rows], visibleArea(workspace), GAP);
 }
 
 Blockly.icons.registry.unregister(Blockly.icons.IconType.COMMENT.toString());
-Blockly.icons.registry.register(Blockly.icons.IconType.COMMENT, NoteSign);
+Blockly.icons.registry.register(Blockly.icons.IconType.COMMENT, NoteIcon);
 
-function inOneStep(change: () => void): void {
+function withEventGroup(change: () => void): void {
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
   change();
@@ -358,45 +358,45 @@ export function hasNote(block: Blockly.BlockSvg): boolean {
 
 export function removeNote(block: Blockly.BlockSvg): void {
   const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
-  if (!(sign instanceof NoteSign)) return;
-  inOneStep(() => {
-    sign.tellChange(sign.shape, {...sign.shape, open: false});  // undo brings it back as it was
+  if (!(sign instanceof NoteIcon)) return;
+  withEventGroup(() => {
+    sign.fireNoteChange(sign.shape, {...sign.shape, open: false});  // undo brings it back as it was
     block.setCommentText(null);
   });
 }
 
 /** The words of its note; '' when it has none. */
-export function wordsOfNote(block: Blockly.BlockSvg): string {
+export function getNoteText(block: Blockly.BlockSvg): string {
   return block.getIcon(Blockly.icons.IconType.COMMENT)?.getText() ?? '';
 }
 
 /** The sheet of a note goes and comes with the block that it is beside. */
-export function showNote(block: Blockly.BlockSvg, seen: boolean): void {
+export function setNoteVisible(block: Blockly.BlockSvg, visible: boolean): void {
   const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
-  if (sign instanceof NoteSign) sign.isSeen = seen;
+  if (sign instanceof NoteIcon) sign.isSeen = visible;
 }
 
 /** An open note that has the keys. */
 export async function addNote(block: Blockly.BlockSvg): Promise<void> {
-  inOneStep(() => block.setCommentText(''));
+  withEventGroup(() => block.setCommentText(''));
   const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
-  if (!(sign instanceof NoteSign)) return;
+  if (!(sign instanceof NoteIcon)) return;
   await sign.setBubbleVisible(true);
   const sheet = sign.getBubble();
-  if (!(sheet instanceof Sheet)) return;
+  if (!(sheet instanceof NoteBubble)) return;
   Blockly.getFocusManager().focusNode(sheet.getEditor());
   const {x, y} = sheet.getRelativeToSurfaceXY();
   const {width, height} = sheet.getSize();
-  block.workspace.scrollBoundsIntoView(new Rect(y, y + height, x, x + width), IN_SIGHT);  // where all is full it is far off
+  block.workspace.scrollBoundsIntoView(new Rect(y, y + height, x, x + width), VIEW_MARGIN);  // where all is full it is far off
 }
 
 /** A note on the canvas itself, at a place of the page. */
-export function addCanvasNote(workspace: Blockly.WorkspaceSvg, place: {x: number; y: number}): void {
-  const at = Blockly.utils.svgMath.screenToWsCoordinates(workspace, new Coordinate(place.x, place.y));
-  inOneStep(() => {
+export function addCanvasNote(workspace: Blockly.WorkspaceSvg, screenPosition: {x: number; y: number}): void {
+  const wsPosition = Blockly.utils.svgMath.screenToWsCoordinates(workspace, new Coordinate(screenPosition.x, screenPosition.y));
+  withEventGroup(() => {
     const note = new Blockly.comments.RenderedWorkspaceComment(workspace);
-    note.setSize(new Size(...FIRST_SIZE));
-    note.moveTo(at);
+    note.setSize(new Size(...DEFAULT_SIZE));
+    note.moveTo(wsPosition);
     Blockly.getFocusManager().focusNode(note.view.getEditorFocusableNode());
   });
 }
@@ -407,7 +407,7 @@ export function keepNotesReadable(workspace: Blockly.WorkspaceSvg): void {
   const adapt = () => {
     if (workspace.scale === scale) return;
     ({scale} = workspace);
-    const size = Math.min(LARGEST, Math.max(FONT, SMALLEST / scale));
+    const size = Math.min(MAX_FONT_SIZE, Math.max(FONT_SIZE, MIN_FONT_SIZE / scale));
     workspace.getInjectionDiv().style.setProperty('--nep-noteFont', `${size}px`);
   };
   adapt();

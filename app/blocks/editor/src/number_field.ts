@@ -5,7 +5,7 @@ import {Hint} from './hint';
 import {parseNumber, type Rejection} from './typed_number';
 import {lazy, t} from './words';
 
-const SENTENCES: Readonly<Record<Rejection, string>> = {
+const REJECTION_MESSAGES: Readonly<Record<Rejection, string>> = {
   'separators': lazy('Enter a number with at most one decimal comma or point, such as 1234.5 or 1234,5.'),
   'not a number': lazy('Enter a number.'),
 };
@@ -26,7 +26,7 @@ class NumberField extends Blockly.FieldNumber {
     const typed = String(value);
     const problem = parseNumber(typed);
     this.problem = typeof problem === 'string' ? problem : null;
-    if (this.problem && !UNFINISHED.test(typed)) this.explain(t(SENTENCES[this.problem]));
+    if (this.problem && !UNFINISHED.test(typed)) this.showHint(t(REJECTION_MESSAGES[this.problem]));
     else this.hint?.hide();
   }
 
@@ -39,7 +39,7 @@ class NumberField extends Blockly.FieldNumber {
   override onFinishEditing_(value: unknown): void {
     super.onFinishEditing_(value);
     const keeps = t('The value stays {number}.', {number: String(value)});
-    if (this.problem) this.explain(`${t(SENTENCES[this.problem])} ${keeps}`);
+    if (this.problem) this.showHint(`${t(REJECTION_MESSAGES[this.problem])} ${keeps}`);
     this.problem = null;
   }
 
@@ -47,9 +47,9 @@ class NumberField extends Blockly.FieldNumber {
     return Hint.of(this.getSourceBlock()?.workspace);
   }
 
-  private explain(sentence: string): void {
+  private showHint(text: string): void {
     const {left, bottom} = this.getScaledBBox();
-    this.hint?.show(sentence, new Blockly.utils.Coordinate(left, bottom));
+    this.hint?.show(text, new Blockly.utils.Coordinate(left, bottom));
   }
 }
 

@@ -1,14 +1,14 @@
 // What the blocks show while a program runs: glow, outlines, sentences, absent robots, live values.
 import * as Blockly from 'blockly/core';
-import {Bubbles, type Said} from './bubbles';
+import {Bubbles, type BubbleContent} from './bubbles';
 import {definitionOf, sensorTypes} from './definitions';
 import {FieldLive} from './fields';
-import {seenInPlaceOf} from './folding';
+import {visibleBlockOf} from './folding';
 import {isUnknown} from './unknown_blocks';
 import {type BlockState, pathOf} from './renderer';
 import {t} from './words';
 
-const PICTURE_MS = 66;
+const FRAME_INTERVAL_MS = 66;
 
 export class Overlays {
   private running = new Set<string>();
@@ -33,46 +33,46 @@ export class Overlays {
     this.next = ids;
     if (this.resting) return;
     this.running = new Set(ids);
-    this.outline();
+    this.updateOutlines();
     this.resting = window.setTimeout(() => {
       this.resting = 0;
       const {next} = this;
       if (next.length !== this.running.size || next.some((id) => !this.running.has(id))) this.highlight(next);
-    }, PICTURE_MS);
+    }, FRAME_INTERVAL_MS);
   }
 
   markStopped(ids: string[]): void {
     this.stopped = new Set(ids);
-    this.outline();
+    this.updateOutlines();
   }
 
   /** The outline and its sentence in one step: nobody sees one without the other. */
   setErrors(errors: Record<string, string>): void {
     this.errors = new Map(Object.entries(errors));
-    this.outline();
-    this.talk();
+    this.updateOutlines();
+    this.updateBubbles();
   }
 
   /** A sentence beside each of these blocks; what they do goes on, so they have no outline. */
   setWarnings(warnings: Record<string, string>): void {
     this.warnings = new Map(Object.entries(warnings));
-    this.talk();
+    this.updateBubbles();
   }
 
   setAbsent(ids: string[]): void {
     this.absent = new Set(ids);
-    this.dress();
+    this.updateAbsentBlocks();
   }
 
   /** Keys: a block's id, or `<robot>/<property>` and perhaps `/<field>` for every block that reads this sensor. */
   setLive(values: Record<string, string>, old: string[]): void {
     this.live = new Map(Object.entries(values));
     this.old = new Set(old);
-    this.showLive();
+    this.renderLiveValues();
   }
 
   /** Another program is here: nothing of it runs, nothing is wrong with it. */
-  forget(): void {
+  reset(): void {
     window.clearTimeout(this.resting);
     this.resting = 0;
     this.next = [];
@@ -81,43 +81,43 @@ export class Overlays {
     this.errors = new Map();
     this.warnings = new Map();
     this.absent = new Set();
-    this.talk();
+    this.updateBubbles();
     this.restore();
   }
 
   /** Puts everything on again after the blocks were made anew. */
   restore(): void {
     this.outlined.clear();
-    this.outline();
-    this.dress();
-    this.showLive();
-    this.bubbles.placeSoon();
+    this.updateOutlines();
+    this.updateAbsentBlocks();
+    this.renderLiveValues();
+    this.bubbles.scheduleUpdate();
   }
 
   private onEvent(event: Blockly.Events.Abstract): void {
     if (event.type === Blockly.Events.BLOCK_CREATE) this.restore();
-    else if (event instanceof Blockly.Events.BlockChange && event.element === 'collapsed') this.outline();
+    else if (event instanceof Blockly.Events.BlockChange && event.element === 'collapsed') this.updateOutlines();
     else if (event.type === Blockly.Events.BLOCK_CHANGE || event.type === Blockly.Events.TOOLBOX_ITEM_SELECT) {
-      this.showLive();
+      this.renderLiveValues();
     }
-    this.bubbles.placeSoon();
+    this.bubbles.scheduleUpdate();
   }
 
   /** Only blocks whose state differs are touched: this runs 30 times a second. */
-  private outline(): void {
-    const wanted = new Map<string, BlockState>();
+  private updateOutlines(): void {
+    const stateById = new Map<string, BlockState>();
     // What counts most comes last: a folded block shows the state of all that is in it.
-    for (const id of this.stopped) wanted.set(this.seen(id), 'stopped');
-    for (const id of this.errors.keys()) wanted.set(this.seen(id), 'error');
-    for (const id of this.running) wanted.set(this.seen(id), 'running');
-    for (const id of this.outlined) if (!wanted.has(id)) this.setState(id, null);
-    for (const [id, state] of wanted) this.setState(id, state);
+    for (const id of this.stopped) stateById.set(this.getVisibleBlockId(id), 'stopped');
+    for (const id of this.errors.keys()) stateById.set(this.getVisibleBlockId(id), 'error');
+    for (const id of this.running) stateById.set(this.getVisibleBlockId(id), 'running');
+    for (const id of this.outlined) if (!stateById.has(id)) this.setState(id, null);
+    for (const [id, state] of stateById) this.setState(id, state);
   }
 
   /** The block that shows what this one does. */
-  private seen(id: string): string {
+  private getVisibleBlockId(id: string): string {
     const block = this.workspace.getBlockById(id);
-    return block ? seenInPlaceOf(block).id : id;
+    return block ? visibleBlockOf(block).id : id;
   }
 
   private setState(id: string, state: BlockState | null): void {
@@ -129,7 +129,7 @@ export class Overlays {
     else this.outlined.delete(id);
   }
 
-  private dress(): void {
+  private updateAbsentBlocks(): void {
     for (const block of this.workspace.getAllBlocks(false)) {
       const parent = block.isShadow() ? block.getParent() : null;
       const grey = isUnknown(block) || this.absent.has(block.id) || (parent !== null && this.absent.has(parent.id));
@@ -137,21 +137,21 @@ export class Overlays {
       if (root.classList.contains('nepAbsent') === grey) continue;
       root.classList.toggle('nepAbsent', grey);
       if (isUnknown(block)) continue;
-      block.setTooltip(grey ? absentSentence(block) : String(definitionOf(block.type)?.['tooltip'] ?? ''));
+      block.setTooltip(grey ? absentMessage(block) : String(definitionOf(block.type)?.['tooltip'] ?? ''));
     }
   }
 
   /** Five times a second: only blocks of sensors are looked at, and only new words are drawn. */
-  showLive(): void {
+  renderLiveValues(): void {
     const flyout = this.workspace.getFlyout()?.getWorkspace();
     for (const workspace of flyout ? [this.workspace, flyout] : [this.workspace]) {
       for (const type of sensorTypes()) {
-        for (const block of workspace.getBlocksByType(type, false)) this.showLiveOn(block);
+        for (const block of workspace.getBlocksByType(type, false)) this.renderLiveValue(block);
       }
     }
   }
 
-  private showLiveOn(block: Blockly.Block): void {
+  private renderLiveValue(block: Blockly.Block): void {
     for (const field of block.getFields()) {
       if (!(field instanceof FieldLive)) continue;
       const key = this.live.has(block.id) ? block.id : sensorKey(block);
@@ -160,11 +160,11 @@ export class Overlays {
   }
 
   /** A block that failed says that; what it was warned of before matters less. */
-  private talk(): void {
-    const said = new Map<string, Said>();
-    for (const [id, sentence] of this.warnings) said.set(id, ['warning', sentence]);
-    for (const [id, sentence] of this.errors) said.set(id, ['error', sentence]);
-    this.bubbles.say(said);
+  private updateBubbles(): void {
+    const messages = new Map<string, BubbleContent>();
+    for (const [id, sentence] of this.warnings) messages.set(id, ['warning', sentence]);
+    for (const [id, sentence] of this.errors) messages.set(id, ['error', sentence]);
+    this.bubbles.setContents(messages);
   }
 }
 
@@ -178,7 +178,7 @@ function sensorKey(block: Blockly.Block): string {
   return [...sensorOf(block), ...(typeof part === 'string' ? [part] : [])].join('/');
 }
 
-function absentSentence(block: Blockly.Block): string {
+function absentMessage(block: Blockly.Block): string {
   const robot = block.getField('ROBOT')?.getText();
   return robot ? t('{robot} isn\'t connected. This block is skipped when the program runs.', {robot}) :
     t('The robot isn\'t connected. This block is skipped when the program runs.');

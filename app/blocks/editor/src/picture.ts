@@ -1,27 +1,27 @@
 // A picture of all blocks of a behaviour, also of those outside the view: SVG that needs nothing else (looks and fonts
 // are in it), or PNG made of that. The canvas that is seen stays as it is; states of a run and outlines are left out.
 import * as Blockly from 'blockly/core';
-import {keepTyped, ownerOf} from './notes';
+import {flushTypedText, blockIdOf} from './notes';
 
-const SVG = 'http://www.w3.org/2000/svg';
+const SVG_NS = 'http://www.w3.org/2000/svg';
 /** Around the blocks; the signs at their left are 20 wide. */
 const MARGIN = 32;
 const SCALE = 2;
 /** What is higher is the sheet of a note, not the bar above it. */
-const HEAD = 30;
+const NOTE_HEADER_HEIGHT = 30;
 /** What Chromium can draw at once: on a side, and in all. */
-const MOST_SIDE = 16_000;
-const MOST_PIXELS = 120_000_000;
+const MAX_SIDE_PX = 16_000;
+const MAX_PIXELS = 120_000_000;
 
 /** The looks that make a difference, with what they are where nobody says anything: that needs no words. */
-const LOOKS: Readonly<Record<string, string>> = {
+const STYLE_DEFAULTS: Readonly<Record<string, string>> = {
   'fill': 'rgb(0, 0, 0)', 'fill-opacity': '1', 'fill-rule': 'nonzero', 'stroke': 'none', 'stroke-width': '1px', 'stroke-opacity': '1',
   'stroke-linecap': 'butt', 'stroke-linejoin': 'miter', 'stroke-dasharray': 'none', 'opacity': '1', 'paint-order': 'normal',
 };
-const LETTERS: readonly string[] = ['font-family', 'font-size', 'font-weight', 'text-anchor', 'dominant-baseline'];
-const SHAPES: readonly string[] = ['d', 'x', 'y', 'width', 'height', 'rx', 'ry', 'cx', 'cy', 'r', 'x1', 'y1', 'x2', 'y2', 'points',
+const TEXT_PROPERTIES: readonly string[] = ['font-family', 'font-size', 'font-weight', 'text-anchor', 'dominant-baseline'];
+const GEOMETRY_ATTRIBUTES: readonly string[] = ['d', 'x', 'y', 'width', 'height', 'rx', 'ry', 'cx', 'cy', 'r', 'x1', 'y1', 'x2', 'y2', 'points',
   'transform', 'href', 'viewBox', 'dy', 'dx'];
-const LEFT_OUT = '.nepState, .nepSelection, .nepTryHandle, .nepNoteButton, .blocklyInsertionMarker, .blocklyHighlightedConnectionPath, ' +
+const EXCLUDED_SELECTOR = '.nepState, .nepSelection, .nepTryHandle, .nepNoteButton, .blocklyInsertionMarker, .blocklyHighlightedConnectionPath, ' +
   '.blocklyResizeHandle, .blocklyFoldoutIcon, .blocklyDeleteIcon, .blocklyConnectionIndicator, title';
 
 export interface Picture {
@@ -31,65 +31,65 @@ export interface Picture {
 }
 
 /** What is on the canvas: a stack, a note, or the note of a block, which goes with its stack. */
-export interface Drawn {
+export interface RenderedItem {
   item: unknown;
   box: Blockly.utils.Rect;
   drawn: SVGElement | null;
 }
 
 /** Each thing on the canvas, or `only` these, with its looks written on it; `patterns` gets what they are filled with, by id. */
-export function drawings(workspace: Blockly.WorkspaceSvg, patterns: Map<string, SVGElement>, only?: ReadonlySet<unknown>): Drawn[] {
-  keepTyped();
+export function renderItems(workspace: Blockly.WorkspaceSvg, patterns: Map<string, SVGElement>, only?: ReadonlySet<unknown>): RenderedItem[] {
+  flushTypedText();
   Blockly.renderManagement.triggerQueuedRenders();
   const all = [...workspace.getTopBlocks(true), ...workspace.getTopComments()] as (Blockly.IBoundedElement & {
     getSvgRoot?(): SVGElement; view?: {getSvgRoot(): SVGElement};
   })[];
-  const items = all.filter((each) => !only || only.has(each));
-  const found = items.map((item): Drawn => ({item, box: item.getBoundingRectangle(),
-    drawn: copy(item.getSvgRoot?.() ?? item.view!.getSvgRoot(), patterns)}));
+  const items = all.filter((item) => !only || only.has(item));
+  const renderedItems = items.map((item): RenderedItem => ({item, box: item.getBoundingRectangle(),
+    drawn: cloneWithStyles(item.getSvgRoot?.() ?? item.view!.getSvgRoot(), patterns)}));
   for (const sheet of workspace.getBubbleCanvas().querySelectorAll<SVGGElement>('.nepNote')) {
-    const owner = workspace.getBlockById(ownerOf(sheet))?.getRootBlock();
+    const owner = workspace.getBlockById(blockIdOf(sheet))?.getRootBlock();
     if (only && !only.has(owner)) continue;
     const {x, y, width, height} = sheet.getBBox();
     const {e, f} = sheet.transform.baseVal.consolidate()?.matrix ?? {e: 0, f: 0};
-    found.push({item: owner,
-      box: new Blockly.utils.Rect(y + f, y + f + height, x + e, x + e + width), drawn: copy(sheet, patterns)});
+    renderedItems.push({item: owner,
+      box: new Blockly.utils.Rect(y + f, y + f + height, x + e, x + e + width), drawn: cloneWithStyles(sheet, patterns)});
   }
-  return found;
+  return renderedItems;
 }
 
 /** null: there is nothing to be seen. Call it while the page has the light theme; of `only` these, in the theme of now. */
-export async function pictureOf(workspace: Blockly.WorkspaceSvg, white: boolean, only?: ReadonlySet<unknown>): Promise<Picture | null> {
+export async function createPicture(workspace: Blockly.WorkspaceSvg, white: boolean, only?: ReadonlySet<unknown>): Promise<Picture | null> {
   const patterns = new Map<string, SVGElement>();
-  const found = drawings(workspace, patterns, only);
-  if (!found.length) return null;
-  const boxes = found.map(({box}) => box);
-  const drawn = found.map((each) => each.drawn);
-  for (const each of drawn) if (each) cut(each);
+  const renderedItems = renderItems(workspace, patterns, only);
+  if (!renderedItems.length) return null;
+  const boxes = renderedItems.map(({box}) => box);
+  const drawn = renderedItems.map((item) => item.drawn);
+  for (const element of drawn) if (element) truncateNote(element);
   const left = Math.floor(Math.min(...boxes.map((box) => box.left)) - MARGIN);
   const top = Math.floor(Math.min(...boxes.map((box) => box.top)) - MARGIN);
   const width = Math.ceil(Math.max(...boxes.map((box) => box.right)) + MARGIN) - left;
   const height = Math.ceil(Math.max(...boxes.map((box) => box.bottom)) + MARGIN) - top;
-  const made = document.createElementNS(SVG, 'svg');
-  for (const [name, value] of Object.entries({width, height, viewBox: `${left} ${top} ${width} ${height}`})) made.setAttribute(name, `${value}`);
-  const looks = document.createElementNS(SVG, 'style');
-  const fonts = new Set(drawn.flatMap((each) => [...each?.querySelectorAll('text') ?? []].flatMap(fontsOf)));
-  const defs = document.createElementNS(SVG, 'defs');
+  const root = document.createElementNS(SVG_NS, 'svg');
+  for (const [name, value] of Object.entries({width, height, viewBox: `${left} ${top} ${width} ${height}`})) root.setAttribute(name, `${value}`);
+  const style = document.createElementNS(SVG_NS, 'style');
+  const fonts = new Set(drawn.flatMap((element) => [...element?.querySelectorAll('text') ?? []].flatMap(fontsOf)));
+  const defs = document.createElementNS(SVG_NS, 'defs');
   defs.append(...patterns.values());
-  made.append(looks, defs);
+  root.append(style, defs);
   if (white) {
-    const ground = document.createElementNS(SVG, 'rect');
+    const ground = document.createElementNS(SVG_NS, 'rect');
     for (const [name, value] of Object.entries({x: left, y: top, width, height, fill: '#ffffff'})) ground.setAttribute(name, `${value}`);
-    made.append(ground);
+    root.append(ground);
   }
-  made.append(...drawn.filter((each) => each !== null));
-  looks.textContent = (await Promise.all([...fonts].map(fontFace))).join('\n');
-  return {svg: new XMLSerializer().serializeToString(made), width, height};
+  root.append(...drawn.filter((element) => element !== null));
+  style.textContent = (await Promise.all([...fonts].map(fontFace))).join('\n');
+  return {svg: new XMLSerializer().serializeToString(root), width, height};
 }
 
 /** As a `data:` URL of a PNG, twice as large as on the screen (or `wanted`) or as large as can be. */
-export async function asPng({svg, width, height}: Picture, wanted = SCALE): Promise<string> {
-  const scale = Math.min(wanted, MOST_SIDE / width, MOST_SIDE / height, Math.sqrt(MOST_PIXELS / (width * height)));
+export async function renderPng({svg, width, height}: Picture, requestedScale = SCALE): Promise<string> {
+  const scale = Math.min(requestedScale, MAX_SIDE_PX / width, MAX_SIDE_PX / height, Math.sqrt(MAX_PIXELS / (width * height)));
   const image = new Image(width, height);
   image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`;
   await image.decode();
@@ -100,52 +100,52 @@ export async function asPng({svg, width, height}: Picture, wanted = SCALE): Prom
 }
 
 /** The same shapes with their looks written on them; null for what is not seen. */
-function copy(source: Element, patterns: Map<string, SVGElement>): SVGElement | null {
-  if (source.matches(LEFT_OUT)) return null;
+function cloneWithStyles(source: Element, patterns: Map<string, SVGElement>): SVGElement | null {
+  if (source.matches(EXCLUDED_SELECTOR)) return null;
   const style = getComputedStyle(source);
   if (style.display === 'none' || style.visibility === 'hidden' || style.opacity === '0') return null;
-  if (source.localName === 'foreignObject') return wordsOf(source);
-  const made = document.createElementNS(SVG, source.localName);
-  for (const name of SHAPES) {
+  if (source.localName === 'foreignObject') return createNoteText(source);
+  const clone = document.createElementNS(SVG_NS, source.localName);
+  for (const name of GEOMETRY_ATTRIBUTES) {
     const value = source.getAttribute(name);
-    if (value !== null) made.setAttribute(name, value);
+    if (value !== null) clone.setAttribute(name, value);
   }
   if (source instanceof SVGGElement) {
-    if (style.opacity !== '1') made.setAttribute('opacity', style.opacity);
-  } else writeLooks(source, style, made, patterns);
+    if (style.opacity !== '1') clone.setAttribute('opacity', style.opacity);
+  } else writeStyles(source, style, clone, patterns);
   for (const child of source.childNodes) {
     if (child instanceof Element) {
-      const inner = copy(child, patterns);
-      if (inner) made.append(inner);
+      const inner = cloneWithStyles(child, patterns);
+      if (inner) clone.append(inner);
     } else if (child instanceof Text && (source.localName === 'text' || source.localName === 'tspan')) {
-      made.append(child.data);
+      clone.append(child.data);
     }
   }
-  return made;
+  return clone;
 }
 
-function writeLooks(source: Element, style: CSSStyleDeclaration, made: SVGElement, patterns: Map<string, SVGElement>): void {
-  for (const [name, usual] of Object.entries(LOOKS)) {
+function writeStyles(source: Element, style: CSSStyleDeclaration, clone: SVGElement, patterns: Map<string, SVGElement>): void {
+  for (const [name, usual] of Object.entries(STYLE_DEFAULTS)) {
     const value = style.getPropertyValue(name);
-    if (value && value !== usual) made.setAttribute(name, value);
+    if (value && value !== usual) clone.setAttribute(name, value);
   }
-  if (source.localName === 'text') for (const name of LETTERS) made.setAttribute(name, style.getPropertyValue(name));
+  if (source.localName === 'text') for (const name of TEXT_PROPERTIES) clone.setAttribute(name, style.getPropertyValue(name));
   const id = /url\("?#([^")]+)"?\)/.exec(style.fill)?.[1];
   if (!id) return;
-  made.setAttribute('fill', `url(#${id})`);
+  clone.setAttribute('fill', `url(#${id})`);
   const pattern = document.getElementById(id);
   if (!pattern || patterns.has(id)) return;
-  const kept = pattern.cloneNode(true) as SVGElement;
-  [...pattern.querySelectorAll('*')].forEach((each, at) => {
-    const looks = getComputedStyle(each);
-    const mine = kept.querySelectorAll('*')[at];
-    for (const name of ['fill', 'stroke']) mine?.setAttribute(name, looks.getPropertyValue(name));
+  const patternClone = pattern.cloneNode(true) as SVGElement;
+  [...pattern.querySelectorAll('*')].forEach((element, index) => {
+    const elementStyle = getComputedStyle(element);
+    const mine = patternClone.querySelectorAll('*')[index];
+    for (const name of ['fill', 'stroke']) mine?.setAttribute(name, elementStyle.getPropertyValue(name));
   });
-  patterns.set(id, kept);
+  patterns.set(id, patternClone);
 }
 
 /** The words of a note as lines of text: other programs show no fields of a page. */
-function wordsOf(source: Element): SVGElement | null {
+function createNoteText(source: Element): SVGElement | null {
   const area = source.querySelector('textarea');
   if (!area?.value) return null;
   const style = getComputedStyle(area);
@@ -154,52 +154,52 @@ function wordsOf(source: Element): SVGElement | null {
   const [width, height] = ['width', 'height'].map((name) => parseFloat(source.getAttribute(name) ?? '0') || 0) as [number, number];
   const inset = parseFloat(style.paddingLeft) || 8;
   const rise = parseFloat(style.paddingTop) || 0;
-  const each = parseFloat(style.lineHeight) || size * 1.4;
-  const made = document.createElementNS(SVG, 'text');
-  for (const name of ['font-family', 'font-size', 'font-weight'] as const) made.setAttribute(name, style.getPropertyValue(name));
-  made.setAttribute('fill', style.color);
-  const lines = wrapped(area.value, width - 2 * inset, `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`);
-  const room = Math.max(1, Math.floor((height - rise) / each));
-  lines.forEach((line, at) => {
-    const part = document.createElementNS(SVG, 'tspan');
+  const lineHeight = parseFloat(style.lineHeight) || size * 1.4;
+  const text = document.createElementNS(SVG_NS, 'text');
+  for (const name of ['font-family', 'font-size', 'font-weight'] as const) text.setAttribute(name, style.getPropertyValue(name));
+  text.setAttribute('fill', style.color);
+  const lines = wrapText(area.value, width - 2 * inset, `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`);
+  const room = Math.max(1, Math.floor((height - rise) / lineHeight));
+  lines.forEach((line, index) => {
+    const part = document.createElementNS(SVG_NS, 'tspan');
     part.setAttribute('x', `${x + inset}`);
-    part.setAttribute('y', `${y + rise + size + at * each}`);
+    part.setAttribute('y', `${y + rise + size + index * lineHeight}`);
     part.textContent = line;
-    made.append(part);
+    text.append(part);
   });
-  if (lines.length > room) Object.assign(made.dataset, {room, more: Math.ceil((lines.length - room) * each)});
-  return made;
+  if (lines.length > room) Object.assign(text.dataset, {room, more: Math.ceil((lines.length - room) * lineHeight)});
+  return text;
 }
 
 /** How much higher a note has to be for all its words. */
-export function moreOf(note: SVGElement): number {
+export function overflowHeight(note: SVGElement): number {
   return Number(note.querySelector<SVGElement>('[data-more]')?.dataset['more'] ?? 0);
 }
 
 /** Makes a note as high as its words. */
-export function grow(note: SVGElement): void {
-  const more = moreOf(note);
+export function expandNote(note: SVGElement): void {
+  const more = overflowHeight(note);
   for (const ground of note.querySelectorAll('rect')) {
     const height = Number(ground.getAttribute('height'));
-    if (height > HEAD) ground.setAttribute('height', `${height + more}`);
+    if (height > NOTE_HEADER_HEIGHT) ground.setAttribute('height', `${height + more}`);
   }
 }
 
 /** Leaves out the words that do not fit into a note, and says so with “…”. */
-export function cut(note: SVGElement): void {
-  const words = note.querySelector<SVGElement>('[data-room]');
-  if (!words) return;
-  const lines = [...words.children];
-  const room = Number(words.dataset['room']);
+export function truncateNote(note: SVGElement): void {
+  const text = note.querySelector<SVGElement>('[data-room]');
+  if (!text) return;
+  const lines = [...text.children];
+  const room = Number(text.dataset['room']);
   for (const line of lines.splice(room)) line.remove();
   lines[room - 1]?.append(' …');
 }
 
-function wrapped(words: string, width: number, font: string): string[] {
+function wrapText(text: string, width: number, font: string): string[] {
   const pen = document.createElement('canvas').getContext('2d')!;
   pen.font = font;
   const lines: string[] = [];
-  for (const paragraph of words.split('\n')) {
+  for (const paragraph of text.split('\n')) {
     let line = '';
     for (const word of paragraph.match(WORDS) ?? []) {
       if (line && pen.measureText((line + word).trimEnd()).width > width) {
@@ -218,35 +218,35 @@ const JAPANESE = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]/;
 /** A word with the spaces after it, or a single Japanese character: lines may break after each. */
 const WORDS = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef] *|[^ \u3000-\u30ff\u3400-\u9fff\uff00-\uffef]+ *| +/g;
 
-const faces = new Map<string, Promise<string>>();
+const fontFaces = new Map<string, Promise<string>>();
 
 /** The bundled fonts of a text, as "file weight family". */
 function fontsOf(text: SVGTextElement): string[] {
   const weight = text.getAttribute('font-weight') ?? '';
   if (!(weight in WEIGHTS)) return [];
-  const found = [`Inter-${WEIGHTS[weight]}.otf ${weight} Inter`];
-  if (JAPANESE.test(text.textContent ?? '')) found.push(`MPLUS1p-${JAPANESE_WEIGHTS[weight]}.ttf ${weight} "M PLUS 1p"`);
-  return found;
+  const fonts = [`Inter-${WEIGHTS[weight]}.otf ${weight} Inter`];
+  if (JAPANESE.test(text.textContent ?? '')) fonts.push(`MPLUS1p-${JAPANESE_WEIGHTS[weight]}.ttf ${weight} "M PLUS 1p"`);
+  return fonts;
 }
 
 /** Returns the rule that embeds a font, so that the picture looks the same where the font isn't installed; cached. */
 async function fontFace(font: string): Promise<string> {
-  if (!faces.has(font)) {
+  if (!fontFaces.has(font)) {
     const [file, weight, ...family] = font.split(' ');
     const read = readFace(file!, weight!, family.join(' '));
-    read.catch(() => faces.delete(font));  // the next picture tries again
-    faces.set(font, read);
+    read.catch(() => fontFaces.delete(font));  // the next picture tries again
+    fontFaces.set(font, read);
   }
-  return faces.get(font)!;
+  return fontFaces.get(font)!;
 }
 
 async function readFace(file: string, weight: string, family: string): Promise<string> {
-  const answer = await fetch(`fonts/${file}`);
-  const data = await new Promise<string>((done, failed) => {
+  const response = await fetch(`fonts/${file}`);
+  const data = await new Promise<string>((resolve, failed) => {
     const reader = new FileReader();
-    reader.onload = () => done(String(reader.result));
+    reader.onload = () => resolve(String(reader.result));
     reader.onerror = () => failed(reader.error ?? new Error('a font cannot be read'));
-    void answer.blob().then((blob) => reader.readAsDataURL(blob), failed);
+    void response.blob().then((blob) => reader.readAsDataURL(blob), failed);
   });
   return `@font-face { font-family: ${family}; font-weight: ${weight}; src: url(${data}); }`;
 }

@@ -2,11 +2,11 @@
 import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
 import type {Culling} from './culling';
-import {freePlace, inSight, obstacles} from './free_place';
+import {findFreePosition, visibleArea, obstacles} from './free_place';
 import {type BlockState, UNKNOWN_BLOCK, wrapUnknown, wrapWholeStack, unwrapUnknown} from './unknown_blocks';
 import {NamelessVariables} from './nameless_variables';
-import {keepTyped} from './notes';
-import {withDeferredWords} from './blockly_patches';
+import {flushTypedText} from './notes';
+import {withDeferredAria} from './blockly_patches';
 
 type Json = Record<string, unknown>;
 
@@ -16,14 +16,14 @@ export interface Listener {
   selected(id: string): void;
 }
 
-const QUIET_MS = 150;
+const DEBOUNCE_MS = 150;
 
 export class Program {
   /** Parts of the file that Blockly does not know; written back as they were. */
   private rest: Json = {};
-  private told = '';
+  private lastNotifiedJson = '';
   private timer = 0;
-  private historyTold = 'false false';
+  private lastNotifiedHistory = 'false false';
   private loading = false;
   private readonly nameless: NamelessVariables;
 
@@ -39,10 +39,10 @@ export class Program {
     this.workspace.clearUndo();
     window.clearTimeout(this.timer);
     this.timer = 0;
-    this.told = JSON.stringify(this.save());
-    this.tellHistory();
-    this.goHome();
-    this.culling.look();
+    this.lastNotifiedJson = JSON.stringify(this.save());
+    this.notifyHistory();
+    this.scrollToStart();
+    this.culling.update();
   }
 
   /** Another program in the place of this one, as one edit that undo takes back; the view stays. */
@@ -53,31 +53,31 @@ export class Program {
     const group = Blockly.Events.getGroup();
     Blockly.Events.setGroup(true);
     try {
-      this.fill(state, {recordUndo: true});
+      this.loadBlocks(state, {recordUndo: true});
       this.workspace.scroll(scrollX, scrollY);
-      this.told = JSON.stringify(this.save());  // the window made it
-      const made = this.workspace.getTopBlocks(false).filter((block) => !before.has(block.id));
-      const [only] = made;
-      if (before.size && only && made.length === 1) this.layInSight(only);
+      this.lastNotifiedJson = JSON.stringify(this.save());  // the window made it
+      const newBlocks = this.workspace.getTopBlocks(false).filter((block) => !before.has(block.id));
+      const [only] = newBlocks;
+      if (before.size && only && newBlocks.length === 1) this.moveIntoView(only);
     } finally {
       Blockly.Events.setGroup(group);
     }
   }
 
   /** A script that was added: the window knows neither what can be seen nor how wide the other scripts are. */
-  private layInSight(made: Blockly.BlockSvg): void {
+  private moveIntoView(block: Blockly.BlockSvg): void {
     Blockly.renderManagement.triggerQueuedRenders(this.workspace);
-    const box = made.getBoundingRectangle();
+    const box = block.getBoundingRectangle();
     const size = {width: box.getWidth(), height: box.getHeight()};
-    const view = inSight(this.workspace);
-    const place = freePlace(new Blockly.utils.Coordinate(box.left, box.top), size,
-      obstacles(this.workspace, new Set([made])), view);
-    if (place.x !== box.left || place.y !== box.top) {
-      made.moveBy(place.x - box.left, place.y - box.top);
-      this.touched();
+    const view = visibleArea(this.workspace);
+    const position = findFreePosition(new Blockly.utils.Coordinate(box.left, box.top), size,
+      obstacles(this.workspace, new Set([block])), view);
+    if (position.x !== box.left || position.y !== box.top) {
+      block.moveBy(position.x - box.left, position.y - box.top);
+      this.scheduleFlush();
     }
-    const now = made.getRelativeToSurfaceXY();
-    if (!view.contains(now.x, now.y)) this.workspace.centerOnBlock(made.id, true);
+    const now = block.getRelativeToSurfaceXY();
+    if (!view.contains(now.x, now.y)) this.workspace.centerOnBlock(block.id, true);
   }
 
   /** Tells nothing any more. */
@@ -98,10 +98,10 @@ export class Program {
   }
 
   /** Undo or redo, after the edits of this frame have reached Blockly's own list of edits. */
-  undo(again: boolean): void {
+  undo(redo: boolean): void {
     window.requestAnimationFrame(() => window.setTimeout(() => {
-      this.workspace.undo(again);
-      this.tellHistory();
+      this.workspace.undo(redo);
+      this.notifyHistory();
     }));
   }
 
@@ -109,30 +109,30 @@ export class Program {
     const state = Blockly.serialization.workspaces.save(this.workspace) as Json;
     const blocks = state['blocks'] as {blocks: BlockState[]} | undefined;
     if (blocks) state['blocks'] = {...blocks, blocks: blocks.blocks.map(unwrapUnknown)};
-    return {...this.rest, ...this.nameless.withoutThem(state)};
+    return {...this.rest, ...this.nameless.omitPlaceholders(state)};
   }
 
   /** The newest JSON; tells about it at once when the window does not have it yet. */
   flush(): string {
-    keepTyped();
+    flushTypedText();
     window.clearTimeout(this.timer);
     this.timer = 0;
     const json = JSON.stringify(this.save());
-    if (json !== this.told) {
-      this.told = json;
+    if (json !== this.lastNotifiedJson) {
+      this.lastNotifiedJson = json;
       this.listener.changed(json);
     }
     return json;
   }
 
   /** Something of the behaviour has changed that is no edit of its blocks, and that undo leaves alone. */
-  touched(): void {
+  scheduleFlush(): void {
     window.clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => this.flush(), QUIET_MS);
+    this.timer = window.setTimeout(() => this.flush(), DEBOUNCE_MS);
   }
 
   /** Puts the program's top left corner near the workspace's. */
-  goHome(): void {
+  scrollToStart(): void {
     const blocks = this.workspace.getTopBlocks(false);
     if (!blocks.length) {
       this.workspace.scroll(0, 0);
@@ -148,14 +148,14 @@ export class Program {
     this.loading = true;
     Blockly.Events.disable();
     try {
-      this.fill(state);
+      this.loadBlocks(state);
     } finally {
       Blockly.Events.enable();
       this.loading = false;
     }
   }
 
-  private fill(state: Json, how: {recordUndo?: boolean} = {}): void {
+  private loadBlocks(state: Json, how: {recordUndo?: boolean} = {}): void {
     const {blocks, ...others} = state;
     const tops = (blocks as {blocks?: unknown} | undefined)?.blocks;
     this.rest = Object.fromEntries(Object.entries(others).filter(([name]) =>
@@ -167,13 +167,13 @@ export class Program {
       this.loadOthers(others, how);
       this.nameless.create(Array.isArray(tops) ? tops as BlockState[] : []);
       this.workspace.setResizesEnabled(false);
-      withoutTypeChecks(() => withDeferredWords(() => {
+      withoutTypeChecks(() => withDeferredAria(() => {
         for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState, how);
       }));
     } finally {
       Blockly.utils.dom.stopTextWidthCache();
       this.workspace.setResizesEnabled(true);
-      this.culling.lookSoon();
+      this.culling.scheduleUpdate();
     }
   }
 
@@ -205,47 +205,47 @@ export class Program {
       this.listener.selected((event as Blockly.Events.Selected).newElementId ?? '');
     }
     if (event.isUiEvent || this.loading || event.type === Blockly.Events.FINISHED_LOADING) return;
-    if (event.type === Blockly.Events.BLOCK_DELETE) this.forgetWhatCameAndWent(event.group);
-    this.tellHistory();
+    if (event.type === Blockly.Events.BLOCK_DELETE) this.dropEmptyUndoGroup(event.group);
+    this.notifyHistory();
     window.clearTimeout(this.timer);
     this.timer = window.setTimeout(() => {
       // While a block is in the hand the program is not finished: wait until it is put down.
       if (this.workspace.isDragging()) this.onEvent(event);
       else this.flush();
-    }, QUIET_MS);
+    }, DEBOUNCE_MS);
   }
 
   /** A block that was dragged out of the toolbox and back into it has changed nothing: there is nothing to undo. */
-  private forgetWhatCameAndWent(group: string): void {
+  private dropEmptyUndoGroup(group: string): void {
     const stack = this.workspace.getUndoStack();
-    const first = group ? stack.findIndex((each) => each.group === group) : -1;
+    const first = group ? stack.findIndex((event) => event.group === group) : -1;
     if (first < 0) return;
     const step = stack.slice(first) as Blockly.Events.BlockBase[];
-    const ids = (type: string) => step.filter((each) => each.type === type)
-      .flatMap((each) => (each as Blockly.Events.BlockCreate | Blockly.Events.BlockDelete).ids ?? []);
-    const came = new Set(ids(Blockly.Events.BLOCK_CREATE));
-    const went = new Set(ids(Blockly.Events.BLOCK_DELETE));
-    const isNothing = step.every((each) => each.group === group && came.has(each.blockId ?? ''));
-    if (isNothing && [...came].every((id) => went.has(id))) stack.splice(first);
+    const ids = (type: string) => step.filter((event) => event.type === type)
+      .flatMap((event) => (event as Blockly.Events.BlockCreate | Blockly.Events.BlockDelete).ids ?? []);
+    const createdIds = new Set(ids(Blockly.Events.BLOCK_CREATE));
+    const deletedIds = new Set(ids(Blockly.Events.BLOCK_DELETE));
+    const isNothing = step.every((event) => event.group === group && createdIds.has(event.blockId ?? ''));
+    if (isNothing && [...createdIds].every((id) => deletedIds.has(id))) stack.splice(first);
   }
 
   /** Tells what can be undone; `again`: also when that was told before. */
-  tellHistory(again = false): void {
+  notifyHistory(force = false): void {
     const canUndo = this.workspace.getUndoStack().length > 0;
     const canRedo = this.workspace.getRedoStack().length > 0;
-    if (`${canUndo} ${canRedo}` === this.historyTold && !again) return;
-    this.historyTold = `${canUndo} ${canRedo}`;
+    if (`${canUndo} ${canRedo}` === this.lastNotifiedHistory && !force) return;
+    this.lastNotifiedHistory = `${canUndo} ${canRedo}`;
     this.listener.history(canUndo, canRedo);
   }
 }
 
 /** Whether the workspace holds a block of one of the types, or a kept block whose own type is among them. */
-export function holdsAny(workspace: Blockly.Workspace, types: ReadonlySet<string>): boolean {
+export function hasBlockOfTypes(workspace: Blockly.Workspace, types: ReadonlySet<string>): boolean {
   return workspace.getAllBlocks(false).some((block) => types.has(block.type) ||
-    (block.type === UNKNOWN_BLOCK && keptMatches(block, types)));
+    (block.type === UNKNOWN_BLOCK && unknownBlockMatches(block, types)));
 }
 
-function keptMatches(block: Blockly.Block, types: ReadonlySet<string>): boolean {
+function unknownBlockMatches(block: Blockly.Block, types: ReadonlySet<string>): boolean {
   const state = block.saveExtraState?.() as {original?: {type?: string}; whole?: boolean} | undefined;
   return state?.whole === true || types.has(state?.original?.type ?? '');
 }

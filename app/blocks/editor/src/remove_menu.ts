@@ -2,7 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
 import {definitionOf} from './definitions';
-import {DEFINITIONS, type DefinitionBlock, MOST_INPUTS, addBranch, branchesOf, changeInputs} from './mutators';
+import {DEFINITIONS, type DefinitionBlock, MAX_INPUTS, addBranch, branchesOf, changeInputs} from './mutators';
 import {lazy, t} from './words';
 
 interface Item {
@@ -16,8 +16,8 @@ type State = Blockly.serialization.blocks.State;
 function itemOf(start: Blockly.Block | null): Item | null {
   let block = start;
   for (let parent = block?.getParent(); block && parent; parent = block.getParent()) {
-    const place = definitionOf(parent.type)?.mutator === 'nep_items' ? parent.getInputWithBlock(block)?.name : '';
-    const number = /^ITEM(\d+)$/.exec(place ?? '')?.[1];
+    const inputName = definitionOf(parent.type)?.mutator === 'nep_items' ? parent.getInputWithBlock(block)?.name : '';
+    const number = /^ITEM(\d+)$/.exec(inputName ?? '')?.[1];
     if (number !== undefined) return {list: parent as Blockly.BlockSvg, number: Number(number)};
     if (!block.isShadow()) return null;
     block = parent;
@@ -29,29 +29,29 @@ function itemOf(start: Blockly.Block | null): Item | null {
 function removeItem({list, number}: Item): void {
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
-  const holder = (list.outputConnection ?? list.previousConnection)?.targetConnection ?? null;
+  const parentConnection = (list.outputConnection ?? list.previousConnection)?.targetConnection ?? null;
   const saved = Blockly.serialization.blocks.save(list, {addCoordinates: true}) as State;
   const {workspace} = list;
   list.dispose(false);
-  const made = withoutTypeChecks(() => {
-    const block = Blockly.serialization.blocks.append(without(saved, number), workspace, {recordUndo: true});
-    const own = block.outputConnection ?? block.previousConnection;
-    if (holder && own) holder.connect(own);
+  const newList = withoutTypeChecks(() => {
+    const block = Blockly.serialization.blocks.append(withoutItem(saved, number), workspace, {recordUndo: true});
+    const connection = block.outputConnection ?? block.previousConnection;
+    if (parentConnection && connection) parentConnection.connect(connection);
     return block as Blockly.BlockSvg;
   });
   if (!group) Blockly.Events.setGroup(false);
-  const left = made.getInput(`ITEM${Math.max(0, number - 1)}`)?.connection?.targetBlock();
-  const next = left instanceof Blockly.BlockSvg ? left : made;
+  const neighbour = newList.getInput(`ITEM${Math.max(0, number - 1)}`)?.connection?.targetBlock();
+  const next = neighbour instanceof Blockly.BlockSvg ? neighbour : newList;
   // After Blockly has given the keys of the old list to what is near.
   window.setTimeout(() => !next.isDeadOrDying() && Blockly.getFocusManager().focusNode(next));
 }
 
-function without(saved: State, number: number): State {
+function withoutItem(saved: State, number: number): State {
   const items = (saved.extraState as {items: number}).items;
   const inputs: NonNullable<State['inputs']> = {};
   for (const [name, each] of Object.entries(saved.inputs ?? {})) {
-    const at = Number(/^ITEM(\d+)$/.exec(name)?.[1] ?? -1);
-    if (at !== number) inputs[at > number ? `ITEM${at - 1}` : name] = each;
+    const index = Number(/^ITEM(\d+)$/.exec(name)?.[1] ?? -1);
+    if (index !== number) inputs[index > number ? `ITEM${index - 1}` : name] = each;
   }
   return {...saved, inputs, extraState: {...saved.extraState, items: items - 1}};
 }
@@ -59,36 +59,36 @@ function without(saved: State, number: number): State {
 // ---- the menu
 
 /** The grey value that the keys were on: Blockly opens the menu of the block that holds it. */
-let asked: Blockly.BlockSvg | null = null;
-let found: Item | null = null;
+let menuBlock: Blockly.BlockSvg | null = null;
+let menuItem: Item | null = null;
 
-const open = Blockly.BlockSvg.prototype.showContextMenu;
+const baseShowContextMenu = Blockly.BlockSvg.prototype.showContextMenu;
 Blockly.BlockSvg.prototype.showContextMenu = function (this: Blockly.BlockSvg, event: Event) {
-  const first = asked === null;
-  asked ??= this;
+  const first = menuBlock === null;
+  menuBlock ??= this;
   try {
-    open.call(this, event);
+    baseShowContextMenu.call(this, event);
   } finally {
-    if (first) asked = null;
+    if (first) menuBlock = null;
   }
 };
 
-function wanted(block: Blockly.BlockSvg, event: Event): Item | null {
+function findMenuItem(block: Blockly.BlockSvg, event: Event): Item | null {
   const pressed = event instanceof PointerEvent && event.target instanceof Element ? event.target : null;
   const id = pressed?.closest<SVGElement>('[data-id]')?.dataset['id'];
-  return itemOf((id ? block.workspace.getBlockById(id) : null) ?? asked ?? block);
+  return itemOf((id ? block.workspace.getBlockById(id) : null) ?? menuBlock ?? block);
 }
 
 export function registerRemoveMenu(): void {
   const scopeType = Blockly.ContextMenuRegistry.ScopeType.BLOCK;
   Blockly.ContextMenuRegistry.registry.register({
     id: 'nepRemoveItem', weight: 81, scopeType,
-    displayText: () => t('Remove item {number} from the list', {number: (found?.number ?? 0) + 1}),
+    displayText: () => t('Remove item {number} from the list', {number: (menuItem?.number ?? 0) + 1}),
     preconditionFn: ({block}, event) => {
-      found = block && !block.isInFlyout ? wanted(block, event) : null;
-      return found ? 'enabled' : 'hidden';
+      menuItem = block && !block.isInFlyout ? findMenuItem(block, event) : null;
+      return menuItem ? 'enabled' : 'hidden';
     },
-    callback: () => found && removeItem(found),
+    callback: () => menuItem && removeItem(menuItem),
   });
   for (const [id, isElseIf, words] of [['nepAddElseIf', true, lazy('Add “else if”')], ['nepAddElse', false, lazy('Add “else”')]] as const) {
     Blockly.ContextMenuRegistry.registry.register({
@@ -104,14 +104,14 @@ export function registerRemoveMenu(): void {
       },
     });
   }
-  for (let place = 0; place < MOST_INPUTS; place += 1) {
+  for (let index = 0; index < MAX_INPUTS; index += 1) {
     const inputOf = (block?: Blockly.BlockSvg) =>
-      block && DEFINITIONS.includes(block.type) && !block.isInFlyout ? (block as unknown as DefinitionBlock).own[place] : undefined;
+      block && DEFINITIONS.includes(block.type) && !block.isInFlyout ? (block as unknown as DefinitionBlock).own[index] : undefined;
     Blockly.ContextMenuRegistry.registry.register({
-      id: `nepRemoveInput${place}`, weight: 82 + place / 100, scopeType,
+      id: `nepRemoveInput${index}`, weight: 82 + index / 100, scopeType,
       displayText: ({block}) => t('Remove the input “{input}”', {input: inputOf(block)?.name ?? ''}),
       preconditionFn: ({block}) => inputOf(block) ? 'enabled' : 'hidden',
-      callback: ({block}) => block && changeInputs(block as unknown as DefinitionBlock, -1, place),
+      callback: ({block}) => block && changeInputs(block as unknown as DefinitionBlock, -1, index),
     });
   }
 }

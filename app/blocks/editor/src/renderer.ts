@@ -5,7 +5,7 @@ export type BlockState = 'running' | 'stopped' | 'error';
 
 type Shape = [path: string, offset: Blockly.utils.Coordinate, rtl: boolean];
 
-const SVG = 'http://www.w3.org/2000/svg';
+const SVG_NS = 'http://www.w3.org/2000/svg';
 /** Widths of the strokes that together make the soft glow; cheaper than a blur, repainted ten times a second. */
 /** A block that is over sooner gets its outline only: a glow that nobody can see cost half a core at 30 a second. */
 const GLOW_AFTER_MS = 150;
@@ -49,7 +49,7 @@ export class StatePath extends Blockly.zelos.PathObject {
   private around = '';
   private selection: SVGGElement | null = null;
   private selected = false;
-  private chosen = false;
+  private isMultiSelected = false;
 
   override applyColour(block: Blockly.BlockSvg): void {
     super.applyColour(block);
@@ -60,12 +60,12 @@ export class StatePath extends Blockly.zelos.PathObject {
     let next: Blockly.BlockSvg | null = block;
     for (let path: StatePath | null = this; next && path; next = next.getNextBlock(), path = next && pathOf(next)) {
       if (next !== block && path.around === around) break;
-      path.lieIn(around, next);
+      path.setSurroundingStyle(around, next);
     }
   }
 
   /** A block in one of its own colour gets a light edge. */
-  private lieIn(around: string, block: Blockly.BlockSvg): void {
+  private setSurroundingStyle(around: string, block: Blockly.BlockSvg): void {
     this.around = around;
     this.setClass_('nepInside', around !== '' && !block.isShadow() && around === block.getStyleName());
   }
@@ -74,28 +74,28 @@ export class StatePath extends Blockly.zelos.PathObject {
   override updateSelected(enable: boolean): void {
     this.setClass_('blocklySelected', enable);
     this.selected = enable;
-    this.outline();
+    this.updateOutline();
   }
 
   /** One of several that are chosen; it looks selected, whichever of them has the keys. */
-  setChosen(chosen: boolean): void {
-    this.setClass_('nepChosen', chosen);
-    this.chosen = chosen;
-    this.outline();
+  setMultiSelected(isMultiSelected: boolean): void {
+    this.setClass_('nepChosen', isMultiSelected);
+    this.isMultiSelected = isMultiSelected;
+    this.updateOutline();
   }
 
-  private outline(): void {
-    const outlined = this.selected || this.chosen;
+  private updateOutline(): void {
+    const outlined = this.selected || this.isMultiSelected;
     if (outlined === (this.selection !== null)) return;
     this.selection?.remove();
-    this.selection = outlined ? this.group('nepSelection', 'nepSelected', [7, 3]) : null;
+    this.selection = outlined ? this.createGroup('nepSelection', 'nepSelected', [7, 3]) : null;
     if (this.selection) this.svgRoot.append(this.selection);
   }
 
   override setPath(path: string): void {
     super.setPath(path);
-    this.selection?.querySelectorAll('path').forEach((each) => each.setAttribute('d', path));
-    for (const mark of this.marks) mark.querySelectorAll('path').forEach((each) => each.setAttribute('d', path));
+    this.selection?.querySelectorAll('path').forEach((element) => element.setAttribute('d', path));
+    for (const mark of this.marks) mark.querySelectorAll('path').forEach((element) => element.setAttribute('d', path));
   }
 
   /** Shows one state, or none; calling it again with the same state costs nothing. */
@@ -107,31 +107,31 @@ export class StatePath extends Blockly.zelos.PathObject {
     this.marks = [];
     if (!state) return;
     // The outline lies on everything inside the block, the glow behind the block itself.
-    const outline = this.mark(`nepState nepState-${state}`, 'nepOutline', [state === 'running' ? 4 : 3]);
+    const outline = this.addMark(`nepState nepState-${state}`, 'nepOutline', [state === 'running' ? 4 : 3]);
     this.svgRoot.append(outline);
-    if (state === 'running') this.glowing = window.setTimeout(() => this.glow(), GLOW_AFTER_MS);
+    if (state === 'running') this.glowing = window.setTimeout(() => this.addGlow(), GLOW_AFTER_MS);
   }
 
-  private glow(): void {
-    this.svgRoot.prepend(this.mark('nepState nepGlow', 'nepGlowRing', GLOW_WIDTHS));
+  private addGlow(): void {
+    this.svgRoot.prepend(this.addMark('nepState nepGlow', 'nepGlowRing', GLOW_WIDTHS));
   }
 
-  private mark(name: string, pathName: string, widths: number[]): SVGGElement {
-    const group = this.group(name, pathName, widths);
+  private addMark(name: string, pathName: string, widths: number[]): SVGGElement {
+    const group = this.createGroup(name, pathName, widths);
     this.marks.push(group);
     return group;
   }
 
-  private group(name: string, pathName: string, widths: number[]): SVGGElement {
-    const group = document.createElementNS(SVG, 'g');
+  private createGroup(name: string, pathName: string, widths: number[]): SVGGElement {
+    const group = document.createElementNS(SVG_NS, 'g');
     group.setAttribute('class', name);
     group.setAttribute('aria-hidden', 'true');
-    group.append(...widths.map((width) => this.copy(pathName, width)));
+    group.append(...widths.map((width) => this.createPath(pathName, width)));
     return group;
   }
 
-  private copy(name: string, width: number): SVGPathElement {
-    const path = document.createElementNS(SVG, 'path');
+  private createPath(name: string, width: number): SVGPathElement {
+    const path = document.createElementNS(SVG_NS, 'path');
     path.setAttribute('class', name);
     path.setAttribute('d', this.svgPath.getAttribute('d') ?? '');
     path.setAttribute('stroke-width', String(width));
@@ -141,11 +141,11 @@ export class StatePath extends Blockly.zelos.PathObject {
 
 class Constants extends Blockly.zelos.ConstantProvider {
   override FIELD_TEXT_FONTWEIGHT = '600';
-  private plain: Blockly.Theme.BlockStyle | null = null;
+  private defaultStyle: Blockly.Theme.BlockStyle | null = null;
 
   /** Each block begins with the style of none, which Blockly works out anew for each. */
   override getBlockStyle(name: string | null): Blockly.Theme.BlockStyle {
-    return name ? super.getBlockStyle(name) : this.plain ??= super.getBlockStyle(name);
+    return name ? super.getBlockStyle(name) : this.defaultStyle ??= super.getBlockStyle(name);
   }
 }
 
@@ -168,21 +168,21 @@ export function pathOf(block: Blockly.BlockSvg): StatePath | null {
 }
 
 /** Enter on a block with one field opens it: a text's quotation marks are no reason to go inside first. */
-const act = Blockly.BlockSvg.prototype.performAction;
+const basePerformAction = Blockly.BlockSvg.prototype.performAction;
 Blockly.BlockSvg.prototype.performAction = function (this: Blockly.BlockSvg, event?: KeyboardEvent) {
   const fields = [...this.getFields()].filter((field) => field.isClickable());
   const [only] = fields;
   if (!this.workspace.isFlyout && this.outputConnection && fields.length === 1 && only) only.showEditor(event);
-  else act.call(this, event);
+  else basePerformAction.call(this, event);
 };
 
 /** Blockly asks for the drawn shape of a connection by this name, wherever it needs one. */
-interface Finds {
+interface HighlightFinder {
   findHighlightSvg(this: Blockly.RenderedConnection): SVGPathElement | null;
 }
-const finds = Blockly.RenderedConnection.prototype as unknown as Finds;
-const find = finds.findHighlightSvg;
-finds.findHighlightSvg = function (this: Blockly.RenderedConnection) {
+const connectionPrototype = Blockly.RenderedConnection.prototype as unknown as HighlightFinder;
+const baseFindHighlightSvg = connectionPrototype.findHighlightSvg;
+connectionPrototype.findHighlightSvg = function (this: Blockly.RenderedConnection) {
   pathOf(this.getSourceBlock())?.drawConnection(this);
-  return find.call(this);
+  return baseFindHighlightSvg.call(this);
 };

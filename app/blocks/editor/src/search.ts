@@ -7,35 +7,35 @@ import {t} from './words';
 
 export type Entry = Record<string, unknown>;
 
-function plain(words: string): string {
-  return words.normalize('NFKD').replace(/[\u0300-\u036f]/g, '').toLowerCase().replace(/’/g, '\'')
+function normalize(text: string): string {
+  return text.normalize('NFKD').replace(/[\u0300-\u036f]/g, '').toLowerCase().replace(/’/g, '\'')
     .replace(/\s+/g, ' ').trim();
 }
 
 /** Words of at least so many letters are found although one letter is wrong, missing or too many. */
-const LONG = 4;
+const MIN_FUZZY_LENGTH = 4;
 
 /** Whether two words differ by one letter at most, or by two neighbours that changed places. */
-function isNear(one: string, other: string): boolean {
-  const [short, long] = one.length <= other.length ? [one, other] : [other, one];
+function isSimilar(word: string, other: string): boolean {
+  const [short, long] = word.length <= other.length ? [word, other] : [other, word];
   if (long.length - short.length > 1) return false;
-  let at = 0;
-  while (at < short.length && short[at] === long[at]) at += 1;
+  let index = 0;
+  while (index < short.length && short[index] === long[index]) index += 1;
   const rest = (from: number) => long.slice(from);
-  if (short.length < long.length) return short.slice(at) === rest(at + 1);
-  return short.slice(at + 1) === rest(at + 1) ||
-    (short[at] === long[at + 1] && short[at + 1] === long[at] && short.slice(at + 2) === rest(at + 2));
+  if (short.length < long.length) return short.slice(index) === rest(index + 1);
+  return short.slice(index + 1) === rest(index + 1) ||
+    (short[index] === long[index + 1] && short[index + 1] === long[index] && short.slice(index + 2) === rest(index + 2));
 }
 
 /** Whether a word of the text begins nearly like this one. */
-function hasNear(text: string, wanted: string): boolean {
-  if (wanted.length < LONG) return false;
-  return text.split(' ').some((word) => word.length >= LONG - 1 && [0, -1, 1].some((more) =>
-    isNear(word.slice(0, wanted.length + more), wanted)));
+function hasSimilarWord(text: string, query: string): boolean {
+  if (query.length < MIN_FUZZY_LENGTH) return false;
+  return text.split(' ').some((word) => word.length >= MIN_FUZZY_LENGTH - 1 && [0, -1, 1].some((more) =>
+    isSimilar(word.slice(0, query.length + more), query)));
 }
 
 /** Where a word may be found, with what that is worth: on the block, in a choice of it, in lists of other words. */
-interface Searched {
+interface IndexedEntry {
   title: string;
   choices: string[];
   /** Words for which it comes before what is called so. */
@@ -45,28 +45,28 @@ interface Searched {
 }
 
 /** More than a block can have that is called so. */
-const LEADS = 15;
+const LEAD_SCORE = 15;
 /** Less than this is found in what is told about a block, not in what it is called. */
-const CALLED = 3;
+const MIN_TITLE_SCORE = 3;
 
-function searched(entry: Entry): Searched {
+function indexEntry(entry: Entry): IndexedEntry {
   const type = String(entry['type']);
   const help = helpFor(type);
-  const shown = Object.values((entry['fields'] ?? {}) as object).filter((each) => typeof each === 'string').join(' ');
+  const fieldText = Object.values((entry['fields'] ?? {}) as object).filter((value) => typeof value === 'string').join(' ');
   const name = String((entry['extraState'] as {name?: unknown} | undefined)?.name ?? '');
   const gaps = /\([^)]*\)|%\d+/g;
-  const title = plain(`${name} ${(help?.title ?? String(definitionOf(type)?.['message0'] ?? '')).replace(gaps, ' ')} ${shown}`);
-  const choices = (help?.choices ?? []).map(plain);
-  const list = (words: string) => plain(words.replace(/,/g, ' ').replace(/([^\s=])!/g, '$1'));
-  const leads = `${help?.words ?? ''}, ${help?.english ?? ''}`.split(',').map(plain)
-    .filter((each) => /[^!]!$/.test(each)).map((each) => each.slice(0, -1));
+  const title = normalize(`${name} ${(help?.title ?? String(definitionOf(type)?.['message0'] ?? '')).replace(gaps, ' ')} ${fieldText}`);
+  const choices = (help?.choices ?? []).map(normalize);
+  const list = (text: string) => normalize(text.replace(/,/g, ' ').replace(/([^\s=])!/g, '$1'));
+  const leads = `${help?.words ?? ''}, ${help?.english ?? ''}`.split(',').map(normalize)
+    .filter((phrase) => /[^!]!$/.test(phrase)).map((phrase) => phrase.slice(0, -1));
   return {
     title,
     choices,
     leads: new Set(leads),
     lists: [[title, 7, 6.5, 9], [choices.join(' '), 7, 5, 7], [list(help?.words ?? ''), 6, 5.5, 8],
       [list(help?.english ?? ''), 4, 3.5, 5]],
-    told: plain(`${help?.does ?? ''} ${help?.more ?? ''} ${help?.gaps.map(([, words]) => words).join(' ') ?? ''}`),
+    told: normalize(`${help?.does ?? ''} ${help?.more ?? ''} ${help?.gaps.map(([, words]) => words).join(' ') ?? ''}`),
   };
 }
 
@@ -76,19 +76,19 @@ function searched(entry: Entry): Searched {
  * A whole word is worth more than the beginning of one, and the first word more than the others: what a block begins
  * with, and what most people call it instead.
  */
-function worthOf({title, leads, lists, told}: Searched, word: string): number {
-  if (leads.has(word)) return LEADS;
-  const found = lists.map(([text, worth, ofBeginning, first]) => `${text} `.startsWith(`${word} `) ? first :
+function scoreOf({title, leads, lists, told}: IndexedEntry, word: string): number {
+  if (leads.has(word)) return LEAD_SCORE;
+  const scores = lists.map(([text, worth, ofBeginning, first]) => `${text} `.startsWith(`${word} `) ? first :
     ` ${text} `.includes(` ${word} `) ? worth : ` ${text}`.includes(` ${word}`) ? ofBeginning : 0);
-  if (found.some(Boolean)) return Math.max(...found);
-  if (word.length >= LONG - 1 && title.includes(word)) return CALLED;
+  if (scores.some(Boolean)) return Math.max(...scores);
+  if (word.length >= MIN_FUZZY_LENGTH - 1 && title.includes(word)) return MIN_TITLE_SCORE;
   return ` ${told}`.includes(` ${word}`) ? 1 : 0;
 }
 
-function nearWorthOf({lists}: Searched, word: string): number {
-  const found = lists.map(([text, worth, , first]) => !hasNear(text, word) ? 0 :
-    hasNear(text.split(' ', 1)[0] ?? '', word) ? first : worth);
-  return found.some(Boolean) ? CALLED + Math.max(...found) / 10 : 0;
+function fuzzyScoreOf({lists}: IndexedEntry, word: string): number {
+  const scores = lists.map(([text, worth, , first]) => !hasSimilarWord(text, word) ? 0 :
+    hasSimilarWord(text.split(' ', 1)[0] ?? '', word) ? first : worth);
+  return scores.some(Boolean) ? MIN_TITLE_SCORE + Math.max(...scores) / 10 : 0;
 }
 
 /**
@@ -97,35 +97,35 @@ function nearWorthOf({lists}: Searched, word: string): number {
  * The words may come in any order. One that nothing has may have a wrong letter. When nothing answers to all of them,
  * the blocks that are called by most of them do.
  */
-export function findEntries(entries: Entry[], words: string, most = 40): Entry[] {
-  const wanted = [...new Set(plain(words).split(/[\s,]+/).filter(Boolean))];
-  if (!wanted.length) return [];
-  const known = entries.map(searched);
-  const worths = wanted.map((word) => {
-    const exact = known.map((each) => worthOf(each, word));
-    return exact.some(Boolean) ? exact : known.map((each) => nearWorthOf(each, word));
+export function findEntries(entries: Entry[], query: string, limit = 40): Entry[] {
+  const queryWords = [...new Set(normalize(query).split(/[\s,]+/).filter(Boolean))];
+  if (!queryWords.length) return [];
+  const indexedEntries = entries.map(indexEntry);
+  const worths = queryWords.map((word) => {
+    const exact = indexedEntries.map((indexed) => scoreOf(indexed, word));
+    return exact.some(Boolean) ? exact : indexedEntries.map((indexed) => fuzzyScoreOf(indexed, word));
   });
-  const whole = wanted.join(' ');
-  const answers = entries.map((entry, place) => {
-    const own = worths.map((each) => each[place] ?? 0);
-    const {title, choices} = known[place] as Searched;
-    const begins = title.startsWith(whole) || choices.some((choice) => `${choice} `.startsWith(`${whole} `));
+  const fullQuery = queryWords.join(' ');
+  const results = entries.map((entry, index) => {
+    const scores = worths.map((wordScores) => wordScores[index] ?? 0);
+    const {title, choices} = indexedEntries[index] as IndexedEntry;
+    const begins = title.startsWith(fullQuery) || choices.some((choice) => `${choice} `.startsWith(`${fullQuery} `));
     return {
       entry,
-      answered: own.every(Boolean) ? wanted.length : own.filter((worth) => worth >= CALLED).length,
-      worth: own.reduce((sum, each) => sum + each, 0) / wanted.length + (begins ? 5 : 0),
+      answered: scores.every(Boolean) ? queryWords.length : scores.filter((worth) => worth >= MIN_TITLE_SCORE).length,
+      worth: scores.reduce((sum, score) => sum + score, 0) / queryWords.length + (begins ? 5 : 0),
     };
   });
-  const best = Math.max(...answers.map(({answered}) => answered));
-  return answers.filter(({answered}) => answered > 0 && answered === best)
-    .sort((one, other) => other.worth - one.worth)
-    .slice(0, most).map(({entry}) => entry);
+  const best = Math.max(...results.map(({answered}) => answered));
+  return results.filter(({answered}) => answered > 0 && answered === best)
+    .sort((result, other) => other.worth - result.worth)
+    .slice(0, limit).map(({entry}) => entry);
 }
 
 /** What stands on a block, without the blocks in it. */
-function wordsOf(block: Blockly.Block): string {
-  const own = block.inputList.flatMap((input) => input.fieldRow).map((field) => field.getText());
-  return plain(own.join(' '));
+function blockText(block: Blockly.Block): string {
+  const texts = block.inputList.flatMap((input) => input.fieldRow).map((field) => field.getText());
+  return normalize(texts.join(' '));
 }
 
 /**
@@ -136,40 +136,40 @@ function wordsOf(block: Blockly.Block): string {
  */
 export class FindBar {
   private readonly bar = document.createElement('div');
-  private readonly words = document.createElement('input');
+  private readonly input = document.createElement('input');
   private readonly count = document.createElement('span');
-  private found: Blockly.BlockSvg[] = [];
-  private at = -1;
+  private matches: Blockly.BlockSvg[] = [];
+  private currentIndex = -1;
   private timer = 0;
 
   constructor(private readonly workspace: () => Blockly.WorkspaceSvg) {
     this.bar.className = 'nepFind';
     this.bar.setAttribute('role', 'search');
     this.bar.hidden = true;
-    this.words.type = 'search';
-    this.words.placeholder = t('Find in blocks');
-    this.words.setAttribute('aria-label', t('Find in blocks'));
-    this.words.spellcheck = false;
+    this.input.type = 'search';
+    this.input.placeholder = t('Find in blocks');
+    this.input.setAttribute('aria-label', t('Find in blocks'));
+    this.input.spellcheck = false;
     this.count.setAttribute('role', 'status');
-    this.words.oninput = () => this.search();
+    this.input.oninput = () => this.search();
     this.bar.onkeydown = (event) => this.onKey(event);
-    this.bar.append(iconElement('search', 16), this.words, this.count,
-      this.button('arrow-up', t('Previous (Shift+Enter)'), () => this.step(-1)),
-      this.button('arrow-down', t('Next (Enter)'), () => this.step(1)),
-      this.button('x', t('Close (Esc)'), () => this.close()));
+    this.bar.append(iconElement('search', 16), this.input, this.count,
+      this.createButton('arrow-up', t('Previous (Shift+Enter)'), () => this.step(-1)),
+      this.createButton('arrow-down', t('Next (Enter)'), () => this.step(1)),
+      this.createButton('x', t('Close (Esc)'), () => this.close()));
     document.body.append(this.bar);
   }
 
   open(): void {
     const already = !this.bar.hidden;
     this.bar.hidden = false;
-    this.words.focus();
-    this.words.select();
-    if (!already || this.words.value) this.search();
+    this.input.focus();
+    this.input.select();
+    if (!already || this.input.value) this.search();
   }
 
   /** Another behaviour, or other blocks: look again when the bar is open. */
-  again(): void {
+  refresh(): void {
     if (this.bar.hidden) return;
     window.clearTimeout(this.timer);
     this.timer = window.setTimeout(() => this.search(false), 100);
@@ -177,61 +177,61 @@ export class FindBar {
 
   close(): void {
     if (this.bar.hidden) return;
-    const block = this.found[this.at];
+    const block = this.matches[this.currentIndex];
     this.bar.hidden = true;
-    this.mark([]);
+    this.setMatches([]);
     if (block && !block.isDeadOrDying()) Blockly.getFocusManager().focusNode(block);
     else Blockly.getFocusManager().focusTree(this.workspace());
   }
 
-  private button(icon: string, words: string, action: () => void): HTMLButtonElement {
-    const made = document.createElement('button');
-    made.type = 'button';
-    made.title = words;
-    made.setAttribute('aria-label', words);
-    made.append(iconElement(icon, 16));
-    made.onclick = action;
-    return made;
+  private createButton(icon: string, label: string, action: () => void): HTMLButtonElement {
+    const button = document.createElement('button');
+    button.type = 'button';
+    button.title = label;
+    button.setAttribute('aria-label', label);
+    button.append(iconElement(icon, 16));
+    button.onclick = action;
+    return button;
   }
 
   private onKey(event: KeyboardEvent): void {
     event.stopPropagation();
     if (event.key === 'Escape') this.close();
-    else if (event.key === 'Enter' && event.target === this.words) this.step(event.shiftKey ? -1 : 1);
+    else if (event.key === 'Enter' && event.target === this.input) this.step(event.shiftKey ? -1 : 1);
     else return;
     event.preventDefault();
   }
 
   private search(moves = true): void {
-    const wanted = plain(this.words.value);
-    const before = this.found[this.at];
-    const all = wanted ? this.workspace().getAllBlocks(true).filter((block) => !block.isInsertionMarker()) : [];
-    this.mark(all.filter((block) => wordsOf(block).includes(wanted)));
-    this.at = before ? this.found.indexOf(before) : -1;
-    if (this.at < 0 && moves && this.found.length) this.step(1);
-    else this.show();
+    const query = normalize(this.input.value);
+    const before = this.matches[this.currentIndex];
+    const all = query ? this.workspace().getAllBlocks(true).filter((block) => !block.isInsertionMarker()) : [];
+    this.setMatches(all.filter((block) => blockText(block).includes(query)));
+    this.currentIndex = before ? this.matches.indexOf(before) : -1;
+    if (this.currentIndex < 0 && moves && this.matches.length) this.step(1);
+    else this.render();
   }
 
-  private mark(blocks: Blockly.BlockSvg[]): void {
-    for (const block of this.found) block.getSvgRoot()?.classList.remove('nepFound', 'nepFoundNow');
-    this.found = blocks;
-    this.at = -1;
+  private setMatches(blocks: Blockly.BlockSvg[]): void {
+    for (const block of this.matches) block.getSvgRoot()?.classList.remove('nepFound', 'nepFoundNow');
+    this.matches = blocks;
+    this.currentIndex = -1;
     for (const block of blocks) block.getSvgRoot().classList.add('nepFound');
   }
 
   private step(by: number): void {
-    if (this.found.length) {
-      this.at = (this.at + by + this.found.length + (this.at < 0 && by < 0 ? 1 : 0)) % this.found.length;
-      const block = this.found[this.at];
+    if (this.matches.length) {
+      this.currentIndex = (this.currentIndex + by + this.matches.length + (this.currentIndex < 0 && by < 0 ? 1 : 0)) % this.matches.length;
+      const block = this.matches[this.currentIndex];
       if (block && !block.isDeadOrDying()) this.workspace().centerOnBlock(block.id, true);
     }
-    this.show();
+    this.render();
   }
 
-  private show(): void {
-    this.found.forEach((block, number) => block.getSvgRoot()?.classList.toggle('nepFoundNow', number === this.at));
-    this.count.textContent = !this.words.value.trim() ? '' :
-      this.found.length ? t('{number} of {count}', {number: this.at + 1, count: this.found.length}) : t('No results');
-    this.bar.classList.toggle('none', Boolean(this.words.value.trim()) && !this.found.length);
+  private render(): void {
+    this.matches.forEach((block, number) => block.getSvgRoot()?.classList.toggle('nepFoundNow', number === this.currentIndex));
+    this.count.textContent = !this.input.value.trim() ? '' :
+      this.matches.length ? t('{number} of {count}', {number: this.currentIndex + 1, count: this.matches.length}) : t('No results');
+    this.bar.classList.toggle('none', Boolean(this.input.value.trim()) && !this.matches.length);
   }
 }

@@ -7,13 +7,13 @@ import {t} from './words';
 export const SEARCH = 'nepSearch';
 
 /** Blocks are made for a word, not for each letter of it: when no other came for so long. */
-const QUIET_MS = 80;
+const DEBOUNCE_MS = 80;
 /** As high as a block in the toolbox is at least, with what is free below it. */
 const BLOCK_HEIGHT = 50;
 const SHOW_ALL = 'SHOW_ALL_FOUND';
 
 /** What the field needs of the toolbox in which it stands. */
-interface SearchedToolbox {
+interface SearchableToolbox {
   allEntries(): Entry[];
   showFound(entries: unknown[] | null): void;
   showAllFound(entries: unknown[], before: number): void;
@@ -21,7 +21,7 @@ interface SearchedToolbox {
 }
 
 /** The words in a search field, which of them are selected, and whether their blocks are still to be shown. */
-interface Query {
+interface SearchState {
   words: string;
   selection: [start: number, end: number];
   hasFocus: boolean;
@@ -41,19 +41,19 @@ export class SearchItem extends Blockly.ToolboxItem {
     this.field.spellcheck = false;
     this.field.setAttribute('aria-label', t('Find a block: type words and press Enter to select the first result'));
     this.field.title = t('Find a block');
-    this.field.onfocus = () => this.dress();
+    this.field.onfocus = () => this.updateExpanded();
     this.field.onblur = () => {
       // Who goes elsewhere in the page wants that; another window takes the keys as well.
-      if (document.hasFocus()) this.forgetWaiting();
-      this.dress();
+      if (document.hasFocus()) this.cancelSearch();
+      this.updateExpanded();
     };
-    this.field.oninput = () => this.showSoon();
+    this.field.oninput = () => this.scheduleSearch();
     this.field.onkeydown = (event) => this.onKey(event);
     // Otherwise the toolbox takes it for a click beside its categories and closes the blocks.
     this.div.onpointerdown = (event) => event.stopPropagation();
     this.div.append(iconElement('search', 16), this.field);
     this.parentToolbox_.getWorkspace().registerButtonCallback(SHOW_ALL, () => {
-      this.toolbox.showAllFound(this.found(), this.atFirst);
+      this.toolbox.showAllFound(this.getMatches(), this.atFirst);
     });
   }
 
@@ -66,24 +66,24 @@ export class SearchItem extends Blockly.ToolboxItem {
   }
 
   override dispose(): void {
-    this.forgetWaiting();
+    this.cancelSearch();
     this.div.remove();
   }
 
   focus(): void {
     this.field.focus();
     this.field.select();
-    if (this.field.value) this.show();
+    if (this.field.value) this.showResults();
   }
 
   clear(): void {
-    this.forgetWaiting();
+    this.cancelSearch();
     this.field.value = '';
-    this.dress();
+    this.updateExpanded();
   }
 
   /** Its words and its focus, for the field that replaces it. */
-  get query(): Query {
+  get query(): SearchState {
     const {value, selectionStart, selectionEnd} = this.field;
     return {
       words: value,
@@ -94,49 +94,49 @@ export class SearchItem extends Blockly.ToolboxItem {
   }
 
   /** Takes the place of a field that had these words and this focus. */
-  restore({words, selection, hasFocus, isPending}: Query): void {
+  restore({words, selection, hasFocus, isPending}: SearchState): void {
     this.field.value = words;
     if (hasFocus) this.field.focus();
     this.field.setSelectionRange(...selection);
-    this.dress();
-    if (isPending) this.showSoon();
+    this.updateExpanded();
+    if (isPending) this.scheduleSearch();
   }
 
   /** Shows again which blocks the words find. */
   refresh(): void {
-    if (this.field.value.trim()) this.show();
+    if (this.field.value.trim()) this.showResults();
   }
 
   /** While somebody looks for a block, a toolbox of tiles is whole. */
-  private dress(): void {
-    const whole = document.activeElement === this.field || this.field.value !== '';
+  private updateExpanded(): void {
+    const isExpanded = document.activeElement === this.field || this.field.value !== '';
     const box = this.div.closest('.blocklyToolbox');
-    if (!box || box.classList.contains('nepWhole') === whole) return;
-    box.classList.toggle('nepWhole', whole);
+    if (!box || box.classList.contains('nepWhole') === isExpanded) return;
+    box.classList.toggle('nepWhole', isExpanded);
     const workspace = this.parentToolbox_.getWorkspace();
     if (workspace.getParentSvg().isConnected) Blockly.svgResize(workspace);
   }
 
-  private get toolbox(): SearchedToolbox {
-    return this.parentToolbox_ as unknown as SearchedToolbox;
+  private get toolbox(): SearchableToolbox {
+    return this.parentToolbox_ as unknown as SearchableToolbox;
   }
 
-  private showSoon(): void {
-    this.forgetWaiting();
-    this.waiting = window.setTimeout(() => this.show(), QUIET_MS);
+  private scheduleSearch(): void {
+    this.cancelSearch();
+    this.waiting = window.setTimeout(() => this.showResults(), DEBOUNCE_MS);
   }
 
   /** Shows what was typed, if it was not yet. */
-  private showWaiting(): void {
-    if (this.waiting) this.show();
+  private flushSearch(): void {
+    if (this.waiting) this.showResults();
   }
 
-  private forgetWaiting(): void {
+  private cancelSearch(): void {
     window.clearTimeout(this.waiting);
     this.waiting = 0;
   }
 
-  private found(): Entry[] {
+  private getMatches(): Entry[] {
     return findEntries(this.toolbox.allEntries(), this.field.value);
   }
 
@@ -146,20 +146,20 @@ export class SearchItem extends Blockly.ToolboxItem {
     return Math.max(8, Math.ceil(height / BLOCK_HEIGHT) + 1);
   }
 
-  private show(): void {
-    this.forgetWaiting();
-    const words = this.field.value;
-    if (!words.trim()) {
+  private showResults(): void {
+    this.cancelSearch();
+    const query = this.field.value;
+    if (!query.trim()) {
       this.toolbox.showFound(null);
       return;
     }
-    const found = this.found();
-    const none = [t('No blocks match “{words}”', {words: words.trim()}), t('Try a simpler word, such as “turn” or “say”,'),
+    const entries = this.getMatches();
+    const none = [t('No blocks match “{words}”', {words: query.trim()}), t('Try a simpler word, such as “turn” or “say”,'),
       t('or browse the categories.')].map((text) => ({kind: 'label', text, gap: 8}));
     const {atFirst} = this;
-    const number = found.length - atFirst;
+    const number = entries.length - atFirst;
     const more = {kind: 'button', text: t('Show {number} more', {number}), callbackkey: SHOW_ALL};
-    this.toolbox.showFound(!found.length ? none : number > 0 ? [...found.slice(0, atFirst), more] : found);
+    this.toolbox.showFound(!entries.length ? none : number > 0 ? [...entries.slice(0, atFirst), more] : entries);
   }
 
   private onKey(event: KeyboardEvent): void {
@@ -169,18 +169,18 @@ export class SearchItem extends Blockly.ToolboxItem {
       this.toolbox.showFound(null);
       Blockly.getFocusManager().focusTree(this.parentToolbox_.getWorkspace());
     } else if (event.key === 'Enter' || event.key === 'ArrowDown') {
-      this.showWaiting();
+      this.flushSearch();
       this.toolbox.enterFound(event.key === 'Enter' ? event : null);
     } else {
-      if (event.key === 'Tab') this.showWaiting();
-      if (event.key === 'Tab' && event.shiftKey) this.leaveBackwards();
+      if (event.key === 'Tab') this.flushSearch();
+      if (event.key === 'Tab' && event.shiftKey) this.focusPrevious();
       return;
     }
     event.preventDefault();
   }
 
   /** The toolbox around the field would get the keys next and give them to a category, which leads back to here. */
-  private leaveBackwards(): void {
+  private focusPrevious(): void {
     const box = this.div.closest<HTMLElement>('.blocklyToolbox');
     if (!box) return;
     box.tabIndex = -1;

@@ -15,41 +15,41 @@ export function isNote(item: unknown): item is Note {
 }
 
 /** How far the mouse may move and the press still be a click, in pixels. */
-const STILL = 5;
+const CLICK_TOLERANCE_PX = 5;
 /** The top of a block that holds others: a frame that touches it means the block, one further down what is inside. */
-const HEAD = 48;
+const HEADER_HEIGHT = 48;
 
 const selections = new WeakMap<Blockly.Workspace, Selection>();
 
 export class Selection {
-  private chosen = new Set<Item>();
+  private selectedItems = new Set<Item>();
   /** What the mouse is in the middle of: a press on a block that waits to be a click. */
   private pressed: {x: number; y: number; item: Item; toggles: boolean; before: Item | null} | null = null;
 
   constructor(readonly workspace: Blockly.WorkspaceSvg) {
     selections.set(workspace, this);
-    const place = workspace.getInjectionDiv();
-    place.addEventListener('pointerdown', (event) => this.onDown(event), true);
-    place.addEventListener('pointerup', (event) => this.onUp(event), true);
-    place.addEventListener('keydown', (event) => {
-      if (event.key === 'Escape' && !workspace.isDragging() && !Blockly.getFocusManager().ephemeralFocusTaken()) this.letGo();
+    const injectionDiv = workspace.getInjectionDiv();
+    injectionDiv.addEventListener('pointerdown', (event) => this.onDown(event), true);
+    injectionDiv.addEventListener('pointerup', (event) => this.onUp(event), true);
+    injectionDiv.addEventListener('keydown', (event) => {
+      if (event.key === 'Escape' && !workspace.isDragging() && !Blockly.getFocusManager().ephemeralFocusTaken()) this.clear();
     });
     workspace.addChangeListener((event) => {
-      if (event instanceof Blockly.Events.Click && event.targetType === 'workspace') this.letGo();
+      if (event instanceof Blockly.Events.Click && event.targetType === 'workspace') this.clear();
     });
   }
 
   /** More than one, or none; the blocks in the order in which they are read, then the notes. */
   get items(): Item[] {
-    if ([...this.chosen].some((each) => each.isDeadOrDying())) this.show([...this.chosen].filter((each) => !each.isDeadOrDying()));
-    return this.chosen.size > 1 ? [...this.chosen] : [];
+    if ([...this.selectedItems].some((item) => item.isDeadOrDying())) this.setSelectedItems([...this.selectedItems].filter((item) => !item.isDeadOrDying()));
+    return this.selectedItems.size > 1 ? [...this.selectedItems] : [];
   }
 
   /** Chooses exactly these: one is selected as by a click, of several one has the keys. */
-  choose(items: Iterable<Item>): void {
+  select(items: Iterable<Item>): void {
     const all = [...new Set(items)];
-    const outermost = [...withoutInner(new Set(blocksIn(all))), ...all.filter(isNote)];
-    this.show(outermost.length > 1 ? outermost : []);
+    const outermost = [...getOutermostBlocks(new Set(blocksIn(all))), ...all.filter(isNote)];
+    this.setSelectedItems(outermost.length > 1 ? outermost : []);
     const [first] = outermost;
     const focused = Blockly.getFocusManager().getFocusedNode();
     if (outermost.includes(focused as Item)) return;
@@ -58,27 +58,27 @@ export class Selection {
   }
 
   /** Shows which are chosen, without moving the keys: while a frame is drawn. */
-  show(items: Iterable<Item>): void {
+  setSelectedItems(items: Iterable<Item>): void {
     const now = new Set(items);
-    for (const each of this.chosen) if (!now.has(each) && !each.isDeadOrDying()) outline(each, false);
-    for (const each of now) if (!this.chosen.has(each)) outline(each, true);
-    this.chosen = now;
+    for (const item of this.selectedItems) if (!now.has(item) && !item.isDeadOrDying()) setSelectedStyle(item, false);
+    for (const item of now) if (!this.selectedItems.has(item)) setSelectedStyle(item, true);
+    this.selectedItems = now;
   }
 
-  letGo(): void {
-    if (this.chosen.size) this.show([]);
+  clear(): void {
+    if (this.selectedItems.size) this.setSelectedItems([]);
   }
 
   /** The chosen note that this is, or the block that it is or is inside of. */
-  around(item: Item | null): Item | null {
-    if (isNote(item)) return this.chosen.has(item) ? item : null;
-    for (let each = item; each; each = each.getSurroundParent()) if (this.chosen.has(each)) return each;
+  findSelectedAncestor(item: Item | null): Item | null {
+    if (isNote(item)) return this.selectedItems.has(item) ? item : null;
+    for (let block = item; block; block = block.getSurroundParent()) if (this.selectedItems.has(block)) return block;
     return null;
   }
 
   /** The keys went to it, by a click or by arrow keys: the others are let go when it is none of them. */
-  focused(item: Item): void {
-    if (this.chosen.size && !this.pressed?.toggles && !this.around(item)) this.letGo();
+  onFocus(item: Item): void {
+    if (this.selectedItems.size && !this.pressed?.toggles && !this.findSelectedAncestor(item)) this.clear();
   }
 
   private onDown(event: PointerEvent): void {
@@ -87,7 +87,7 @@ export class Selection {
     const id = event.target.closest('.blocklyDraggable')?.getAttribute('data-id');
     const under = id ? this.workspace.getBlockById(id) ?? this.workspace.getCommentById(id) : null;
     if (!isItem(under) || event.target.closest('.blocklyFlyout, textarea')) return;
-    const item = this.around(under) ?? (isNote(under) ? under : withoutShadow(under));
+    const item = this.findSelectedAncestor(under) ?? (isNote(under) ? under : getNonShadowBlock(under));
     const before = Blockly.common.getSelected();
     this.pressed = {x: event.clientX, y: event.clientY, item,
       toggles: event.shiftKey || event.ctrlKey || event.metaKey,
@@ -97,21 +97,21 @@ export class Selection {
   private onUp(event: PointerEvent): void {
     const {pressed} = this;
     if (!pressed) return;
-    const still = Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) < STILL;
-    if (still && !this.workspace.isDragging()) {
+    const isClick = Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) < CLICK_TOLERANCE_PX;
+    if (isClick && !this.workspace.isDragging()) {
       if (pressed.toggles) {
         this.workspace.getGesture(event)?.cancel();  // a click would open the field below the mouse
         this.toggle(pressed.item, pressed.before);
-      } else if (event.button === 0) this.letGo();
+      } else if (event.button === 0) this.clear();
     }
     this.pressed = null;
   }
 
   private toggle(item: Item, before: Item | null): void {
-    const now = new Set(this.chosen);
+    const now = new Set(this.selectedItems);
     if (!now.size && before && before !== item) now.add(before);
     if (!now.delete(item)) now.add(item);
-    this.choose(now);
+    this.select(now);
     if (now.has(item)) Blockly.getFocusManager().focusNode(item);
   }
 }
@@ -120,50 +120,50 @@ function isItem(item: unknown): item is Item {
   return item instanceof Blockly.BlockSvg || isNote(item);
 }
 
-function outline(item: Item, chosen: boolean): void {
-  if (isNote(item)) item.getSvgRoot().classList.toggle('nepChosen', chosen);
-  else pathOf(item)?.setChosen(chosen);
+function setSelectedStyle(item: Item, isSelected: boolean): void {
+  if (isNote(item)) item.getSvgRoot().classList.toggle('nepChosen', isSelected);
+  else pathOf(item)?.setMultiSelected(isSelected);
 }
 
 function blocksIn(items: readonly Item[]): Block[] {
-  return items.filter((each): each is Block => !isNote(each));
+  return items.filter((item): item is Block => !isNote(item));
 }
 
-function withoutShadow(block: Block): Block {
+function getNonShadowBlock(block: Block): Block {
   let real = block;
   while (real.isShadow() && real.getParent()) real = real.getParent()!;
   return real;
 }
 
 /** In the order of reading; what is inside another chosen one goes with it anyway. */
-function withoutInner(blocks: ReadonlySet<Block>): Block[] {
+function getOutermostBlocks(blocks: ReadonlySet<Block>): Block[] {
   if (blocks.size < 2) return [...blocks];
-  const found: Block[] = [];
+  const outermost: Block[] = [];
   const [first] = blocks;
   const walk = (block: Block | null) => {
-    for (let each = block; each; each = each.getNextBlock()) {
-      if (blocks.has(each)) found.push(each);
-      else for (const child of each.getChildren(true)) if (child !== each.getNextBlock()) walk(child);
+    for (let current = block; current; current = current.getNextBlock()) {
+      if (blocks.has(current)) outermost.push(current);
+      else for (const child of current.getChildren(true)) if (child !== current.getNextBlock()) walk(child);
     }
   };
   for (const top of first?.workspace.getTopBlocks(true) ?? []) walk(top);
-  return found;
+  return outermost;
 }
 
 /** All blocks and notes that are chosen together with this one; none when it is not one of several. */
-export function allChosenWith(item: Item | null | undefined): Item[] {
+export function getSelectedItemsWith(item: Item | null | undefined): Item[] {
   const selection = item ? selections.get(item.workspace) : undefined;
-  return selection?.around(item ?? null) ? selection.items : [];
+  return selection?.findSelectedAncestor(item ?? null) ? selection.items : [];
 }
 
 /** The blocks among them. */
-export function chosenWith(item: Item | null | undefined): Block[] {
-  return blocksIn(allChosenWith(item));
+export function getSelectedBlocksWith(item: Item | null | undefined): Block[] {
+  return blocksIn(getSelectedItemsWith(item));
 }
 
 /** The notes among them. */
-export function notesChosenWith(item: Item | null | undefined): Note[] {
-  return allChosenWith(item).filter(isNote);
+export function getSelectedNotesWith(item: Item | null | undefined): Note[] {
+  return getSelectedItemsWith(item).filter(isNote);
 }
 
 export function selectionOf(workspace: Blockly.Workspace): Selection | undefined {
@@ -171,22 +171,22 @@ export function selectionOf(workspace: Blockly.Workspace): Selection | undefined
 }
 
 /** Chosen blocks that hang below each other, together; the topmost first. */
-export function runsOf(blocks: readonly Block[]): Block[][] {
-  const chosen = new Set(blocks);
-  return blocks.filter((each) => !chosen.has(each.getPreviousBlock() as Block) || each.getPreviousBlock()?.getNextBlock() !== each)
-    .map((head) => {
+export function groupIntoStacks(blocks: readonly Block[]): Block[][] {
+  const selected = new Set(blocks);
+  return blocks.filter((block) => !selected.has(block.getPreviousBlock() as Block) || block.getPreviousBlock()?.getNextBlock() !== block)
+    .map((first) => {
       const run: Block[] = [];
-      for (let each: Block | null = head; each && chosen.has(each); each = each.getNextBlock()) run.push(each);
+      for (let current: Block | null = first; current && selected.has(current); current = current.getNextBlock()) run.push(current);
       return run;
     });
 }
 
 /** How many blocks a person sees in them: grey values in gaps are none. */
-export function countIn(blocks: readonly Block[]): number {
+export function countBlocks(blocks: readonly Block[]): number {
   let count = 0;
   for (const block of blocks) {
     const below = new Set(block.getNextBlock()?.getDescendants(false) ?? []);
-    count += block.getDescendants(false).filter((each) => !each.isShadow() && !below.has(each)).length;
+    count += block.getDescendants(false).filter((descendant) => !descendant.isShadow() && !below.has(descendant)).length;
   }
   return count;
 }
@@ -205,7 +205,7 @@ export function areasOf(workspace: Blockly.WorkspaceSvg): Area[] {
   const add = (block: Block) => {
     const {x, y} = block.previousConnection ?? block.outputConnection ?? block.getRelativeToSurfaceXY();
     const holds = !block.isCollapsed() && block.inputList.some((input) => input.type === Blockly.inputs.inputTypes.STATEMENT);
-    const bottom = y + (holds ? Math.min(block.height, HEAD) : block.height);
+    const bottom = y + (holds ? Math.min(block.height, HEADER_HEIGHT) : block.height);
     areas.push({item: block, left: x, top: y, right: x + block.childlessWidth, bottom});
     if (!holds) return;
     for (const input of block.inputList) {
@@ -213,7 +213,7 @@ export function areasOf(workspace: Blockly.WorkspaceSvg): Area[] {
     }
   };
   const walk = (first: Block | null) => {
-    for (let each = first; each; each = each.getNextBlock()) if (!each.isShadow()) add(each);
+    for (let block = first; block; block = block.getNextBlock()) if (!block.isShadow()) add(block);
   };
   for (const top of workspace.getTopBlocks(true)) walk(top);
   for (const item of workspace.getTopComments().filter(isNote)) {
@@ -223,38 +223,38 @@ export function areasOf(workspace: Blockly.WorkspaceSvg): Area[] {
   return areas;
 }
 
-const focus = Blockly.BlockSvg.prototype.onNodeFocus;
+const baseOnNodeFocus = Blockly.BlockSvg.prototype.onNodeFocus;
 Blockly.BlockSvg.prototype.onNodeFocus = function (this: Block) {
-  focus.call(this);
-  selections.get(this.workspace)?.focused(this);
+  baseOnNodeFocus.call(this);
+  selections.get(this.workspace)?.onFocus(this);
 };
 
-const focusNote = Blockly.comments.RenderedWorkspaceComment.prototype.onNodeFocus;
+const baseNoteOnNodeFocus = Blockly.comments.RenderedWorkspaceComment.prototype.onNodeFocus;
 Blockly.comments.RenderedWorkspaceComment.prototype.onNodeFocus = function (this: Note) {
-  focusNote.call(this);
-  selections.get(this.workspace)?.focused(this);
+  baseNoteOnNodeFocus.call(this);
+  selections.get(this.workspace)?.onFocus(this);
 };
 
 /** Deleting one of several deletes them all, as one step; whether it was one of several. */
-export function removeChosenWith(item: Item): boolean {
-  const chosen = allChosenWith(item).filter((each) => each.isDeletable());
-  if (!chosen.length) return false;
+export function deleteSelectionWith(item: Item): boolean {
+  const items = getSelectedItemsWith(item).filter((selected) => selected.isDeletable());
+  if (!items.length) return false;
   const {workspace} = item;
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
   workspace.hideChaff();
-  removeAll(runsOf(blocksIn(chosen)), chosen.filter(isNote));
+  removeAll(groupIntoStacks(blocksIn(items)), items.filter(isNote));
   Blockly.Events.setGroup(group);
   return true;
 }
 
-const remove = Blockly.BlockSvg.prototype.checkAndDelete;
+const baseCheckAndDelete = Blockly.BlockSvg.prototype.checkAndDelete;
 Blockly.BlockSvg.prototype.checkAndDelete = function (this: Block) {
-  if (!removeChosenWith(this)) remove.call(this);
+  if (!deleteSelectionWith(this)) baseCheckAndDelete.call(this);
 };
 
 /** Blockly's key deletes only the note that has the keys. */
 export function deleteByKey(): boolean {
   const focused = Blockly.getFocusManager().getFocusedNode();
-  return isNote(focused) && removeChosenWith(focused);
+  return isNote(focused) && deleteSelectionWith(focused);
 }

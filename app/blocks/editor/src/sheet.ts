@@ -5,17 +5,17 @@ import {iconElement} from './icons';
 import {t} from './words';
 
 /** Room for the buttons below the sheet. */
-const FOOT = 64;
+const FOOTER_HEIGHT = 64;
 
 /** A sheet is open for a moment only: it closes with the next thing that is done elsewhere. */
 export abstract class Sheet extends Flyout {
-  protected override leaveRoom(): void {}
+  protected override updateOverlayOffset(): void {}
 
-  protected override readonly foot = FOOT;
+  protected override readonly footerHeight = FOOTER_HEIGHT;
   protected override readonly name: string = 'nepSheet';
 
   /** What Enter or a click on a stack of blocks in it does. */
-  abstract take(block: Blockly.BlockSvg): void;
+  abstract pick(block: Blockly.BlockSvg): void;
 
   /** What Delete on it does. */
   remove(_block: Blockly.BlockSvg): void {}
@@ -35,7 +35,7 @@ export abstract class Sheet extends Flyout {
     Blockly.getFocusManager().focusNode(first);
   }
 
-  protected override makeButton(): HTMLButtonElement {
+  protected override createHeaderButton(): HTMLButtonElement {
     const close = document.createElement('button');
     close.type = 'button';
     close.title = t('Close (Esc)');
@@ -49,7 +49,7 @@ export abstract class Sheet extends Flyout {
 const sheets = new Map<Blockly.WorkspaceSvg, Sheet>();
 
 /** Puts a new sheet beside the canvas of `workspace`. */
-export function openable<S extends Sheet>(workspace: Blockly.WorkspaceSvg, make: (options: Blockly.Options) => S): S {
+export function createSheet<S extends Sheet>(workspace: Blockly.WorkspaceSvg, make: (options: Blockly.Options) => S): S {
   const options = workspace.copyOptionsForFlyout();
   options.toolboxPosition = Blockly.utils.toolbox.Position.RIGHT;
   const sheet = make(options);
@@ -71,22 +71,22 @@ export function sheetOf(block: Blockly.Block | null | undefined): Sheet | null {
 }
 
 /** Enter on a block in a sheet takes it. */
-const act = Blockly.BlockSvg.prototype.performAction;
+const basePerformAction = Blockly.BlockSvg.prototype.performAction;
 Blockly.BlockSvg.prototype.performAction = function (this: Blockly.BlockSvg, event?: KeyboardEvent) {
   const sheet = sheetOf(this);
-  if (sheet) sheet.take(this.getRootBlock());
-  else act.call(this, event);
+  if (sheet) sheet.pick(this.getRootBlock());
+  else basePerformAction.call(this, event);
 };
 
 /** So does a click: whether this block was one in a sheet. */
-export function takeClicked(block: Blockly.BlockSvg | null): boolean {
+export function activateClicked(block: Blockly.BlockSvg | null): boolean {
   const sheet = sheetOf(block);
-  if (sheet && block) sheet.take(block.getRootBlock());
+  if (sheet && block) sheet.pick(block.getRootBlock());
   return sheet !== null;
 }
 
 /** A click on a field there takes the stack as well: what waits is not edited. */
-const clickable = Blockly.Field.prototype.isClickableInFlyout;
+const baseIsClickableInFlyout = Blockly.Field.prototype.isClickableInFlyout;
 Blockly.Field.prototype.isClickableInFlyout = function (this: Blockly.Field, closes: boolean) {
-  return !sheetOf(this.getSourceBlock()) && clickable.call(this, closes);
+  return !sheetOf(this.getSourceBlock()) && baseIsClickableInFlyout.call(this, closes);
 };

@@ -2,21 +2,21 @@
 import * as Blockly from 'blockly/core';
 import {Backpack} from './backpack';
 import {Bin} from './bin';
-import type {Leaving} from './carrying';
+import type {OutgoingDrag} from './carrying';
 import {CHECKER} from './checker';
 import {FieldChoice} from './choices';
 import {Culling} from './culling';
-import {foldOnDoubleClick} from './folding';
-import {Frame} from './frame';
-import {DRAGGER, listenToDrags} from './drag';
+import {collapseOnDoubleClick} from './folding';
+import {Marquee} from './frame';
+import {DRAGGER, setDragListener} from './drag';
 import {Functions} from './functions';
-import {FLYOUT, Flyout, SCALE} from './flyout';
-import {WrongDrops} from './wrong_drop';
+import {FLYOUT, Flyout, DEFAULT_SCALE} from './flyout';
+import {RejectedDrops} from './wrong_drop';
 import {Variables} from './variables';
 import {visibleSensors, observeFlyout} from './visible_sensors';
-import {keepInsideMarks} from './inside_marks';
+import {registerInsideMarks} from './inside_marks';
 import {keepNotesReadable} from './notes';
-import {Program, holdsAny} from './program';
+import {Program, hasBlockOfTypes} from './program';
 import {RENDERER} from './renderer';
 import {type Item, Selection} from './selection';
 import {Overlays} from './overlays';
@@ -45,7 +45,7 @@ export interface TabListener {
   /** These in the hand are outside of the page, there; null: they are not any more. */
   outside(mouse: Blockly.utils.Coordinate | null, items?: readonly Item[]): void;
   /** It was let go there. */
-  letGoOutside(tab: Tab, what: Leaving, mouse: Blockly.utils.Coordinate): void;
+  letGoOutside(tab: Tab, leaving: OutgoingDrag, mouse: Blockly.utils.Coordinate): void;
   /** A drag is over; see `DragListener`. */
   dragEnded(placed: boolean, copies: boolean): void;
 }
@@ -60,7 +60,7 @@ export class Tab {
   private readonly functions: Functions;
   private readonly variables: Variables;
   private readonly culling: Culling;
-  private readonly wrongDrops: WrongDrops;
+  private readonly rejectedDrops: RejectedDrops;
   key = '';
   generation = 0;
   private readonly frame = document.createElement('div');
@@ -70,9 +70,9 @@ export class Tab {
   private choicesOutdated = false;
   private themeOutdated = false;
 
-  constructor(place: HTMLElement, listener: TabListener) {
+  constructor(container: HTMLElement, listener: TabListener) {
     this.frame.className = 'nepTab';
-    place.append(this.frame);
+    container.append(this.frame);
     this.workspace = Blockly.inject(this.frame, {
       media: 'media/', renderer: RENDERER, sounds: false, trashcan: false, theme: makeTheme(),
       toolbox: {kind: 'categoryToolbox', contents: []},
@@ -81,7 +81,7 @@ export class Tab {
         [Blockly.registry.Type.CONNECTION_CHECKER.toString()]: CHECKER},
       grid: {spacing: 28, length: 2, snap: true, colour: 'transparent'},
       move: {scrollbars: true, drag: true, wheel: true},
-      zoom: {controls: false, wheel: true, pinch: true, startScale: SCALE, minScale: 0.3, maxScale: 2},
+      zoom: {controls: false, wheel: true, pinch: true, startScale: DEFAULT_SCALE, minScale: 0.3, maxScale: 2},
     });
     this.culling = new Culling(this.workspace);
     this.program = new Program(this.workspace, this.culling, {
@@ -91,31 +91,31 @@ export class Tab {
     });
     this.overlays = new Overlays(this.workspace);
     this.functions = new Functions(this.workspace);
-    foldOnDoubleClick(this.workspace);
-    new Frame(this.workspace, new Selection(this.workspace));
+    collapseOnDoubleClick(this.workspace);
+    new Marquee(this.workspace, new Selection(this.workspace));
     keepNotesReadable(this.workspace);
-    keepInsideMarks(this.workspace);
+    registerInsideMarks(this.workspace);
     new TryHandle(this.workspace);
     this.variables = new Variables(this.workspace);
     this.bin = new Bin(this.workspace, {deleted: (count) => listener.deleted(this, count), changed: () => listener.binned(this)});
     this.backpack = new Backpack(this.workspace);
-    this.wrongDrops = new WrongDrops(this.workspace);
-    listenToDrags(this.workspace, {
+    this.rejectedDrops = new RejectedDrops(this.workspace);
+    setDragListener(this.workspace, {
       overDelete: (mouse) => this.bin.showHint(mouse),
-      letGo: (block, mouse) => this.wrongDrops.explain(block, mouse),
-      putDown: (block, meant) => this.wrongDrops.explainAt(block, meant),
+      letGo: (block, mouse) => this.rejectedDrops.explainDrop(block, mouse),
+      putDown: (block, target) => this.rejectedDrops.explainKeyboardDrop(block, target),
       outside: (mouse, items) => listener.outside(mouse, items),
       ended: (placed, copies) => listener.dragEnded(placed, copies),
-      letGoOutside: (what, mouse) => listener.letGoOutside(this, what, mouse),
+      letGoOutside: (leaving, mouse) => listener.letGoOutside(this, leaving, mouse),
     });
     const toolbox = this.workspace.getToolbox();
-    if (toolbox instanceof Toolbox) toolbox.onFound = () => this.overlays.showLive();
+    if (toolbox instanceof Toolbox) toolbox.onResultsShown = () => this.overlays.renderLiveValues();
     const flyout = this.workspace.getFlyout();
     if (flyout) observeFlyout(flyout, () => listener.offered(this));
     registerVariableButtons(this.workspace);
     this.watched = new WatchedValues(this.workspace, this.frame, {
       changed: () => {
-        this.program.touched();
+        this.program.scheduleFlush();
         listener.watched(this);
       },
     });
@@ -125,18 +125,18 @@ export class Tab {
 
   /** Shows another program here, with an empty history. */
   load(generation: number, state: Record<string, unknown>): void {
-    this.letGo();
+    this.cancelInteraction();
     this.program.load(state);
     this.functions.refresh();
     this.variables.refresh();
     this.generation = generation;
-    this.overlays.forget();
-    this.bin.forget();
+    this.overlays.reset();
+    this.bin.clear();
   }
 
   /** Another program in the place of this one, as an edit that can be undone. */
   change(state: Record<string, unknown>): void {
-    this.letGo();
+    this.cancelInteraction();
     this.program.change(state);
     this.functions.refresh();
     this.variables.refresh();
@@ -150,13 +150,13 @@ export class Tab {
     Blockly.clipboard.setLastCopiedWorkspace(this.workspace);
     this.resize();
     this.update();
-    this.program.tellHistory(true);
+    this.program.notifyHistory(true);
   }
 
   /** The page has another size. */
   resize(): void {
     Blockly.svgResize(this.workspace);
-    this.culling.lookSoon();
+    this.culling.scheduleUpdate();
   }
 
   /** Keeps the blocks of a category open, or not; `closes`: what is open does not stay until the next click. */
@@ -167,24 +167,24 @@ export class Tab {
 
   /** Tells the newest edits and takes it off the screen; what is told to it meanwhile waits until `show`. */
   hide(): void {
-    this.letGo();
+    this.cancelInteraction();
     Blockly.renderManagement.triggerQueuedRenders();
     this.program.flush();
     this.frame.hidden = true;
   }
 
   dispose(): void {
-    this.letGo();
+    this.cancelInteraction();
     this.program.dispose();
     this.bin.dispose();
     this.backpack.dispose();
-    this.wrongDrops.dispose();
+    this.rejectedDrops.dispose();
     this.workspace.dispose();
     this.frame.remove();
   }
 
   /** Ends what the mouse or an open field is in the middle of. */
-  letGo(): void {
+  cancelInteraction(): void {
     this.workspace.hideChaff();
     this.workspace.getGesture(new PointerEvent('pointercancel'))?.cancel();
   }
@@ -212,7 +212,7 @@ export class Tab {
   /** Makes up for what changed while nobody saw it. */
   private update(): void {
     if (this.themeOutdated) this.workspace.setTheme(makeTheme());
-    const rebuilt = this.outdated.size > 0 && holdsAny(this.workspace, this.outdated);
+    const rebuilt = this.outdated.size > 0 && hasBlockOfTypes(this.workspace, this.outdated);
     if (rebuilt) {
       this.program.flush();
       this.program.rebuild();
@@ -271,8 +271,8 @@ export class Tab {
   }
 
   private addList(edit: VariableEdit): void {
-    const made = editVariable(this.workspace, edit);
-    if (made) this.variables.useAsList(made);
+    const variable = editVariable(this.workspace, edit);
+    if (variable) this.variables.useAsList(variable);
   }
 
   reveal(id: string): void {

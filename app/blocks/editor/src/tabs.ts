@@ -1,13 +1,13 @@
 // The behaviours that are open in the page, one of them shown.
 import * as Blockly from 'blockly/core';
-import {type BlockDefinition, define, defineSources} from './definitions';
+import {type BlockDefinition, defineBlocks, defineSources} from './definitions';
 import {type Option} from './choices';
-import {type BlockHelp, useHelp} from './help';
+import {type BlockHelp, setHelp} from './help';
 import {Tab, type TabListener} from './tab';
 
-const BUSY_MS = 60;
+const BUSY_POLL_MS = 60;
 /** A canvas as wide as this has room for the blocks of a category beside it. */
-const WIDE = 1000;
+const MIN_PINNED_WIDTH = 1000;
 
 export interface Definitions {
   blocks?: BlockDefinition[];
@@ -27,22 +27,22 @@ export interface ShownTab {
 export class Tabs {
   private readonly tabs = new Map<string, Tab>();
   /** The one that is shown; before the first key, and after closing it, an empty one without a key. */
-  shown: Tab;
+  activeTab: Tab;
   private waiting: Definitions | null = null;
   private toolbox: unknown = {contents: []};
   /** Whether the blocks of a category stay open; null: when there is room. */
   private pinned: boolean | null = null;
 
-  constructor(private readonly place: HTMLElement, private readonly listener: TabListener) {
-    this.shown = this.make();
+  constructor(private readonly container: HTMLElement, private readonly listener: TabListener) {
+    this.activeTab = this.createTab();
   }
 
   show({key, generation, workspace}: ShownTab): void {
-    this.applyWaiting();
-    const tab = this.tabs.get(key) ?? this.free() ?? this.make();
+    this.applyPending();
+    const tab = this.tabs.get(key) ?? this.getUnusedTab() ?? this.createTab();
     tab.key = key;
     this.tabs.set(key, tab);
-    this.turnTo(tab);
+    this.activate(tab);
     if (generation !== undefined) tab.load(generation, workspace ?? {});
   }
 
@@ -50,25 +50,25 @@ export class Tabs {
     const tab = this.tabs.get(key);
     if (!tab) return;
     this.tabs.delete(key);
-    if (tab === this.shown) this.turnTo(this.make(), false);
+    if (tab === this.activeTab) this.activate(this.createTab(), false);
     tab.dispose();
   }
 
   /** Keeps the blocks of a category open (true), or not; null: as long as the page is wide. */
   setPinned(pinned: boolean | null): void {
     this.pinned = pinned;
-    this.shown.setPinned(this.staysOpen, pinned === null);
+    this.activeTab.setPinned(this.staysOpen, pinned === null);
   }
 
   /** The page has another size. */
   resize(): void {
-    this.shown.resize();
-    if (this.pinned === null) this.shown.setPinned(this.staysOpen, true);
+    this.activeTab.resize();
+    if (this.pinned === null) this.activeTab.setPinned(this.staysOpen, true);
   }
 
   private get staysOpen(): boolean {
-    const toolbox = this.shown.workspace.getMetricsManager().getToolboxMetrics().width;
-    return this.pinned ?? this.place.clientWidth - toolbox >= WIDE;
+    const toolbox = this.activeTab.workspace.getMetricsManager().getToolboxMetrics().width;
+    return this.pinned ?? this.container.clientWidth - toolbox >= MIN_PINNED_WIDTH;
   }
 
   themeChanged(): void {
@@ -82,46 +82,46 @@ export class Tabs {
     if (first) this.applyWhenIdle();
   }
 
-  private make(): Tab {
-    const tab = new Tab(this.place, this.listener);
+  private createTab(): Tab {
+    const tab = new Tab(this.container, this.listener);
     tab.definitionsChanged([], this.toolbox, false);
     return tab;
   }
 
-  private free(): Tab | null {
-    return this.tabs.has(this.shown.key) ? null : this.shown;
+  private getUnusedTab(): Tab | null {
+    return this.tabs.has(this.activeTab.key) ? null : this.activeTab;
   }
 
-  private turnTo(tab: Tab, keeps = true): void {
-    const before = this.shown;
+  private activate(tab: Tab, keeps = true): void {
+    const before = this.activeTab;
     if (tab === before) return;
     const hadFocus = before.hasFocus;
     if (keeps) before.hide();
-    this.shown = tab;
+    this.activeTab = tab;
     tab.show();
     tab.setPinned(this.staysOpen, true);
     if (hadFocus) tab.focus();
   }
 
   private all(): Set<Tab> {
-    return new Set([...this.tabs.values(), this.shown]);
+    return new Set([...this.tabs.values(), this.activeTab]);
   }
 
   private applyWhenIdle(): void {
-    const busy = Blockly.Gesture.inProgress() || this.shown.isDragging ||
+    const busy = Blockly.Gesture.inProgress() || this.activeTab.isDragging ||
       Blockly.WidgetDiv.isVisible() || Blockly.DropDownDiv.isVisible() ||
       document.querySelector('dialog[open]') !== null;
-    if (busy && this.waiting) window.setTimeout(() => this.applyWhenIdle(), BUSY_MS);
-    else this.applyWaiting();
+    if (busy && this.waiting) window.setTimeout(() => this.applyWhenIdle(), BUSY_POLL_MS);
+    else this.applyPending();
   }
 
-  private applyWaiting(): void {
+  private applyPending(): void {
     const definitions = this.waiting;
     this.waiting = null;
     if (!definitions) return;
-    useHelp(definitions.help ?? {});
-    const {changed, sources} = define(definitions.blocks ?? []);
-    const topics = (definitions.topics ?? []).map((each): Option => [each, each]);
+    setHelp(definitions.help ?? {});
+    const {changed, sources} = defineBlocks(definitions.blocks ?? []);
+    const topics = (definitions.topics ?? []).map((topic): Option => [topic, topic]);
     const more = defineSources({topics, ...definitions.sources});
     this.toolbox = {contents: [], ...definitions.toolbox};
     for (const tab of this.all()) tab.definitionsChanged(changed, this.toolbox, sources || more);

@@ -2,8 +2,8 @@
 import * as Blockly from 'blockly/core';
 import {SAME_STYLE, categories, colour, roles} from './tokens';
 
-const FONT = 'Inter, "Noto Sans", "M PLUS 1p", "Noto Sans CJK JP", sans-serif';
-let made = 0;
+const FONT_FAMILY = 'Inter, "Noto Sans", "M PLUS 1p", "Noto Sans CJK JP", sans-serif';
+let themeCount = 0;
 
 export function makeTheme(): Blockly.Theme {
   const blockStyles: Record<string, Partial<Blockly.Theme.BlockStyle>> = {};
@@ -23,9 +23,9 @@ export function makeTheme(): Blockly.Theme {
     colourTertiary: colour('borderStrong')};
   blockStyles['kept'] = {...grey, hat: ''};
   blockStyles['kept_hat'] = {...grey, hat: 'cap'};
-  made += 1;
-  return Blockly.Theme.defineTheme(`nep${made}`, {
-    name: `nep${made}`,
+  themeCount += 1;
+  return Blockly.Theme.defineTheme(`nep${themeCount}`, {
+    name: `nep${themeCount}`,
     blockStyles,
     categoryStyles,
     componentStyles: {
@@ -42,7 +42,7 @@ export function makeTheme(): Blockly.Theme {
       selectedGlowColour: colour('focus'),
       cursorColour: colour('focus'),
     },
-    fontStyle: {family: FONT, weight: '600', size: 11.5},
+    fontStyle: {family: FONT_FAMILY, weight: '600', size: 11.5},
     startHats: false,
   });
 }
@@ -52,6 +52,6 @@ export function setCssVariables(dark: boolean): void {
   const style = document.documentElement.style;
   for (const [role, value] of roles()) style.setProperty(`--nep-${role}`, value);
   for (const [name, {primary}] of categories()) style.setProperty(`--nep-block-${name}`, primary);
-  style.setProperty('--nep-families', FONT);
+  style.setProperty('--nep-families', FONT_FAMILY);
   style.setProperty('color-scheme', dark ? 'dark' : 'light');
 }

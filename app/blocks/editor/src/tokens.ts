@@ -7,12 +7,12 @@ export interface BlockColours {
 }
 
 type Roles = Record<string, unknown>;
-type Both<T> = {light: T; dark: T};
+type LightDark<T> = {light: T; dark: T};
 
 /** Either the whole file, or one mode of it (then `colour` and each block hold that mode's values). */
 export interface Tokens {
-  colour: Roles | Both<Roles>;
-  block: Record<string, {icon: string} & (BlockColours | Both<BlockColours>)>;
+  colour: Roles | LightDark<Roles>;
+  block: Record<string, {icon: string} & (BlockColours | LightDark<BlockColours>)>;
 }
 
 /** Blockly's own style names, and a few plurals, mean ours. */
@@ -30,9 +30,9 @@ export function useTokens(tokens: Tokens, dark: boolean): void {
   isDark = dark;
 }
 
-function modeOf<T extends object>(each: T | Both<T>): T {
-  if (!('light' in each && 'dark' in each)) return each as T;
-  return (each as Both<T>)[isDark ? 'dark' : 'light'];
+function modeOf<T extends object>(value: T | LightDark<T>): T {
+  if (!('light' in value && 'dark' in value)) return value as T;
+  return (value as LightDark<T>)[isDark ? 'dark' : 'light'];
 }
 
 /** The colour of a role in the present mode; a role nobody defined is a visible mistake. */

@@ -8,7 +8,7 @@ import {t} from './words';
 
 type Def = Record<string, unknown>;
 
-function text(value: unknown): string {
+function toText(value: unknown): string {
   return typeof value === 'string' ? value : '';
 }
 
@@ -18,7 +18,7 @@ class Category extends Blockly.ToolboxCategory {
     const tile = document.createElement('span');
     tile.className = 'nepTile';
     tile.style.background = this.colour_;
-    tile.append(iconElement(iconName(text(def['icon']), text(def['categorystyle'])), 16));
+    tile.append(iconElement(iconName(toText(def['icon']), toText(def['categorystyle'])), 16));
     return tile;
   }
 
@@ -33,7 +33,7 @@ class Category extends Blockly.ToolboxCategory {
   }
 }
 
-function noteOf(def: Def): string {
+function connectionNote(def: Def): string {
   if (def['connected'] === false) return t('not connected');
   return def['virtual'] === true ? t('virtual') : '';
 }
@@ -50,7 +50,7 @@ const headings = new Set<Heading>();
 /** The headings of these robots say so, at once and whatever is in the hand: a dot must not stay green. */
 export function showAlarms(now: Record<string, Alarm>): void {
   alarms = new Map(Object.entries(now));
-  for (const heading of headings) heading.dress();
+  for (const heading of headings) heading.updateStatus();
 }
 
 /** "Blocks", or a robot's name with a filled dot (connected) or an empty ring (not). */
@@ -66,7 +66,7 @@ class Heading extends Blockly.ToolboxItem {
     div.id = this.getId();
     div.setAttribute('role', 'presentation');
     const name = document.createElement('b');
-    name.textContent = text(def['name']) || text(def['text']);
+    name.textContent = toText(def['name']) || toText(def['text']);
     if (typeof def['connected'] === 'boolean') {
       div.append(this.dot);
       div.classList.add('robot');
@@ -74,16 +74,16 @@ class Heading extends Blockly.ToolboxItem {
     div.append(name, this.note);
     this.div = div;
     headings.add(this);
-    this.dress();
+    this.updateStatus();
   }
 
   /** Dot and note: what is wrong now, else whether the robot is connected. */
-  dress(): void {
+  updateStatus(): void {
     const def = (this.toolboxItemDef_ ?? {}) as unknown as Def;
-    const alarm = typeof def['connected'] === 'boolean' ? alarms.get(text(def['name'])) : undefined;
+    const alarm = typeof def['connected'] === 'boolean' ? alarms.get(toText(def['name'])) : undefined;
     this.dot.className = alarm?.status ?? (def['connected'] ? 'on' : 'off');
     this.note.className = alarm?.status ?? '';
-    this.note.textContent = alarm?.words ?? (text(def['note']) || noteOf(def));
+    this.note.textContent = alarm?.words ?? (toText(def['note']) || connectionNote(def));
   }
 
   override getDiv(): Element | null {
@@ -100,50 +100,50 @@ class Heading extends Blockly.ToolboxItem {
   }
 }
 
-interface Items {
+interface ToolboxContents {
   contents: Def[];
 }
 
 /** Gives every item an id that stays the same from one definition to the next; says so when there is no robot. */
-function withIds(def: Items): Items {
+function withIds(def: ToolboxContents): ToolboxContents {
   let section = '';
   const empty = def.contents.length && !def.contents.some((item) => item['kind'] === 'robotHeading');
   const none = {kind: 'robotHeading', name: t('No robot'), note: t('connected'), connected: false};
   const contents = def.contents.map((item) => {
-    const name = text(item['name']) || text(item['text']);
+    const name = toText(item['name']) || toText(item['text']);
     if (item['kind'] !== 'category') {
       section = name || section;
       return item;
     }
-    const dynamic = text(item['dynamic']);
-    return {...item, ...(dynamic && {custom: dynamic}), toolboxitemid: text(item['toolboxitemid']) || `category ${section} / ${name}`};
+    const dynamic = toText(item['dynamic']);
+    return {...item, ...(dynamic && {custom: dynamic}), toolboxitemid: toText(item['toolboxitemid']) || `category ${section} / ${name}`};
   });
   const search = {kind: SEARCH, toolboxitemid: 'search'};
   return {...def, contents: [search, ...contents, ...(empty ? [none] : [])]};
 }
 
 export class Toolbox extends Blockly.Toolbox {
-  private shown = '';
+  private contentsJson = '';
   private lastOpen = '';
-  private showsFound = false;
+  private isShowingResults = false;
   /** What each category was made of; Blockly writes into the contents it is given. */
-  private made = new Map<string, string>();
-  private given: Def[] = [];
+  private contentsById = new Map<string, string>();
+  private contentItems: Def[] = [];
   /** What to do when other blocks are shown than those of a category. */
-  onFound = (): void => undefined;
+  onResultsShown = (): void => undefined;
 
   /** Every block of every category, each once. */
   allEntries(): Def[] {
-    const seen = new Set<string>();
-    const offered = this.given.flatMap((item) => {
-      const dynamic = text(item['dynamic']);
-      const made = dynamic && this.workspace_.getToolboxCategoryCallback(dynamic)?.(this.workspace_);
-      return (Array.isArray(made) ? made : item['contents'] ?? []) as Def[];
+    const seenKeys = new Set<string>();
+    const offered = this.contentItems.flatMap((item) => {
+      const dynamic = toText(item['dynamic']);
+      const dynamicContents = dynamic && this.workspace_.getToolboxCategoryCallback(dynamic)?.(this.workspace_);
+      return (Array.isArray(dynamicContents) ? dynamicContents : item['contents'] ?? []) as Def[];
     });
-    return offered.filter((each) => {
-      const key = JSON.stringify(each);
-      if (each['kind'] !== 'block' || seen.has(key)) return false;
-      return seen.add(key);
+    return offered.filter((entry) => {
+      const key = JSON.stringify(entry);
+      if (entry['kind'] !== 'block' || seenKeys.has(key)) return false;
+      return seenKeys.add(key);
     });
   }
 
@@ -159,13 +159,13 @@ export class Toolbox extends Blockly.Toolbox {
     if (!(flyout instanceof Flyout)) return;
     const before = flyout.isPinned;
     flyout.setPinned(keeps);
-    if (keeps) this.openLast();
+    if (keeps) this.openLastCategory();
     else if (before && closes) this.clearSelection();
     if (before !== keeps) this.workspace_.resize();
   }
 
   /** Opens the category that was open last, or the first, when none is open and one has to be. */
-  private openLast(): void {
+  private openLastCategory(): void {
     if (!this.isPinned || this.getFlyout()?.isVisible()) return;
     const items = this.getToolboxItems().filter((item) => item.isSelectable());
     const last = items.find((item) => item.getId() === this.lastOpen);
@@ -186,13 +186,13 @@ export class Toolbox extends Blockly.Toolbox {
   protected override selectItem_(before: Blockly.ISelectableToolboxItem | null, item: Blockly.ISelectableToolboxItem): void {
     super.selectItem_(before, item);
     this.lastOpen = item.getId();
-    this.showsFound = false;
+    this.isShowingResults = false;
     this.setTitle(item.getName());
   }
 
-  private setTitle(words: string): void {
+  private setTitle(title: string): void {
     const flyout = this.getFlyout();
-    if (flyout instanceof Flyout) flyout.setTitle(words);
+    if (flyout instanceof Flyout) flyout.setTitle(title);
   }
 
   /** Shows these blocks in place of a category; null shows the category again, or none. */
@@ -202,9 +202,9 @@ export class Toolbox extends Blockly.Toolbox {
     this.setTitle(t('Search results'));
     if (entries) flyout?.show(entries as Blockly.utils.toolbox.FlyoutItemInfoArray);
     else flyout?.hide();
-    this.openLast();
-    this.showsFound = entries !== null;
-    this.onFound();
+    this.openLastCategory();
+    this.isShowingResults = entries !== null;
+    this.onResultsShown();
   }
 
   /** Shows also those that were found and not shown; with the keys one is on the first of them. */
@@ -220,7 +220,7 @@ export class Toolbox extends Blockly.Toolbox {
   /** The keys go to the first block that was found; with a key press it is taken at once. */
   enterFound(event: KeyboardEvent | null): void {
     const workspace = this.getFlyout()?.getWorkspace();
-    const first = this.showsFound && this.getFlyout()?.isVisible() ? workspace?.getTopBlocks(true)[0] : undefined;
+    const first = this.isShowingResults && this.getFlyout()?.isVisible() ? workspace?.getTopBlocks(true)[0] : undefined;
     Blockly.keyboardNavigationController.setIsActive(true);
     if (!first) {
       Blockly.getFocusManager().focusTree(this);
@@ -240,13 +240,13 @@ export class Toolbox extends Blockly.Toolbox {
 
   /** What a category holds beside what people made themselves. */
   contentsOf(dynamic: string): unknown[] {
-    return this.given.find((item) => item['dynamic'] === dynamic)?.['contents'] as unknown[] ?? [];
+    return this.contentItems.find((item) => item['dynamic'] === dynamic)?.['contents'] as unknown[] ?? [];
   }
 
   /** Opens a category of what people made, also again with what is new in it. */
   openDynamic(dynamic: string): void {
-    const id = this.given.find((item) => item['dynamic'] === dynamic)?.['toolboxitemid'];
-    const item = this.getToolboxItems().find((each) => each.getId() === id);
+    const id = this.contentItems.find((item) => item['dynamic'] === dynamic)?.['toolboxitemid'];
+    const item = this.getToolboxItems().find((candidate) => candidate.getId() === id);
     if (item && item === this.selectedItem_) this.refreshSelection();
     else if (item) this.setSelectedItem(item);
   }
@@ -254,7 +254,7 @@ export class Toolbox extends Blockly.Toolbox {
   /** Shows a category of what people made again, if it is open. */
   refreshDynamic(dynamic: string): void {
     const open = this.selectedItem_;
-    if (open && this.given.some((item) => item['dynamic'] === dynamic && item['toolboxitemid'] === open.getId())) {
+    if (open && this.contentItems.some((item) => item['dynamic'] === dynamic && item['toolboxitemid'] === open.getId())) {
       const scroll = this.getFlyout()?.getWorkspace().scrollY ?? 0;
       this.refreshSelection();
       this.getFlyout()?.getWorkspace().scrollbar?.setY(-scroll);
@@ -263,45 +263,45 @@ export class Toolbox extends Blockly.Toolbox {
 
   /** Shows new contents; an open category, typed words and the focus stay, and equal contents change nothing. */
   update(def: unknown, blocksChanged: boolean): void {
-    const items = withIds(def as Items);
+    const items = withIds(def as ToolboxContents);
     const key = JSON.stringify(items);
-    const sameItems = key === this.shown;
+    const sameItems = key === this.contentsJson;
     if (sameItems && !blocksChanged) return;
-    this.shown = key;
-    const restoreFocus = this.rememberFocus();
+    this.contentsJson = key;
+    const restoreFocus = this.captureFocus();
     const query = sameItems ? undefined : this.searchItem?.query;
-    const {showsFound} = this;
+    const {isShowingResults: showsFound} = this;
     this.showContents(items, sameItems, blocksChanged);
     if (query) this.searchItem?.restore(query);
     if (showsFound) this.searchItem?.refresh();
     restoreFocus();
   }
 
-  private showContents(items: Items, sameItems: boolean, blocksChanged: boolean): void {
+  private showContents(items: ToolboxContents, sameItems: boolean, blocksChanged: boolean): void {
     const flyout = this.getFlyout();
     const open = this.selectedItem_;
-    const before = this.made;
-    this.given = items.contents;
-    this.made = new Map(items.contents.map((item) => [text(item['toolboxitemid']), JSON.stringify(item['contents'])]));
+    const before = this.contentsById;
+    this.contentItems = items.contents;
+    this.contentsById = new Map(items.contents.map((item) => [toText(item['toolboxitemid']), JSON.stringify(item['contents'])]));
     const scroll = flyout?.getWorkspace().scrollY ?? 0;
     if (!sameItems) {
       this.selectedItem_ = null;
       this.render(items as unknown as Blockly.utils.toolbox.ToolboxInfo);
     }
     if (!open) {
-      this.openLast();
+      this.openLastCategory();
       return;
     }
-    const again = this.getToolboxItemById(open.getId());
-    if (!again?.isSelectable()) {
+    const newItem = this.getToolboxItemById(open.getId());
+    if (!newItem?.isSelectable()) {
       this.selectedItem_ = null;
       flyout?.hide();
-      this.openLast();
+      this.openLastCategory();
       return;
     }
-    const item = again as Blockly.ISelectableToolboxItem;
+    const item = newItem as Blockly.ISelectableToolboxItem;
     if (!sameItems) this.selectItem_(null, item);
-    if (!blocksChanged && before.get(item.getId()) === this.made.get(item.getId())) return;
+    if (!blocksChanged && before.get(item.getId()) === this.contentsById.get(item.getId())) return;
     flyout?.show(item.getContents());
     const workspace = flyout?.getWorkspace();
     workspace?.scrollbar?.setY(-scroll);
@@ -312,7 +312,7 @@ export class Toolbox extends Blockly.Toolbox {
   }
 
   /** Returns a function that restores the focus after the contents were replaced. */
-  private rememberFocus(): () => void {
+  private captureFocus(): () => void {
     const manager = Blockly.getFocusManager();
     const node = manager.getFocusedNode();
     const blocks = this.getFlyout()?.getWorkspace();
@@ -333,7 +333,7 @@ export class Toolbox extends Blockly.Toolbox {
     return () => {
       const tops = blocks.getTopBlocks(true);
       if (root && tops.includes(root)) return;
-      const block = tops.find((each) => contentOf(each) === content) ?? tops[0];
+      const block = tops.find((top) => contentOf(top) === content) ?? tops[0];
       if (block) manager.focusNode(block);
       else manager.focusTree(this);
     };

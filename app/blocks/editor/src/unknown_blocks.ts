@@ -27,7 +27,7 @@ export interface BlockState {
 type Shape = 'value' | 'statement' | 'hat';
 type InputKind = 'value' | 'statement';
 
-interface KeptState {
+interface UnknownState {
   original: Record<string, unknown>;
   shape: Shape;
   inputs: [string, InputKind][];
@@ -36,40 +36,40 @@ interface KeptState {
   whole?: boolean;
 }
 
-function mapInputs(inputs: Record<string, ConnectionState>, change: (each: ConnectionState, name: string) => ConnectionState) {
+function mapInputs(inputs: Record<string, ConnectionState>, change: (connection: ConnectionState, name: string) => ConnectionState) {
   return Object.fromEntries(Object.entries(inputs).map(([name, each]) => [name, change(each, name)]));
 }
 
 /** `state` with every block that cannot be made here replaced by a kept one. */
 export function wrapUnknown(state: BlockState, shape: Shape | null = null): BlockState {
   const definition = definitionOf(state.type);
-  const known = definition !== null && fits(state, definition, shape);
-  const own = known ? inputKinds(definition) : new Map<string, InputKind>();
-  const kindOf = (name: string, each: ConnectionState): InputKind => own.get(name) ?? guessInput(name, each);
+  const isKnown = definition !== null && matchesDefinition(state, definition, shape);
+  const kinds = isKnown ? inputKinds(definition) : new Map<string, InputKind>();
+  const kindOf = (name: string, connection: ConnectionState): InputKind => kinds.get(name) ?? guessInput(name, connection);
   const result: BlockState = {...state};
   if (state.inputs) {
-    result.inputs = mapInputs(state.inputs, (each, name) => wrapConnected(each, kindOf(name, each)));
+    result.inputs = mapInputs(state.inputs, (connection, name) => wrapConnected(connection, kindOf(name, connection)));
   }
   if (state.next) result.next = wrapConnected(state.next, 'statement');
-  if (known) return result;
+  if (isKnown) return result;
   const {id, x, y, inputs, next, ...original} = state;
   const form = shape ?? guessTop(state);
-  const kept: KeptState = {
+  const unknownState: UnknownState = {
     // Nothing can hang below a value; what the file says there stays inside.
     original: form === 'value' && next ? {...original, next} : original,
     shape: form,
     inputs: Object.entries(inputs ?? {}).map(([name, each]) => [name, kindOf(name, each)]),
     label: labelOf(state),
   };
-  return {...position(id, x, y), type: UNKNOWN_BLOCK, extraState: kept,
+  return {...position(id, x, y), type: UNKNOWN_BLOCK, extraState: unknownState,
     ...(result.inputs && {inputs: result.inputs}), ...(form !== 'value' && result.next && {next: result.next})};
 }
 
 /** One kept block that holds a whole stack: the last resort when even `wrapUnknown` cannot be made. */
 export function wrapWholeStack(state: BlockState): BlockState {
   const {id, x, y, ...original} = state;
-  const kept: KeptState = {original, shape: 'statement', inputs: [], label: labelOf(state), whole: true};
-  return {...position(id, x, y), type: UNKNOWN_BLOCK, extraState: kept};
+  const unknownState: UnknownState = {original, shape: 'statement', inputs: [], label: labelOf(state), whole: true};
+  return {...position(id, x, y), type: UNKNOWN_BLOCK, extraState: unknownState};
 }
 
 /** The opposite of `wrapUnknown` and `wrapWholeStack`. */
@@ -82,29 +82,29 @@ export function unwrapUnknown(state: BlockState): BlockState {
   }
   if (next?.block || next?.shadow) result['next'] = unwrapConnected(next);
   if (state.type !== UNKNOWN_BLOCK) return result as BlockState;
-  const kept = state.extraState as KeptState;
+  const unknownState = state.extraState as UnknownState;
   const {type, extraState, ...rest} = result;
   void type;
   void extraState;
-  return {...kept.original, ...rest} as BlockState;
+  return {...unknownState.original, ...rest} as BlockState;
 }
 
 function position(id?: string, x?: number, y?: number): Record<string, unknown> {
   return {...(id !== undefined && {id}), ...(x !== undefined && {x}), ...(y !== undefined && {y})};
 }
 
-function wrapConnected(each: ConnectionState, kind: InputKind): ConnectionState {
-  return {...each, ...(each.block && {block: wrapUnknown(each.block, kind)}),
-    ...(each.shadow && {shadow: wrapUnknown(each.shadow, kind)})};
+function wrapConnected(connection: ConnectionState, kind: InputKind): ConnectionState {
+  return {...connection, ...(connection.block && {block: wrapUnknown(connection.block, kind)}),
+    ...(connection.shadow && {shadow: wrapUnknown(connection.shadow, kind)})};
 }
 
 /** Without the `null` that Blockly writes for the grey preview of a block that is still being dragged. */
-function unwrapConnected(each: ConnectionState): ConnectionState {
-  return {...(each.shadow && {shadow: unwrapUnknown(each.shadow)}), ...(each.block && {block: unwrapUnknown(each.block)})};
+function unwrapConnected(connection: ConnectionState): ConnectionState {
+  return {...(connection.shadow && {shadow: unwrapUnknown(connection.shadow)}), ...(connection.block && {block: unwrapUnknown(connection.block)})};
 }
 
 /** Whether the definition has a place for everything that the state holds. */
-function fits(state: BlockState, definition: BlockDefinition, shape: Shape | null): boolean {
+function matchesDefinition(state: BlockState, definition: BlockDefinition, shape: Shape | null): boolean {
   const connection = shape === 'value' ? 'output' : shape === 'statement' ? 'previousStatement' : null;
   if (connection && !(connection in definition)) return false;
   if (state.next && !('nextStatement' in definition)) return false;
@@ -119,7 +119,7 @@ function fits(state: BlockState, definition: BlockDefinition, shape: Shape | nul
 function hasInput(state: BlockState, definition: BlockDefinition, name: string): boolean {
   if (inputKinds(definition).has(name)) return true;
   const extra = (state.extraState ?? {}) as {items?: unknown; inputs?: unknown};
-  if (definition.mutator === 'nep_call') return readInputs(extra.inputs).some((each) => name === `IN_${each.id}`);
+  if (definition.mutator === 'nep_call') return readInputs(extra.inputs).some((input) => name === `IN_${input.id}`);
   if (definition.mutator === 'nep_branches') {
     const {elseIfs, else: hasElse} = extra as {elseIfs?: unknown; else?: unknown};
     const branch = /^(?:CONDITION|BODY)([1-9]\d?)$/.exec(name)?.[1];
@@ -130,9 +130,9 @@ function hasInput(state: BlockState, definition: BlockDefinition, name: string):
     Number(number) < Math.min(50, typeof extra.items === 'number' ? extra.items : 3);
 }
 
-function guessInput(name: string, each: ConnectionState): InputKind {
-  const child = each.block ?? each.shadow;
-  if (child?.type === UNKNOWN_BLOCK) return (child.extraState as KeptState).shape === 'value' ? 'value' : 'statement';
+function guessInput(name: string, connection: ConnectionState): InputKind {
+  const child = connection.block ?? connection.shadow;
+  if (child?.type === UNKNOWN_BLOCK) return (child.extraState as UnknownState).shape === 'value' ? 'value' : 'statement';
   const definition = child ? definitionOf(child.type) : null;
   if (definition) return 'output' in definition ? 'value' : 'statement';
   return child?.next || /^(do|else|then|body|stack|substack)/i.test(name) ? 'statement' : 'value';
@@ -144,13 +144,13 @@ function guessTop(state: BlockState): Shape {
 }
 
 function labelOf(state: BlockState): string {
-  const words = String(state.type ?? 'block').replace(/^robot_[^_]+_(do|get|when)_/, '').replace(/[_\s]+/g, ' ').trim();
-  const values = Object.values(state.fields ?? {}).filter((each) => ['string', 'number'].includes(typeof each));
-  return [words, ...values].join(' ').slice(0, 80);
+  const name = String(state.type ?? 'block').replace(/^robot_[^_]+_(do|get|when)_/, '').replace(/[_\s]+/g, ' ').trim();
+  const values = Object.values(state.fields ?? {}).filter((value) => ['string', 'number'].includes(typeof value));
+  return [name, ...values].join(' ').slice(0, 80);
 }
 
-interface KeptBlock extends Blockly.Block {
-  kept?: KeptState;
+interface UnknownBlock extends Blockly.Block {
+  kept?: UnknownState;
 }
 
 /** Whether this block stands for one that is not known here. */
@@ -159,14 +159,14 @@ export function isUnknown(block: Blockly.Block): boolean {
 }
 
 Blockly.Blocks[UNKNOWN_BLOCK] = {
-  init(this: KeptBlock) {
+  init(this: UnknownBlock) {
     this.setStyle('kept');
     this.setInputsInline(true);
   },
-  saveExtraState(this: KeptBlock) {
+  saveExtraState(this: UnknownBlock) {
     return this.kept ?? null;
   },
-  loadExtraState(this: KeptBlock, state: KeptState) {
+  loadExtraState(this: UnknownBlock, state: UnknownState) {
     this.kept = state;
     const title = this.appendDummyInput();
     const icon = Blockly.fieldRegistry.fromJson({type: 'field_icon', name: 'circle-dashed'});

@@ -12,22 +12,22 @@ export interface VariableEdit {
   list?: boolean;
 }
 
-const NEW = 'NEP_NEW_VARIABLE';
+const NEW_VARIABLE_ID = 'NEP_NEW_VARIABLE';
 
 /** Asks the window for a command by its name. */
-let ask: (command: string) => void = () => undefined;
+let runCommand: (command: string) => void = () => undefined;
 /** The drop-down in which a person chose “New variable”: it gets the one that is made. */
-let asking: Blockly.FieldVariable | null = null;
+let pendingField: Blockly.FieldVariable | null = null;
 
 /** Buttons and drop-downs about variables lead to the window's commands. */
-export function askWindow(run: (command: string) => void): void {
-  ask = run;
+export function setCommandHandler(run: (command: string) => void): void {
+  runCommand = run;
 }
 
 export function registerVariableButtons(workspace: Blockly.WorkspaceSvg): void {
   const press = (command: string) => () => {
-    asking = null;
-    ask(command);
+    pendingField = null;
+    runCommand(command);
   };
   workspace.registerButtonCallback('CREATE_VARIABLE', press('variable.new'));
   workspace.registerButtonCallback('CREATE_LIST', press('variable.new_list'));
@@ -41,10 +41,10 @@ export function editVariable(workspace: Blockly.WorkspaceSvg, edit: VariableEdit
   Blockly.Events.setGroup(true);
   try {
     if (edit.do === 'new' && edit.name) {
-      const made = variables.createVariable(edit.name);
-      if (asking && !asking.getSourceBlock()?.isDeadOrDying()) asking.setValue(made.getId());
-      asking = null;
-      return made;
+      const created = variables.createVariable(edit.name);
+      if (pendingField && !pendingField.getSourceBlock()?.isDeadOrDying()) pendingField.setValue(created.getId());
+      pendingField = null;
+      return created;
     }
     if (edit.do === 'rename' && variable && edit.name) variables.renameVariable(variable, edit.name);
     else if (edit.do === 'delete' && variable) deleteWithUses(workspace, variable);
@@ -59,45 +59,45 @@ function deleteWithUses(workspace: Blockly.WorkspaceSvg, variable: Variable): vo
   const id = variable.getId();
   for (const block of workspace.getAllBlocks(false)) {
     if (block.isDeadOrDying() || block.isShadow()) continue;
-    if (block.getVarModels().some((each) => each.getId() === id)) block.dispose(true);
+    if (block.getVarModels().some((model) => model.getId() === id)) block.dispose(true);
   }
   workspace.getVariableMap().deleteVariable(variable);
 }
 
 // ---- the drop-down of a variable
 
-interface Inside {
+interface FieldVariableInternals {
   onItemSelected_(this: Blockly.FieldVariable, menu: Blockly.Menu, item: Blockly.MenuItem): void;
 }
 
-const choose = (Blockly.FieldVariable.prototype as unknown as Inside).onItemSelected_;
-(Blockly.FieldVariable.prototype as unknown as Inside).onItemSelected_ = function (menu, item) {
-  const chosen = item.getValue();
+const baseOnItemSelected = (Blockly.FieldVariable.prototype as unknown as FieldVariableInternals).onItemSelected_;
+(Blockly.FieldVariable.prototype as unknown as FieldVariableInternals).onItemSelected_ = function (menu, item) {
+  const value = item.getValue();
   const id = this.getVariable()?.getId() ?? '';
-  asking = null;
-  if (chosen === NEW) {
-    asking = this;
-    ask('variable.new');
-  } else if (chosen === Blockly.RENAME_VARIABLE_ID) {
-    ask(`variable.rename:${id}`);
-  } else if (chosen === Blockly.DELETE_VARIABLE_ID) {
-    ask(`variable.delete:${id}`);
+  pendingField = null;
+  if (value === NEW_VARIABLE_ID) {
+    pendingField = this;
+    runCommand('variable.new');
+  } else if (value === Blockly.RENAME_VARIABLE_ID) {
+    runCommand(`variable.rename:${id}`);
+  } else if (value === Blockly.DELETE_VARIABLE_ID) {
+    runCommand(`variable.delete:${id}`);
   } else {
-    choose.call(this, menu, item);
+    baseOnItemSelected.call(this, menu, item);
   }
 };
 
-const offered = Blockly.FieldVariable.dropdownCreate;
+const baseDropdownCreate = Blockly.FieldVariable.dropdownCreate;
 Blockly.FieldVariable.dropdownCreate = function (this: Blockly.FieldVariable): Blockly.MenuOption[] {
   const inFlyout = this.getSourceBlock()?.isInFlyout;
-  const isOwn = (option: Blockly.MenuOption) => Array.isArray(option) &&
+  const isEditOption = (option: Blockly.MenuOption) => Array.isArray(option) &&
     (option[1] === Blockly.RENAME_VARIABLE_ID || option[1] === Blockly.DELETE_VARIABLE_ID);
-  const all = offered.call(this);
+  const all = baseDropdownCreate.call(this);
   // In the toolbox a drop-down only chooses.
-  if (inFlyout) return all.filter((option) => !isOwn(option));
-  const own = all.filter(isOwn);
-  const names = all.filter((option) => !isOwn(option));
-  return [...names, [t('New variable'), NEW], ...own];
+  if (inFlyout) return all.filter((option) => !isEditOption(option));
+  const editOptions = all.filter(isEditOption);
+  const names = all.filter((option) => !isEditOption(option));
+  return [...names, [t('New variable'), NEW_VARIABLE_ID], ...editOptions];
 };
 
 // ---- the menu of a block with a variable
@@ -109,12 +109,12 @@ function variableOf(block?: Blockly.BlockSvg): Variable | null {
 
 export function registerVariableMenu(isWatched: (id: string) => boolean): void {
   const scopeType = Blockly.ContextMenuRegistry.ScopeType.BLOCK;
-  const entry = (id: string, weight: number, words: (variable: Variable) => string, command: string) =>
+  const entry = (id: string, weight: number, getLabel: (variable: Variable) => string, command: string) =>
     Blockly.ContextMenuRegistry.registry.register({
       id, weight, scopeType,
       displayText: ({block}) => {
         const variable = variableOf(block);
-        return variable ? words(variable) : '';
+        return variable ? getLabel(variable) : '';
       },
       preconditionFn: ({block}) => {
         const variable = variableOf(block);
@@ -123,7 +123,7 @@ export function registerVariableMenu(isWatched: (id: string) => boolean): void {
       },
       callback: ({block}) => {
         const variable = variableOf(block);
-        if (variable) ask(`${command}:${variable.getId()}`);
+        if (variable) runCommand(`${command}:${variable.getId()}`);
       },
     });
   entry('nepWatch', 6.1, (variable) => isWatched(variable.getId()) ?

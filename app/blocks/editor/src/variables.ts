@@ -5,11 +5,11 @@ import type {Variable} from './variable_edits';
 
 export const VARIABLES = 'variables';
 const LISTS = 'lists';
-const MAKES_LIST = 'lists_create';
-const GETS = 'variables_get';
-const SETS = 'variables_set';
+const CREATE_LIST_TYPE = 'lists_create';
+const GETTER_TYPE = 'variables_get';
+const SETTER_TYPE = 'variables_set';
 
-const TOLD: ReadonlySet<string> = new Set([Blockly.Events.VAR_CREATE, Blockly.Events.VAR_RENAME,
+const VARIABLE_EVENTS: ReadonlySet<string> = new Set([Blockly.Events.VAR_CREATE, Blockly.Events.VAR_RENAME,
   Blockly.Events.VAR_DELETE]);
 
 interface Entry {
@@ -23,13 +23,13 @@ export class Variables {
   private newestList = '';
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg) {
-    workspace.registerToolboxCategoryCallback(VARIABLES, () => this.offered());
-    workspace.registerToolboxCategoryCallback(LISTS, () => this.offeredAboutList());
-    workspace.addChangeListener((event) => TOLD.has(event.type) && this.refreshSoon());
+    workspace.registerToolboxCategoryCallback(VARIABLES, () => this.getVariableContents());
+    workspace.registerToolboxCategoryCallback(LISTS, () => this.getListContents());
+    workspace.addChangeListener((event) => VARIABLE_EVENTS.has(event.type) && this.scheduleRefresh());
   }
 
   /** Once for all the variables of a program that is being loaded. */
-  private refreshSoon(): void {
+  private scheduleRefresh(): void {
     if (this.waiting) return;
     this.waiting = true;
     queueMicrotask(() => {
@@ -54,47 +54,47 @@ export class Variables {
   }
 
   /** The variable that a person made as a list last, else the last one that a block makes a list of. */
-  private list(): Variable | null {
+  private getList(): Variable | null {
     const variables = this.workspace.getVariableMap();
-    const made = variables.getVariableById(this.newestList);
-    if (made) return made;
-    const set = this.workspace.getAllBlocks(false).filter((block) => block.type === SETS &&
+    const newest = variables.getVariableById(this.newestList);
+    if (newest) return newest;
+    const set = this.workspace.getAllBlocks(false).filter((block) => block.type === SETTER_TYPE &&
       block.getInputTargetBlock('VALUE')?.type.startsWith('lists_'));
     return set[set.length - 1]?.getVarModels()[0] as Variable | undefined ?? null;
   }
 
   /** First what makes the list, then all that is done with it. */
-  private offeredAboutList(): Blockly.utils.toolbox.FlyoutItemInfoArray {
+  private getListContents(): Blockly.utils.toolbox.FlyoutItemInfoArray {
     const toolbox = this.workspace.getToolbox();
-    const given = (toolbox instanceof Toolbox ? toolbox.contentsOf(LISTS) : []) as Entry[];
-    const list = this.list();
-    if (!list) return given as Blockly.utils.toolbox.FlyoutItemInfoArray;
+    const contents = (toolbox instanceof Toolbox ? toolbox.contentsOf(LISTS) : []) as Entry[];
+    const list = this.getList();
+    if (!list) return contents as Blockly.utils.toolbox.FlyoutItemInfoArray;
     const VAR = {id: list.getId()};
-    const makes = given.find((entry) => entry.type === MAKES_LIST);
-    const sets = {kind: 'block', type: SETS, fields: {VAR}, inputs: {VALUE: {block: {...makes, kind: undefined}}}};
+    const makes = contents.find((entry) => entry.type === CREATE_LIST_TYPE);
+    const sets = {kind: 'block', type: SETTER_TYPE, fields: {VAR}, inputs: {VALUE: {block: {...makes, kind: undefined}}}};
     const about = (entry: Entry): Entry => {
       const filled = {...entry, ...(entry.fields?.['VAR'] !== undefined && {fields: {...entry.fields, VAR}})};
       const inputs = Object.entries(entry.inputs ?? {}).map(([name, {block, shadow}]) =>
         [name, {...(block && {block: about(block)}), ...(shadow && {shadow: about(shadow)})}]);
       return entry.inputs ? {...filled, inputs: Object.fromEntries(inputs)} : filled;
     };
-    const above = given.findIndex((entry) => entry.type);
-    return [...given.slice(0, above), sets, ...given.slice(above).map(about)] as unknown as
+    const above = contents.findIndex((entry) => entry.type);
+    return [...contents.slice(0, above), sets, ...contents.slice(above).map(about)] as unknown as
       Blockly.utils.toolbox.FlyoutItemInfoArray;
   }
 
   /** The blocks of the category about the newest variable, and the value of each. */
-  private offered(): Blockly.utils.toolbox.FlyoutItemInfoArray {
+  private getVariableContents(): Blockly.utils.toolbox.FlyoutItemInfoArray {
     const toolbox = this.workspace.getToolbox();
-    const given = (toolbox instanceof Toolbox ? toolbox.contentsOf(VARIABLES) : []) as Entry[];
+    const contents = (toolbox instanceof Toolbox ? toolbox.contentsOf(VARIABLES) : []) as Entry[];
     const all = this.workspace.getVariableMap().getVariablesOfType('');
     const newest = all[all.length - 1];
-    if (!newest) return given as Blockly.utils.toolbox.FlyoutItemInfoArray;
+    if (!newest) return contents as Blockly.utils.toolbox.FlyoutItemInfoArray;
     const about = (entry: Entry, variable: Blockly.IVariableModel<Blockly.IVariableState>) =>
       ({...entry, fields: {...entry.fields, VAR: {id: variable.getId()}}});
-    const sorted = [...all].sort((one, other) => one.getName().localeCompare(other.getName()));
-    return given.flatMap((entry) => {
-      if (entry.type === GETS) return sorted.map((variable) => about(entry, variable));
+    const sorted = [...all].sort((variable, other) => variable.getName().localeCompare(other.getName()));
+    return contents.flatMap((entry) => {
+      if (entry.type === GETTER_TYPE) return sorted.map((variable) => about(entry, variable));
       return entry.type ? [about(entry, newest)] : [entry];
     }) as unknown as Blockly.utils.toolbox.FlyoutItemInfoArray;
   }

@@ -4,15 +4,15 @@ import {sensorTypes} from './definitions';
 import {sensorOf} from './overlays';
 
 /** Calls `look` after whatever opens, fills or closes it. */
-export function observeFlyout(flyout: Blockly.IFlyout, look: () => void): void {
+export function observeFlyout(flyout: Blockly.IFlyout, onChange: () => void): void {
   const {show, setVisible} = flyout;
   flyout.show = (contents) => {
     show.call(flyout, contents);
-    queueMicrotask(look);
+    queueMicrotask(onChange);
   };
   flyout.setVisible = (visible) => {
     setVisible.call(flyout, visible);
-    queueMicrotask(look);
+    queueMicrotask(onChange);
   };
 }
 
@@ -20,6 +20,6 @@ export function observeFlyout(flyout: Blockly.IFlyout, look: () => void): void {
 export function visibleSensors(flyout: Blockly.IFlyout | null): [robot: string, sensor: string][] {
   if (!flyout?.isVisible()) return [];
   const blocks = [...sensorTypes()].flatMap((type) => flyout.getWorkspace().getBlocksByType(type, true));
-  const found = new Map(blocks.map((block) => [sensorOf(block).join('/'), sensorOf(block)]));
-  return [...found.values()].sort(([a, b], [c, d]) => (`${a}/${b}` < `${c}/${d}` ? -1 : 1));
+  const sensors = new Map(blocks.map((block) => [sensorOf(block).join('/'), sensorOf(block)]));
+  return [...sensors.values()].sort(([a, b], [c, d]) => (`${a}/${b}` < `${c}/${d}` ? -1 : 1));
 }

@@ -3,9 +3,9 @@ import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
 import {t} from './words';
 
-const KEY = 'nepWatched';
-const AFTER_THE_BLOCKS = 10;
-const EDGE = 6;
+const SERIALIZER_NAME = 'nepWatched';
+const SERIALIZER_PRIORITY = 10;
+const PAGE_MARGIN = 6;
 
 /** As `VariableValue.to_json` tells it. */
 export interface VariableValue {
@@ -27,7 +27,7 @@ interface Listener {
   changed(): void;
 }
 
-const all = new WeakMap<Blockly.Workspace, WatchedValues>();
+const instances = new WeakMap<Blockly.Workspace, WatchedValues>();
 
 export class WatchedValues {
   private watched: Watched[] = [];
@@ -35,14 +35,14 @@ export class WatchedValues {
   private readonly cards = new Map<string, HTMLElement>();
   private readonly column = document.createElement('div');
 
-  constructor(private readonly workspace: Blockly.WorkspaceSvg, place: HTMLElement, private readonly listener: Listener) {
+  constructor(private readonly workspace: Blockly.WorkspaceSvg, container: HTMLElement, private readonly listener: Listener) {
     this.column.className = 'nepWatched';
-    place.append(this.column);
-    all.set(workspace, this);
+    container.append(this.column);
+    instances.set(workspace, this);
     workspace.addChangeListener((event) => {
       const renamed = event.type === Blockly.Events.VAR_RENAME || event.type === Blockly.Events.VAR_DELETE ||
         event.type === Blockly.Events.VAR_CREATE;
-      if (renamed && this.watched.length) this.draw();
+      if (renamed && this.watched.length) this.render();
     });
   }
 
@@ -51,20 +51,20 @@ export class WatchedValues {
   }
 
   isWatched(id: string): boolean {
-    return this.watched.some((each) => each.id === id);
+    return this.watched.some((item) => item.id === id);
   }
 
   toggle(id: string): void {
-    this.watched = this.isWatched(id) ? this.watched.filter((each) => each.id !== id) : [...this.watched, {id}];
-    this.draw();
+    this.watched = this.isWatched(id) ? this.watched.filter((item) => item.id !== id) : [...this.watched, {id}];
+    this.render();
     this.listener.changed();
   }
 
-  show(values: Record<string, VariableValue>): void {
+  updateValues(values: Record<string, VariableValue>): void {
     const before = this.values;
     this.values = values;
     for (const [id, card] of this.cards) {
-      if (JSON.stringify(before[id]) !== JSON.stringify(values[id])) this.fill(card, values[id]);
+      if (JSON.stringify(before[id]) !== JSON.stringify(values[id])) this.renderValue(card, values[id]);
     }
   }
 
@@ -73,26 +73,26 @@ export class WatchedValues {
   }
 
   load(saved: unknown): void {
-    const given = Array.isArray(saved) ? saved as Partial<Watched>[] : [];
-    this.watched = given.filter((each): each is Watched => typeof each?.id === 'string');
-    this.draw();
+    const entries = Array.isArray(saved) ? saved as Partial<Watched>[] : [];
+    this.watched = entries.filter((entry): entry is Watched => typeof entry?.id === 'string');
+    this.render();
   }
 
   /** A card for each watched variable; those whose variable is gone are not drawn, undo may bring it back. */
-  private draw(): void {
+  private render(): void {
     this.column.replaceChildren();
     this.cards.clear();
-    for (const each of this.watched) {
-      const variable = this.workspace.getVariableMap().getVariableById(each.id);
+    for (const watched of this.watched) {
+      const variable = this.workspace.getVariableMap().getVariableById(watched.id);
       if (!variable) continue;
-      const card = this.card(each, variable.getName());
-      this.cards.set(each.id, card);
+      const card = this.createCard(watched, variable.getName());
+      this.cards.set(watched.id, card);
       this.column.append(card);
-      this.fill(card, this.values[each.id]);
+      this.renderValue(card, this.values[watched.id]);
     }
   }
 
-  private card(watched: Watched, name: string): HTMLElement {
+  private createCard(watched: Watched, name: string): HTMLElement {
     const card = document.createElement('div');
     card.className = 'nepWatch';
     card.dataset['variable'] = watched.id;
@@ -109,35 +109,35 @@ export class WatchedValues {
     const value = document.createElement('b');
     const items = document.createElement('ol');
     card.append(title, value, close, items);
-    this.move(card, watched);
-    card.onpointerdown = (event) => this.drag(card, watched, event);
+    this.positionCard(card, watched);
+    card.onpointerdown = (event) => this.startDrag(card, watched, event);
     return card;
   }
 
-  private fill(card: HTMLElement, value: VariableValue | undefined): void {
-    const words = card.querySelector('b');
+  private renderValue(card: HTMLElement, value: VariableValue | undefined): void {
+    const text = card.querySelector('b');
     const items = card.querySelector('ol');
-    if (!words || !items) return;
+    if (!text || !items) return;
     const isList = value?.kind === 'list';
-    words.textContent = !value ? '–' : isList ? String(value.length) : value.text;
-    words.title = value && !isList ? value.text : '';
+    text.textContent = !value ? '–' : isList ? String(value.length) : value.text;
+    text.title = value && !isList ? value.text : '';
     card.classList.toggle('list', isList);
-    items.replaceChildren(...(isList ? value.items : []).map((each) => {
+    items.replaceChildren(...(isList ? value.items : []).map((itemText) => {
       const item = document.createElement('li');
-      item.textContent = item.title = each;
+      item.textContent = item.title = itemText;
       return item;
     }));
   }
 
-  private move(card: HTMLElement, {right, top}: Watched): void {
+  private positionCard(card: HTMLElement, {right, top}: Watched): void {
     const moved = typeof right === 'number' && typeof top === 'number';
     card.classList.toggle('moved', moved);
-    card.style.right = moved ? `max(${EDGE}px, min(${right}px, calc(100% - 80px)))` : '';
-    card.style.top = moved ? `max(${EDGE}px, min(${top}px, calc(100% - 40px)))` : '';
+    card.style.right = moved ? `max(${PAGE_MARGIN}px, min(${right}px, calc(100% - 80px)))` : '';
+    card.style.top = moved ? `max(${PAGE_MARGIN}px, min(${top}px, calc(100% - 40px)))` : '';
   }
 
   /** A card follows the hand; it stays inside the page. */
-  private drag(card: HTMLElement, watched: Watched, event: PointerEvent): void {
+  private startDrag(card: HTMLElement, watched: Watched, event: PointerEvent): void {
     if (event.button !== 0 || (event.target as Element).closest('button, ol')) return;
     event.preventDefault();
     const page = this.column.getBoundingClientRect();
@@ -148,10 +148,10 @@ export class WatchedValues {
     card.onpointermove = (now) => {
       moved ||= Math.hypot(now.clientX - from.x, now.clientY - from.y) > 3;
       if (!moved) return;
-      const most = {right: page.width - box.width - EDGE, top: page.height - box.height - EDGE};
-      watched.right = Math.round(Math.max(EDGE, Math.min(most.right, from.right - (now.clientX - from.x))));
-      watched.top = Math.round(Math.max(EDGE, Math.min(most.top, from.top + now.clientY - from.y)));
-      this.move(card, watched);
+      const max = {right: page.width - box.width - PAGE_MARGIN, top: page.height - box.height - PAGE_MARGIN};
+      watched.right = Math.round(Math.max(PAGE_MARGIN, Math.min(max.right, from.right - (now.clientX - from.x))));
+      watched.top = Math.round(Math.max(PAGE_MARGIN, Math.min(max.top, from.top + now.clientY - from.y)));
+      this.positionCard(card, watched);
     };
     card.onpointerup = card.onpointercancel = () => {
       card.onpointermove = card.onpointerup = card.onpointercancel = null;
@@ -160,9 +160,9 @@ export class WatchedValues {
   }
 }
 
-Blockly.serialization.registry.register(KEY, {
-  priority: AFTER_THE_BLOCKS,
-  save: (workspace) => all.get(workspace)?.save() ?? null,
-  load: (state, workspace) => all.get(workspace)?.load(state),
-  clear: (workspace) => all.get(workspace)?.load([]),
+Blockly.serialization.registry.register(SERIALIZER_NAME, {
+  priority: SERIALIZER_PRIORITY,
+  save: (workspace) => instances.get(workspace)?.save() ?? null,
+  load: (state, workspace) => instances.get(workspace)?.load(state),
+  clear: (workspace) => instances.get(workspace)?.load([]),
 });

@@ -1,25 +1,25 @@
 // A block that was let go where it does not fit: why, in a sentence at that place, and out of the way.
 import * as Blockly from 'blockly/core';
-import {freePlace, inSight, obstacles} from './free_place';
+import {findFreePosition, visibleArea, obstacles} from './free_place';
 import {helpFor} from './help';
 import {Hint} from './hint';
 import {lazy, t} from './words';
 
 /** How near a gap was meant, in pixels of the screen. */
-const NEAR = 30;
-const ASIDE = 28;
-const EMPTY_GAP = 40;
+const MAX_DISTANCE_PX = 30;
+const OFFSET = 28;
+const EMPTY_INPUT_SIZE = 40;
 
-const TAKES: Readonly<Record<string, string>> = {
+const TYPE_LABELS: Readonly<Record<string, string>> = {
   Number: lazy('a number'),
   String: lazy('a text'),
   Boolean: lazy('yes or no'),
   List: lazy('a list'),
 };
 
-const ANOTHER = lazy('another value');
+const OTHER_TYPE_LABEL = lazy('another value');
 
-interface Refusal {
+interface DropRejection {
   /** The block at whose gap, or below which, it was let go. */
   by: Blockly.BlockSvg;
   sentence: string;
@@ -27,7 +27,7 @@ interface Refusal {
   place: Blockly.utils.Coordinate;
 }
 
-export class WrongDrops {
+export class RejectedDrops {
   private readonly hint: Hint;
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg) {
@@ -39,91 +39,91 @@ export class WrongDrops {
   }
 
   /** Says why it did not join, if it was let go at something; moves it aside when it covers that. */
-  explain(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void {
-    this.tell(block, this.refusal(block, Blockly.utils.svgMath.screenToWsCoordinates(this.workspace, mouse)));
+  explainDrop(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void {
+    this.showRejection(block, this.findRejection(block, Blockly.utils.svgMath.screenToWsCoordinates(this.workspace, mouse)));
   }
 
   /** The same for a value that was put down with the keys: ``meant`` had them before, a gap, a field or a block. */
-  explainAt(block: Blockly.BlockSvg, meant: Blockly.IFocusableNode): void {
-    if (block.outputConnection) this.tell(block, refusedBy(block, meant));
+  explainKeyboardDrop(block: Blockly.BlockSvg, target: Blockly.IFocusableNode): void {
+    if (block.outputConnection) this.showRejection(block, rejectionAt(block, target));
   }
 
-  private tell(block: Blockly.BlockSvg, refusal: Refusal | null): void {
-    if (!refusal) return;
-    const at = Blockly.utils.svgMath.wsToScreenCoordinates(this.workspace, refusal.place);
-    this.hint.show(refusal.sentence, at);
-    this.moveAside(block, refusal.by);
+  private showRejection(block: Blockly.BlockSvg, rejection: DropRejection | null): void {
+    if (!rejection) return;
+    const position = Blockly.utils.svgMath.wsToScreenCoordinates(this.workspace, rejection.place);
+    this.hint.show(rejection.sentence, position);
+    this.moveAside(block, rejection.by);
   }
 
   private moveAside(block: Blockly.BlockSvg, by: Blockly.BlockSvg): void {
     const mine = block.getBoundingRectangle();
-    const its = by.getBoundingRectangleWithoutChildren();
+    const otherBounds = by.getBoundingRectangleWithoutChildren();
     const inputs = by.getHeightWidth();
-    const right = Math.max(its.right, by.getRelativeToSurfaceXY().x + inputs.width);
-    its.right = right;
-    const said = this.hint.bounds;
+    const right = Math.max(otherBounds.right, by.getRelativeToSurfaceXY().x + inputs.width);
+    otherBounds.right = right;
+    const hintBounds = this.hint.bounds;
     const corner = (x: number, y: number) =>
       Blockly.utils.svgMath.screenToWsCoordinates(this.workspace, new Blockly.utils.Coordinate(x, y));
-    const [from, to] = [corner(said.left, said.top), corner(said.right, said.bottom)];
+    const [from, to] = [corner(hintBounds.left, hintBounds.top), corner(hintBounds.right, hintBounds.bottom)];
     const bubble = new Blockly.utils.Rect(from.y, to.y, from.x, to.x);
-    if (mine.intersects(its)) shift(block, right + ASIDE - mine.left, mine);
-    if (mine.intersects(bubble)) shift(block, bubble.right + ASIDE - mine.left, mine);
-    this.uncover(block, mine, bubble);
+    if (mine.intersects(otherBounds)) shift(block, right + OFFSET - mine.left, mine);
+    if (mine.intersects(bubble)) shift(block, bubble.right + OFFSET - mine.left, mine);
+    this.moveToFreePosition(block, mine, bubble);
   }
 
   /** Where it lies now may be another script: then it goes to the next free place. */
-  private uncover(block: Blockly.BlockSvg, mine: Blockly.utils.Rect, bubble: Blockly.utils.Rect): void {
+  private moveToFreePosition(block: Blockly.BlockSvg, mine: Blockly.utils.Rect, bubble: Blockly.utils.Rect): void {
     const others = obstacles(this.workspace, new Set([block]));
     if (!others.some((other) => other.intersects(mine))) return;
-    const wanted = new Blockly.utils.Coordinate(mine.left, mine.top);
+    const requested = new Blockly.utils.Coordinate(mine.left, mine.top);
     const size = {width: mine.getWidth(), height: mine.getHeight()};
-    const place = freePlace(wanted, size, [...others, bubble], inSight(this.workspace), ASIDE);
-    block.moveBy(place.x - mine.left, place.y - mine.top, ['bump']);
+    const position = findFreePosition(requested, size, [...others, bubble], visibleArea(this.workspace), OFFSET);
+    block.moveBy(position.x - mine.left, position.y - mine.top, ['bump']);
   }
 
-  private refusal(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): Refusal | null {
-    const own = new Set(block.getDescendants(false));
-    const near = NEAR / this.workspace.scale;
-    let best: Refusal | null = null;
+  private findRejection(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): DropRejection | null {
+    const ownBlocks = new Set(block.getDescendants(false));
+    const maxDistance = MAX_DISTANCE_PX / this.workspace.scale;
+    let best: DropRejection | null = null;
     let nearest = Infinity;
-    const look = (distance: number, make: () => Refusal | null) => {
+    const consider = (distance: number, make: () => DropRejection | null) => {
       if (distance >= nearest) return;
-      const made = make();
-      if (made) [best, nearest] = [made, distance];
+      const candidate = make();
+      if (candidate) [best, nearest] = [candidate, distance];
     };
     const corner = block.getRelativeToSurfaceXY();
     for (const other of this.workspace.getAllBlocks(false)) {
-      if (own.has(other) || other.isShadow() || other.isInsertionMarker() || other.isCollapsed()) continue;
+      if (ownBlocks.has(other) || other.isShadow() || other.isInsertionMarker() || other.isCollapsed()) continue;
       for (const input of other.inputList) {
         const gap = input.connection as Blockly.RenderedConnection | null;
         if (!gap || !input.isVisible()) continue;
-        const distance = Math.min(far(corner, gap), inGap(gap, mouse) ? 0 : Infinity);
-        if (distance < near) look(distance, () => atGap(block, other, gap));
+        const distance = Math.min(distanceBetween(corner, gap), isInInput(gap, mouse) ? 0 : Infinity);
+        if (distance < maxDistance) consider(distance, () => rejectionAtInput(block, other, gap));
       }
-      const end = below(other);
-      if (end && far(corner, end) < near) look(far(corner, end), () => under(block, other, end));
+      const end = nextBlockPosition(other);
+      if (end && distanceBetween(corner, end) < maxDistance) consider(distanceBetween(corner, end), () => rejectionBelow(block, other, end));
     }
     return best;
   }
 }
 
 /** Why a value does not go where the keys were. */
-function refusedBy(block: Blockly.BlockSvg, meant: Blockly.IFocusableNode): Refusal | null {
-  if (meant instanceof Blockly.RenderedConnection) return atGap(block, meant.getSourceBlock(), meant);
-  const held = meant instanceof Blockly.Field ? meant.getSourceBlock() : meant;
-  if (!(held instanceof Blockly.BlockSvg)) return null;
-  if (held.isShadow() && held.outputConnection?.targetConnection) {
-    const gap: Blockly.RenderedConnection = held.outputConnection.targetConnection;
-    return atGap(block, gap.getSourceBlock(), gap);
+function rejectionAt(block: Blockly.BlockSvg, target: Blockly.IFocusableNode): DropRejection | null {
+  if (target instanceof Blockly.RenderedConnection) return rejectionAtInput(block, target.getSourceBlock(), target);
+  const targetBlock = target instanceof Blockly.Field ? target.getSourceBlock() : target;
+  if (!(targetBlock instanceof Blockly.BlockSvg)) return null;
+  if (targetBlock.isShadow() && targetBlock.outputConnection?.targetConnection) {
+    const gap: Blockly.RenderedConnection = targetBlock.outputConnection.targetConnection;
+    return rejectionAtInput(block, gap.getSourceBlock(), gap);
   }
-  const gaps = held.inputList.map((input) => input.connection as Blockly.RenderedConnection | null)
+  const gaps = targetBlock.inputList.map((input) => input.connection as Blockly.RenderedConnection | null)
     .filter((gap): gap is Blockly.RenderedConnection => gap?.type === Blockly.ConnectionType.INPUT_VALUE);
   for (const gap of gaps) {
-    const refusal = atGap(block, held, gap);
-    if (refusal) return refusal;
+    const rejection = rejectionAtInput(block, targetBlock, gap);
+    if (rejection) return rejection;
   }
-  const end = below(held);
-  return end && under(block, held, end);
+  const end = nextBlockPosition(targetBlock);
+  return end && rejectionBelow(block, targetBlock, end);
 }
 
 function shift(block: Blockly.BlockSvg, by: number, box: Blockly.utils.Rect): void {
@@ -132,12 +132,12 @@ function shift(block: Blockly.BlockSvg, by: number, box: Blockly.utils.Rect): vo
   box.right += by;
 }
 
-function far(one: {x: number; y: number}, other: {x: number; y: number}): number {
-  return Math.hypot(one.x - other.x, one.y - other.y);
+function distanceBetween(point: {x: number; y: number}, other: {x: number; y: number}): number {
+  return Math.hypot(point.x - other.x, point.y - other.y);
 }
 
 /** Where the next block begins, or would. */
-function below(block: Blockly.BlockSvg): Blockly.utils.Coordinate | null {
+function nextBlockPosition(block: Blockly.BlockSvg): Blockly.utils.Coordinate | null {
   if (block.outputConnection) return null;
   const {x, y} = block.getRelativeToSurfaceXY();
   const {nextConnection} = block;
@@ -146,48 +146,48 @@ function below(block: Blockly.BlockSvg): Blockly.utils.Coordinate | null {
 }
 
 /** Whether the mouse is in a gap for a value. */
-function inGap(gap: Blockly.RenderedConnection, mouse: Blockly.utils.Coordinate): boolean {
+function isInInput(gap: Blockly.RenderedConnection, mouse: Blockly.utils.Coordinate): boolean {
   if (gap.type !== Blockly.ConnectionType.INPUT_VALUE) return false;
-  const held = gap.targetBlock();
-  if (held && !held.isShadow()) return false;
-  const size = held?.getHeightWidth() ?? {width: EMPTY_GAP, height: EMPTY_GAP};
+  const targetBlock = gap.targetBlock();
+  if (targetBlock && !targetBlock.isShadow()) return false;
+  const size = targetBlock?.getHeightWidth() ?? {width: EMPTY_INPUT_SIZE, height: EMPTY_INPUT_SIZE};
   return mouse.x > gap.x && mouse.x < gap.x + size.width && mouse.y > gap.y - 4 && mouse.y < gap.y + size.height;
 }
 
-function atGap(block: Blockly.BlockSvg, other: Blockly.BlockSvg, gap: Blockly.RenderedConnection): Refusal | null {
+function rejectionAtInput(block: Blockly.BlockSvg, other: Blockly.BlockSvg, gap: Blockly.RenderedConnection): DropRejection | null {
   const place = new Blockly.utils.Coordinate(gap.x, gap.y);
-  const name = nameOf(block);
+  const name = blockName(block);
   if (gap.type === Blockly.ConnectionType.NEXT_STATEMENT) {
-    return block.outputConnection ? {by: other, place, sentence: isValue(name)} : null;
+    return block.outputConnection ? {by: other, place, sentence: valueMessage(name)} : null;
   }
   if (!block.outputConnection) {
     return {by: other, place, sentence: t('“{block}” doesn\'t return a value, so it doesn\'t fit into a value slot. Place it below another block.', {block: name})};
   }
   const check = gap.getCheck();
   const gives = block.outputConnection.getCheck();
-  if (!check || !gives || check.some((each) => gives.includes(each))) return null;
+  if (!check || !gives || check.some((type) => gives.includes(type))) return null;
   const kind = check[0] ?? '';
-  const what = t(TAKES[kind] ?? ANOTHER);
+  const expected = t(TYPE_LABELS[kind] ?? OTHER_TYPE_LABEL);
   const owner = helpFor(other.type)?.name;
-  const sentence = owner ? t('“{block}” needs {what} here', {block: owner, what}) : t('This slot needs {what}', {what});
+  const sentence = owner ? t('“{block}” needs {what} here', {block: owner, what: expected}) : t('This slot needs {what}', {what: expected});
   return {by: other, place, sentence};
 }
 
-function under(block: Blockly.BlockSvg, other: Blockly.BlockSvg, place: Blockly.utils.Coordinate): Refusal | null {
-  const name = nameOf(block);
-  if (block.outputConnection) return {by: other, place, sentence: isValue(name)};
+function rejectionBelow(block: Blockly.BlockSvg, other: Blockly.BlockSvg, place: Blockly.utils.Coordinate): DropRejection | null {
+  const name = blockName(block);
+  if (block.outputConnection) return {by: other, place, sentence: valueMessage(name)};
   if (!block.previousConnection) {
     return {by: other, place, sentence: t('“{block}” starts a script, so no block can be above it', {block: name})};
   }
-  if (!other.nextConnection) return {by: other, place, sentence: t('“{block}” can\'t have blocks below it', {block: nameOf(other)})};
+  if (!other.nextConnection) return {by: other, place, sentence: t('“{block}” can\'t have blocks below it', {block: blockName(other)})};
   if (block.nextConnection || !other.getNextBlock()) return null;
   return {by: other, place, sentence: t('“{block}” can\'t have blocks below it. Place it at the end.', {block: name})};
 }
 
-function isValue(name: string): string {
+function valueMessage(name: string): string {
   return t('“{block}” is a value. Drag it into a slot of another block.', {block: name});
 }
 
-function nameOf(block: Blockly.BlockSvg): string {
+function blockName(block: Blockly.BlockSvg): string {
   return helpFor(block.type)?.name || t('this block');
 }
