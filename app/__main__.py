@@ -1,8 +1,8 @@
-"""Entry points of NEP Studio: the window, running a behaviour without a window, and child processes.
+"""Entry points of NEP Studio: the window, a behaviour without a window, the self-test, and child processes.
 
-``python -m app [FILE ...]`` opens the window; ``python -m app run FILE`` runs a behaviour without it. A
-frozen build also starts its child processes from the same executable: ``--child`` runs a program, ``--module
-NAME`` runs one of `CHILD_MODULES`.
+``python -m app [FILE ...]`` opens the window; ``python -m app run FILE`` runs a behaviour without it;
+``python -m app --selftest DIR`` tests this installation. A frozen build also starts its child processes from
+the same executable: ``--child`` runs a program, ``--module NAME`` runs one of `CHILD_MODULES`.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def run_parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run Studio and return the exit code (0 on success).
+    """Run Studio and return the exit code: 0 on success, 2 if a required package is missing.
 
     Args:
         arguments: Command-line arguments (default: those of the process).
@@ -241,6 +241,8 @@ def run_behaviour(arguments: Sequence[str]) -> int:
 
 def run_child_module(module: str, arguments: Sequence[str]) -> int:
     """Run a module as ``__main__`` in this process and return the exit code.
+
+    If the module calls `sys.exit`, the SystemExit is passed on.
 
     Args:
         module: One of `CHILD_MODULES`; for any other module, the exit code is 2.

@@ -15,7 +15,7 @@
     │   └── DeclarationError a driver's Python declaration is invalid
     ├── RobotInputError      an action's input is invalid
     ├── RobotValueError      a driver's value doesn't match its declared type
-    └── RobotUnknownError    a robot is not connected
+    └── UnknownRobotError    a robot is not connected
 
 Messages start with a lower-case letter and have no full stop; values are in quotes, and the next step
 follows after a semicolon.

@@ -338,7 +338,11 @@ class _RunEvents:
 
 
 def stop_lines(report: StopReport) -> list[str]:
-    """Format the result of a stop as lines, with one line for each robot that has not stopped."""
+    """Format the result of a stop as lines; empty if there was nothing to stop.
+
+    There is one line if all robots have stopped, otherwise one for each robot. Each program that
+    replied on behalf of a robot adds a line.
+    """
     strange = [
         _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored.").format(
             program=program, robot=name

@@ -24,6 +24,7 @@
     ├── DecodeError             received bytes can't be decoded
     │   └── WireError               received frames violate the native wire format
     ├── RecordingError          a recording can't be written or read
+    │   └── RecordingTooLargeError  reading a recording would exceed a limit
     └── RecordingsUnavailableError  packages that recordings need are not installed
 
 `WrongTypeError` is raised for arguments of a wrong type; it is a `TypeError` and a `ValueError`.

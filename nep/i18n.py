@@ -328,7 +328,11 @@ def best_match(locale_name: str, folder: Path = LOCALE_FOLDER) -> str:
 
 
 def system_language(environ: Mapping[str, str] = os.environ, platform: str = sys.platform) -> str:
-    """Return the operating system's locale, such as "es_MX"; English if it can't be determined."""
+    """Return the user's locale, such as "es_MX.UTF-8" or "es-MX"; English if it can't be determined.
+
+    Environment variables such as LANG take precedence over the setting of Windows or macOS. The locales
+    C and POSIX are English.
+    """
     for name in ("LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG"):
         value = environ.get(name, "").partition(":")[0]
         if value:

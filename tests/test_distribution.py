@@ -181,7 +181,9 @@ def fresh_environment(folder: Path, asked_for: Iterable[Requirement]) -> Path:
     return venv_python(folder, sys.platform)
 
 
-def test_installed_wheel_runs_messages_services_and_commands_in_a_fresh_environment(built: Built, tmp_path: Path) -> None:
+def test_installed_wheel_runs_messages_services_and_commands_in_a_fresh_environment(
+    built: Built, tmp_path: Path
+) -> None:
     python = fresh_environment(tmp_path / "fresh", built.metadata().requires_dist or ())
     pip = [sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index"]
     for step in (

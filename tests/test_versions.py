@@ -126,7 +126,9 @@ def test_mac_package_uses_wheels_for_the_oldest_macos(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("platform", "is_for_oldest"), [("darwin", False), ("linux", True), ("win32", True)])
-def test_pip_selects_the_wheels_except_for_the_oldest_macos(platform: str, is_for_oldest: bool, tmp_path: Path) -> None:
+def test_pip_selects_the_wheels_except_for_the_oldest_macos(
+    platform: str, is_for_oldest: bool, tmp_path: Path
+) -> None:
     system = Pythons({})
     environment(
         system.computer(platform), "python3", tmp_path / "env", "package", is_for_oldest=is_for_oldest

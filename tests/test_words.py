@@ -232,7 +232,9 @@ def test_nep_lang_overrides_the_language_setting(monkeypatch) -> None:
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.9, "es"), (0.89, "en")])
-def test_system_language_is_used_if_90_per_cent_of_its_texts_are_translated(share, expected, spanish, monkeypatch) -> None:
+def test_system_language_is_used_if_90_per_cent_of_its_texts_are_translated(
+    share, expected, spanish, monkeypatch
+) -> None:
     monkeypatch.setenv("NEP_LANG", "")
     monkeypatch.setenv("LANGUAGE", "es_MX")
     known = {"en": {"share": 1.0}, "es": {"share": share}}

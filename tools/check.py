@@ -1,8 +1,8 @@
 """Run all checks of the project, cheapest first.
 
     python tools/check.py           ruff, format, mypy, lint-imports, test collection, pytest
-    python tools/check.py --fast    the same without pytest
-    python tools/check.py -- ARGS   arguments after -- are passed on to pytest
+    python tools/check.py --fast    the same without test collection and pytest
+    python tools/check.py -- ARGS   arguments after -- are passed on to pytest; without test collection
 
 All checks run, even after a failure; the exit code is 1 if any check failed. Test collection writes pytest's
 compiled files, which otherwise every worker would compile. It takes as long as mypy, which uses a single

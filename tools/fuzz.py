@@ -52,6 +52,10 @@ def findings_in(folder: Path) -> list[Path]:
 def fuzz(computer: Computer, arguments: Sequence[str], folder: Path = FOLDER) -> int:
     """Fuzz the requested targets; return 1 if there are findings, else 0.
 
+    With ``--list`` or ``--again``, targets are listed or one input is run instead. If the harness
+    fails, its exit code is returned. Raises Trouble on other systems than Linux and for unknown
+    targets.
+
     Args:
         computer: Computer to run on.
         arguments: Command-line arguments.

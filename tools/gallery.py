@@ -169,7 +169,7 @@ def pictures(percent: int) -> QPixmap:
 
 
 def main() -> int:
-    """Show the gallery or save its image."""
+    """Show the gallery or save its image; return 1 if the image can't be saved."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("picture", nargs="?", type=Path)
     parser.add_argument("--text", type=int, default=100)

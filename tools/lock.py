@@ -56,7 +56,7 @@ def command(uv: str, extra: str, output: Path, upgrade: bool) -> list[str]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write all files; return 2 if uv is missing."""
+    """Write all files; return 0, 2 if uv is missing, or the exit code of uv if it fails."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -146,7 +146,7 @@ def page() -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write or check both pages; return 1 if one is out of date."""
+    """Write both pages; with ``--check``, write nothing and return 1 if one is out of date."""
     parser = argparse.ArgumentParser(description="Write the map of the packages.")
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if out of date")
     options = parser.parse_args(arguments)

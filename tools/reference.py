@@ -522,7 +522,7 @@ def pages() -> dict[str, str]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write or check the pages; return 1 if they are out of date."""
+    """Write the pages; with ``--check``, write nothing and return 1 if they are out of date."""
     parser = argparse.ArgumentParser(description="Write the reference from the docstrings.")
     parser.add_argument("--check", action="store_true", help="write nothing; 1 when a page is old")
     options = parser.parse_args(arguments)

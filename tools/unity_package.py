@@ -86,7 +86,7 @@ def build(folder: Path) -> Path:
 
 
 def main() -> int:
-    """Build the package into the folder given on the command line; return the exit code."""
+    """Build the package into the folder given on the command line; return 0, or 2 without a folder."""
     if len(sys.argv) != 2:
         print(__doc__, file=sys.stderr)
         return 2

@@ -1,7 +1,7 @@
 """Blocks as data, and the compiler from a workspace to a Python program.
 
-This package exports the compiler; exported programs import `app.blocks.commands`. ``editor/`` contains the
-editor's page in TypeScript.
+This package exports the compiler and the definitions for the editor; exported programs import
+`app.blocks.commands`. ``editor/`` contains the editor's page in TypeScript.
 """
 
 from __future__ import annotations

@@ -78,7 +78,8 @@ class RepeatFilter:
     def filter(self, record: logging.LogRecord) -> logging.LogRecord | None:
         """Return the record to write, or None to suppress it. Never raises.
 
-        The number of occurrences is appended to the text of a repetition.
+        Of equal records, the first, 10th, 100th and so on are written. The number of occurrences is
+        appended to the text of a repetition, which has no traceback.
         """
         record = _make_formattable(record)
         key = (record.name, record.levelno, _raise_location(record) or record.getMessage())

@@ -280,7 +280,10 @@ def offer_first_steps(window: MainWindow, *, has_request: bool) -> None:
 
 
 def show_first_page(window: MainWindow, options: Options) -> list[Callable[[], object]]:
-    """Prepare the first page and return the steps that complete it after the first paint."""
+    """Prepare the first page and return the steps that complete it after the first paint.
+
+    With a self-drive, the session is started immediately and there are no steps.
+    """
     layout = "" if options.is_standalone else last_layout(window)
     has_request = bool(options.files or options.demo)
     if options.self_drive is not None:
@@ -329,6 +332,8 @@ def startup_problem(environ: Mapping[str, str], platform: str, user: int) -> str
 
 def run(options: Options) -> int:
     """Show the window and run the event loop until the window is closed.
+
+    If Studio is already running, its window opens the files instead, and this function returns 0.
 
     Returns:
         The exit code: 0 on success, 1 if an unattended run failed, 2 if no window can be opened, or

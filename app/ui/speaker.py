@@ -218,7 +218,7 @@ class QtEngine:
             ended()
 
     def speak(self, text: str, language: str, volume: float, ended: Callable[[], None]) -> str:
-        """Start to speak a text; return an error message if there is no voice for the language."""
+        """Start to speak a text; return "", or an error message if no voice can speak the language."""
         voice = self._get_voice()
         locales = voice.availableLocales() if voice is not None else []
         locale = next((each for each in locales if each.name().split("_")[0] == language), None)
@@ -234,7 +234,7 @@ class QtEngine:
         return ""
 
     def play(self, notes: Notes, volume: float) -> str:
-        """Start to play tones on the default audio output; return an error message if there is none."""
+        """Start to play tones on the default audio output; return "", or an error message without one."""
         try:
             from PySide6.QtMultimedia import QAudioFormat, QAudioSink, QMediaDevices  # noqa: PLC0415 (heavy)
         except (ImportError, RuntimeError) as error:

@@ -25,7 +25,7 @@ from installers.inventory.wheels import parts_in_wheels  # noqa: E402
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; return the exit code."""
+    """Run the command line; return 0, or 1 if a part has no known licence."""
     system, epoch, program_folder, folder, bill_file = sys.argv[1:] if arguments is None else arguments
     version = metadata.version(PROJECT)
     try:

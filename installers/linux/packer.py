@@ -115,7 +115,10 @@ def archive(context: Context) -> Path:
 
 
 def debian_package(context: Context) -> Path:
-    """Build the .deb for Debian and Ubuntu."""
+    """Build the .deb for Debian and Ubuntu and return its path.
+
+    Raises PackageError if dpkg-deb isn't installed or fails.
+    """
     if shutil.which("dpkg-deb") is None:
         raise PackageError("dpkg-deb is not on this computer; the .deb is made on Debian and Ubuntu")
     root = context.work / "deb"

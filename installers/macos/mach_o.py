@@ -39,7 +39,10 @@ class Slice:
 
 
 def read(path: Path) -> tuple[Slice, ...]:
-    """Return the slices of a file; empty if it isn't Mach-O. Raises OSError."""
+    """Return the slices of a file; empty if it isn't Mach-O or is truncated.
+
+    Raises OSError if the file can't be read.
+    """
     with path.open("rb") as file:
         try:
             return tuple(_slices(file))

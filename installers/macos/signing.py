@@ -65,7 +65,9 @@ class Piece:
 
 
 def identity_of(environ: Mapping[str, str]) -> Identity:
-    """Return the identity from environment variables; see the module's documentation.
+    """Return the identity from environment variables (see the module's documentation).
+
+    Without any of them, this is the ad hoc identity.
 
     Raises:
         PackageError: Only some of the required variables are set.

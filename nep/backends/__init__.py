@@ -1,5 +1,6 @@
 """Back ends: implementations of the transport between nodes.
 
-Each module or package in this folder defines one `BACKEND`, except `base`, which defines the interface.
-`memory` is the reference implementation to copy from; `zeromq` is the default back end.
+A module or package in this folder that binds ``BACKEND`` is a back end; `base` defines the interface, and the
+other modules contain what several back ends share. `memory` is the reference implementation to copy from;
+`zeromq` is the default back end.
 """

@@ -229,7 +229,10 @@ def format_rate(value_hz: float | None) -> str:
 
 
 def size(value: float | None, per: str = "") -> str:
-    """Format a number of bytes with a unit, followed by `per`, such as "/s"."""
+    """Format a number of bytes with a unit, followed by `per`, such as "/s".
+
+    Returns `UNKNOWN` if the number is None.
+    """
     if value is None:
         return UNKNOWN
     for unit in ("B", "kB", "MB"):

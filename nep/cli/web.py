@@ -1,4 +1,4 @@
-"""`nep web`: rosbridge server for web pages and programs."""
+"""`nep web`: server for web pages and programs with rosbridge's protocol and, on request, Foxglove's."""
 
 from __future__ import annotations
 
@@ -135,7 +135,11 @@ def _start(server: WebServer) -> None:
 
 
 def _read_or_create_token(file: Path | None, *, is_needed: bool) -> str:
-    """Return the token, reading or creating it if needed; "" if none is required. Raises `NepError`."""
+    """Return the token in `file`, which is created if it doesn't exist.
+
+    Without a file, returns a new token, or "" if none is needed. Raises `NepError` if the file can't be
+    used or contains no valid token.
+    """
     if file is None:
         return new_token() if is_needed else ""
     try:

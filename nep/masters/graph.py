@@ -86,7 +86,10 @@ class OutgoingMessage(NamedTuple):
 
 
 def without_nodes(reply: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
-    """Return a copy of an answer that doesn't contain the given nodes, which have turned out to be dead."""
+    """Return a copy of an answer that doesn't contain the given nodes, which have turned out to be dead.
+
+    Answers other than `FoundReply` and `AddedReply` are returned unchanged.
+    """
     if isinstance(reply, FoundReply) and node_ids:
         return replace(
             reply, publishers=tuple(each for each in reply.publishers if each.node_id not in node_ids)
@@ -101,7 +104,10 @@ def without_nodes(reply: Reply | Push, node_ids: frozenset[str]) -> Reply | Push
 
 
 def with_hosts(reply: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
-    """Return a copy of an answer that contains the addresses at which the master serves other computers."""
+    """Return a copy of an answer that contains the addresses at which the master serves other computers.
+
+    Answers without a field for them are returned unchanged, and all answers if `hosts` is empty.
+    """
     if not hosts:
         return reply
     if isinstance(reply, AddedReply | FoundReply | RenewedReply):

@@ -1,4 +1,4 @@
-"""Functions that find a running master, or start one in a separate process."""
+"""Functions that find and query a running master, or start one in a separate process."""
 
 from __future__ import annotations
 

@@ -340,7 +340,10 @@ class JsonEncoder:
         self._warned_at = -math.inf
 
     def encode(self, payload: object) -> Encoded:
-        """Encode a payload as JSON. Raises `EncodeError`."""
+        """Encode a payload as JSON. Raises `EncodeError`.
+
+        NaN and infinity are replaced by `null`; such messages are counted and logged.
+        """
         encoded_payload = self._encode(payload)
         data = encoded_payload.data
         if type(data) is bytes and data.rfind(NULL) >= 0:
@@ -377,6 +380,8 @@ def _may_have_nan(payload: object) -> bool:
 
 def find_nan(value: object, path: str = "", depth: int = _MAX_DEPTH) -> str | None:
     """Return the path of the first NaN or infinity in a payload, or None if there is none.
+
+    The path is "" if the payload itself is NaN or infinity.
 
     Args:
         value: Payload, or a part of it.

@@ -19,7 +19,10 @@ _PLAIN_NAME = re.compile(r"[^.\[\]\"\s]+")
 
 
 def parse_path(text: str) -> Path:
-    """Parse a field path. Raises `NepError`."""
+    """Parse a field path; "." is the whole value, an empty path.
+
+    Raises `NepError` if the syntax is invalid.
+    """
     if text == ".":
         return ()
     steps: list[str | int] = []
@@ -46,7 +49,7 @@ def parse_path(text: str) -> Path:
 
 
 def value_at(payload: object, path: Path) -> object:
-    """Return the value at a path, or `MISSING`."""
+    """Return the value at a path, or `MISSING` if the payload has no such field or index."""
     value = payload
     for step in path:
         if type(value) is dict:  # common case: isinstance checks of abstract classes take ten times as long

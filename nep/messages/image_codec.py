@@ -72,7 +72,10 @@ class ImageFormat:
             check_range("width", self.width, 1, MAX_WIDTH)
 
     def encode(self, payload: object) -> Encoded:
-        """Encode an image. Raises `EncodeError`."""
+        """Encode an image in this format; JPEG and PNG files pass unchanged.
+
+        Raises `EncodeError` if the payload isn't an image, or if a package for encoding is missing.
+        """
         if isinstance(payload, bytes | bytearray | memoryview):
             return encode(payload)
         try:
@@ -131,7 +134,10 @@ def _numpy() -> ModuleType:
 
 
 def encode(payload: object) -> Encoded:
-    """Encode an image in the default format; JPEG and PNG files pass unchanged. Raises `EncodeError`."""
+    """Encode an image in the default format; JPEG and PNG files pass unchanged.
+
+    Raises `EncodeError` if the payload isn't an image, or if a package for encoding is missing.
+    """
     kind = type(payload).__name__
     if isinstance(payload, bytes | bytearray | memoryview):
         data = bytes(payload)

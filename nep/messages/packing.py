@@ -14,11 +14,11 @@ _MIN_INT, _MAX_INT = -(2**63), 2**64 - 1
 
 
 def pack(value: object, default: Callable[[object], object] | None = None) -> bytes:
-    """Encode a value as msgpack. Raises `ValueError`.
+    """Encode a value as msgpack. Raises `ValueError` if msgpack can't represent the value.
 
     Args:
-        value: The value. A datetime becomes msgpack's timestamp; without a time zone it is local time, as in
-            Python.
+        value: The value. A datetime becomes msgpack's timestamp; without a time zone it is local time,
+            as in Python.
         default: Converts values of other types.
     """
     try:
@@ -82,7 +82,7 @@ def _to_hashable(key: object) -> object:
 
 
 def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
-    """Decode untrusted msgpack as `unpack` does, with limits. Raises `ValueError`.
+    """Decode untrusted msgpack as `unpack` does, with limits.
 
     Without limits, a message of a megabyte could contain a million empty lists, which take seconds to
     create.
@@ -91,6 +91,9 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
         data: Encoded value.
         most_lists: Maximum number of lists and maps.
         longest: Maximum length of a list or map.
+
+    Raises:
+        ValueError: The data isn't valid msgpack, or exceeds a limit.
     """
     remaining = most_lists
 

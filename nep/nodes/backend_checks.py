@@ -57,7 +57,10 @@ def check_history(backend: Backend, history: int, configuration: Configuration) 
 
 
 def check_quality(backend: Backend, qos: str) -> str:
-    """Validate a quality of service and return it. Raises `ValueError`."""
+    """Validate a quality of service and return it; "" is the back end's default.
+
+    Raises `ValueError` if the back end doesn't support it.
+    """
     if qos and not backend.qos:
         raise ValueError(
             _("the back end '{name}' doesn't support quality of service; omit qos").format(name=backend.name)

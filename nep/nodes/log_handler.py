@@ -211,7 +211,10 @@ class LogHandler(logging.Handler):
         return self._dropped
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Queue a record for the handler's thread."""
+        """Queue a record for the handler's thread.
+
+        Records beyond the rate limit are dropped and counted.
+        """
         if (
             getattr(record, _PUBLISHED_BY_ATTRIBUTE, None) is self
             or threading.current_thread() is self._thread

@@ -52,7 +52,10 @@ forks.call_in_child(_forked)
 
 
 def loop_wait() -> LoopWait:
-    """Return the `LoopWait` of the running loop; create it if needed. Raises `TooManyFilesError`."""
+    """Return the `LoopWait` of the running loop; create it if needed.
+
+    Raises `TooManyFilesError`, or `RuntimeError` if no loop is running.
+    """
     loop = asyncio.get_running_loop()
     with _lock:
         watcher = _waits.get(id(loop))

@@ -101,12 +101,12 @@ class Subscriber:
         Messages that can't be decoded are skipped, logged, and reported as an alert in the graph.
 
         Args:
-            block_mode: True to wait without limit.
+            block_mode: True to wait without limit, unless `timeout_s` is given.
             timeout_s: Time limit in seconds. Without either argument the call doesn't wait.
 
         Raises:
             ClosedError: The subscriber is closed.
-            ValueError: `timeout_s` is negative.
+            ValueError: `timeout_s` is negative or not a number.
         """
         try:
             is_wrong = timeout_s is not None and not timeout_s >= 0.0

@@ -27,7 +27,10 @@ MsgType = str | type
 
 
 def name_of(msg_type: object) -> str:
-    """Return the registered name of a message type. Raises `ValueError`."""
+    """Return the name of a message type: the name that a class declares, or the string itself.
+
+    Raises `ValueError` if the name is invalid, or if the class can't be a message type.
+    """
     return (
         typed.message_type(msg_type).name
         if isinstance(msg_type, type)
@@ -44,9 +47,10 @@ def codec_of(backend: Backend, msg_type: MsgType) -> Codec:
 
 
 def wrap_sink(msg_type: MsgType, sink: Sink | None) -> Sink | None:
-    """Return a sink that passes messages with typed payloads to `sink`, or `sink` itself for a type name.
+    """Return a sink that passes messages with typed payloads to `sink`.
 
-    Returns None for None. Raises `ValueError` if `sink` isn't callable.
+    Returns `sink` itself if `msg_type` is a name, and None if `sink` is None. Raises `ValueError` if
+    `sink` isn't callable or `msg_type` is a class that can't be a message type.
     """
     if sink is None or not isinstance(msg_type, type):
         return None if sink is None else check_function("sink", sink)

@@ -515,7 +515,7 @@ Push = PublisherAdded | PublisherRemoved | Probe
 
 
 def node_of(request: Request) -> str | None:
-    """Return the id of the node on whose behalf a request is sent, or None."""
+    """Return the id of the node on whose behalf a request is sent, or None if there is none."""
     if isinstance(request, Join | AddPublisher | AddSubscriber):
         return request.node.id
     if isinstance(request, ReportAlerts | Listen | QueryGraph | Ping):

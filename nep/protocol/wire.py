@@ -377,6 +377,8 @@ def parse_remaining_parts(
 ) -> tuple[Header, bytes | memoryview, Mapping[str, object]]:
     """Parse the parts after the first: header, payload and extension. Raises `WireError`.
 
+    The extension is an empty map if the message has none.
+
     Args:
         rest: The parts.
         is_one_part: True if the parts were split from one part; only then a batch is allowed.

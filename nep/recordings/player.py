@@ -262,7 +262,11 @@ class Playback:
         )
 
     def advance(self) -> DueMessages:
-        """Return the messages that are due. Must be called again within `DueMessages.wait_s` seconds."""
+        """Return the messages that are due.
+
+        Must be called again within `DueMessages.wait_s` seconds unless that is None. After a seek,
+        returns the messages at the new position, even while paused.
+        """
         if self._jump is not None:
             messages, self._jump = self._jump, None
             return DueMessages(messages, is_jump=True, wait_s=0.0 if self._is_playing else None)

@@ -96,7 +96,10 @@ def check_range(name: str, value: object, minimum: int, maximum: int) -> int:
 
 
 def check_optional_time_limit(name: str, value: object) -> float | None:
-    """Validate a non-negative time limit in seconds, or None, and return it. Raises `ValueError`."""
+    """Validate a non-negative time limit in seconds, or None, and return it; None for infinity.
+
+    Raises `ValueError`.
+    """
     if value is None:
         return None
     if not isinstance(value, int | float) or isinstance(value, bool):
@@ -132,7 +135,10 @@ def check_period(name: str, value: object) -> float:
 
 
 def check_time_limit(name: str, value: object) -> float:
-    """Validate a non-negative time limit in seconds and return it. None is rejected. Raises `ValueError`."""
+    """Validate a non-negative time limit in seconds, which may be infinite, and return it as a number.
+
+    Raises `ValueError`, also for None.
+    """
     if value is None:
         raise WrongTypeError(
             _("{name} must be a number of seconds (0 or greater), not None").format(name=name)

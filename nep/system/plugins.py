@@ -1,6 +1,7 @@
 """Plug-in discovery.
 
-Each module of a plug-in package binds one object, so that a new file is a new plug-in.
+A module of a plug-in package that binds an object of a given name is a plug-in, so that a new file is a new
+plug-in. Other distributions can add plug-ins as entry points (`discover`).
 """
 
 from __future__ import annotations

@@ -80,10 +80,13 @@ def print_error(text: str) -> None:
 
 
 def output_problem(raised: OSError | None = None) -> str | None:
-    """Return the reason why stdout can't be written; "" if its reader has exited, None if stdout works.
+    """Return the reason why stdout can't be written, or None if stdout works.
 
-    Unwritten text stays in the buffer, so a failed write is detected by flushing again. Text larger than the
-    buffer is lost; pass the exception of that write as `raised`, because it is the only evidence.
+    The reason is "" if the reader of stdout has exited or stdout is closed.
+
+    Unwritten text stays in the buffer, so a failed write is detected by flushing again. Text larger
+    than the buffer is lost; pass the exception of that write as `raised`, because it is the only
+    evidence.
     """
     try:
         sys.stdout.flush()

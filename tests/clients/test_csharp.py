@@ -212,7 +212,9 @@ def test_payloads_of_every_type_arrive_in_both_directions(
     assert event.get("value", event["payload"]) == sent
 
 
-def test_burst_to_csharp_and_large_messages_from_csharp_arrive_and_excess_counts_as_lost(adapter: Adapter, node: Node) -> None:
+def test_burst_to_csharp_and_large_messages_from_csharp_arrive_and_excess_counts_as_lost(
+    adapter: Adapter, node: Node
+) -> None:
     sub = adapter.ask("subscriber", topic="burst", type="json")["sub"]
     publisher = node.new_pub("burst", "json")
     for number in range(2000):

@@ -136,7 +136,9 @@ def test_xpub_reports_each_subscription_and_serves_every_filter(context, stack: 
     assert xpub.end() == 0
 
 
-def test_xpub_bounds_the_queue_of_a_slow_reader_and_delivers_accepted_messages(context, stack: ExitStack) -> None:
+def test_xpub_bounds_the_queue_of_a_slow_reader_and_delivers_accepted_messages(
+    context, stack: ExitStack
+) -> None:
     xpub = started(stack, "xpub", "127.0.0.1", "queue=8000000")
     endpoint = f"tcp://127.0.0.1:{xpub.line().split()[1]}"
     with context.socket(zmq.SUB) as slow:

@@ -74,7 +74,9 @@ def test_panels_are_restored_after_a_restart(start: Callable[..., Studio]) -> No
     )
 
 
-def test_inspected_topic_of_the_developer_layout_is_restored_after_a_restart(start: Callable[..., Studio]) -> None:
+def test_inspected_topic_of_the_developer_layout_is_restored_after_a_restart(
+    start: Callable[..., Studio],
+) -> None:
     studio = start()
     studio.click("Use the virtual robot")
     studio.says("Pepper ready", 40)

@@ -16,7 +16,9 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.mark.slow
 @pytest.mark.timeout(180)
-def test_memory_handles_and_threads_stay_constant_for_a_minute_under_load(screen: Screen, tmp_path: Path) -> None:
+def test_memory_handles_and_threads_stay_constant_for_a_minute_under_load(
+    screen: Screen, tmp_path: Path
+) -> None:
     samples = tmp_path / "soak.csv"
     done = subprocess.run(
         [sys.executable, str(ROOT / "bench" / "soak.py"), "--minutes", "1", "--csv", str(samples)],

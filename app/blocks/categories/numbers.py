@@ -1,4 +1,4 @@
-"""Category Numbers: arithmetic and mathematical functions."""
+"""Category Numbers and logic: arithmetic and mathematical functions. For logic, see `logic`."""
 
 from __future__ import annotations
 

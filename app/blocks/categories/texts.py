@@ -1,4 +1,4 @@
-"""Category Text: joining, splitting and comparing texts."""
+"""Category Text and answers: joining, splitting and comparing texts. For answers, see `asking`."""
 
 from __future__ import annotations
 

@@ -17,17 +17,17 @@ SCRIPT_SPACING = 420
 
 
 def fix(workspace: Mapping[str, object], action: str) -> dict[str, object] | None:
-    """Return the workspace after applying a fix; None for actions that don't change the workspace.
+    """Return the workspace after applying a fix; None for other actions or if the fix isn't possible.
 
     Actions:
 
     - ``limit:<id>`` sets a time limit for a "wait until".
-    - ``add:<type>`` puts a block above the first script without a start.
+    - ``add:<type>`` puts a block above the first script without a start, or alone if there is none.
     - ``define:<id>`` creates the function that a block calls.
     - ``begin:list:<id>`` and ``begin:number:<id>`` set a variable at the start of the behaviour.
     - ``receive:<name>`` creates a script that receives a broadcast.
-    - ``after:<hat>:<hat>`` moves the script of the first start block to the end of the script of the second
-      one.
+    - ``after:<hat>:<hat>`` moves the script of the first start block to the end of the script of the
+      second one, and removes the first start block.
 
     Args:
         workspace: Saved workspace of Blockly; it is not modified.

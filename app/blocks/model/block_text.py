@@ -32,6 +32,8 @@ def block_text(
 ) -> str:
     """Return a block with its arguments as one line of text, truncated to 80 characters.
 
+    A block without description is represented by its type and field values.
+
     Args:
         placed_block: Block in the workspace.
         blocks: Descriptions of blocks by type.
@@ -68,10 +70,11 @@ def block_text(
 
 
 def label(placed_block: PlacedBlock, block: Block) -> str:
-    """Return the label of a block: its text before the first slot, such as "wait until".
+    """Return the label of a block: its first words, up to a slot, such as "wait until".
 
-    The label of an action block is the title of the action. In Japanese, where the verb comes last, the label
-    is the whole text with "…" for slots.
+    Selected choices are included, but not the robot. The label of an action block is the title of the
+    action. In Japanese, where the verb comes last, the label is the whole text with "…" for slots. If
+    the label would be empty, it is derived from the block's type.
     """
     if block.robot is not None and block.robot.kind == "action":
         return block.robot.title

@@ -103,7 +103,10 @@ class ValueInput(Argument):
         return {} if shadow is None else {self.name: {"shadow": shadow}}
 
     def shadow(self) -> dict[str, object] | None:
-        """Return the shadow block that is shown while the slot is empty; None if there is no default."""
+        """Return the shadow block that is shown while the slot is empty.
+
+        Returns None if there is no default, or if it is a boolean.
+        """
         if self.default is None or isinstance(self.default, bool):
             return None
         if isinstance(self.default, str):
@@ -206,7 +209,11 @@ class ChoiceField(Field):
         return entry
 
     def read(self, saved: object) -> object:
-        """Return the selected value. Raises FieldError if the value is not an option."""
+        """Return the selected value; the first option if nothing is saved.
+
+        With a `source`, any other text is returned unchanged. Otherwise FieldError is raised if the
+        value is not an option.
+        """
         if saved is None and self.options:
             return self.options[0][1]
         for _words, value in self.options:

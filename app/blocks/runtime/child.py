@@ -345,11 +345,15 @@ def read_commands(stream: TextIO) -> Iterator[Mapping[str, object]]:
 
 
 def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
-    """Run one program and return the exit code: 0 if no block failed, else 1.
+    """Run one program and return the exit code.
 
     Args:
         stdin: Commands of the runner (default: ``sys.stdin``).
         stdout: Output to the runner (default: ``sys.stdout``).
+
+    Returns:
+        0 if no block failed, or if the input ended before a program was started; 1 if a block failed or
+        the program can't be started.
     """
     out = RunnerOutput(stdout or sys.stdout)
     incoming = read_commands(stdin or sys.stdin)

@@ -34,6 +34,8 @@ class BehaviourError(AppError):
 def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
     """Convert an exception raised by a block to an error with a message for the user.
 
+    A `BehaviourError` is returned itself, with `block` if it has none.
+
     Args:
         error: Exception.
         label: Label of the block; "" if it is not known.

@@ -76,7 +76,10 @@ class Motions:
             return call.id in self._unanswered
 
     def record_final_reply(self, call: RobotCall) -> None:
-        """Record the final reply to a command."""
+        """Record the final reply to a command, which may have started a motion.
+
+        The motion is stopped at once if the program is paused or the script waits at a block.
+        """
         with self._lock:
             motion = self._unanswered.pop(call.id, None)
             if motion is None:

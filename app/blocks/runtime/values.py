@@ -23,7 +23,10 @@ _ZERO_WIDTH_JOINER = "\u200d"
 
 
 def text(value: object) -> str:
-    """Convert a value to text for the user: "2" for 2.0, "yes" for True, "" for an unknown value."""
+    """Convert a value to text for the user: "2" for 2.0, "yes" for True, "" for an unknown value.
+
+    Lists and mappings become JSON, very large integers a number with an exponent.
+    """
     if value is None:
         return ""
     if isinstance(value, bool):

@@ -127,7 +127,10 @@ class Backpack:
         self._update_items(lambda found: (*(item for item in found if item.id not in ids), *items))
 
     def remove(self, ids: Sequence[str]) -> list[BackpackStack]:
-        """Remove the stacks with these ids; return the removed stacks. Raises BackpackError."""
+        """Remove the stacks with these ids; return the removed stacks.
+
+        Unknown ids are ignored. Raises BackpackError if the backpack can't be read or written.
+        """
         removed: list[BackpackStack] = []
 
         def filter_stacks(stacks: tuple[BackpackStack, ...]) -> tuple[BackpackStack, ...]:
@@ -138,7 +141,10 @@ class Backpack:
         return removed
 
     def empty(self) -> list[BackpackStack]:
-        """Remove and return all stacks that this version can read. Raises BackpackError."""
+        """Remove and return all stacks that this version can read.
+
+        Raises BackpackError if the backpack can't be read or written.
+        """
         return self.remove([item.id for item in self.items])
 
     # -- file ------------------------------------------------------------------------------------------------

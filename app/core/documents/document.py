@@ -141,12 +141,15 @@ class Document:
     def open_example(self, path: Path) -> None:
         """Open an example as a new, unsaved behaviour, translated into the current language.
 
-        Raises DocumentError.
+        Raises DocumentError if the file can't be read; the current content is then unchanged.
         """
         self._replace(translated(read_file(path)), None)
 
     def copy(self, path: Path, name: str) -> None:
-        """Open a file as a new, unsaved behaviour named ``name``. Raises DocumentError."""
+        """Open a file as a new, unsaved behaviour named ``name``.
+
+        Raises DocumentError if the file can't be read; the current content is then unchanged.
+        """
         self._replace(replace(read_file(path), name=name), None)
 
     def duplicate(self, other: Document, name: str) -> None:
@@ -171,12 +174,15 @@ class Document:
             unsaved.journal.unlink(missing_ok=True)
 
     def save(self, path: Path | None = None) -> None:
-        """Write the behaviour to a file atomically. Raises DocumentError.
+        """Write the behaviour to a file atomically.
 
         The behaviour's name is stored in the file too, for programs that display it.
 
         Args:
             path: File, which becomes the file of the behaviour; None for the current file.
+
+        Raises:
+            DocumentError: The file can't be written, or `path` is None and the behaviour has no file.
         """
         target = path if path is not None else self.path
         if target is None:
@@ -346,10 +352,11 @@ class Document:
         return replace(program, shows_value=stack.is_value)
 
     def newest_program(self) -> Program | None:
-        """Return the newest compiled program without blocking.
+        """Return the newest compiled program; None if a long behaviour has not been compiled yet.
 
-        Long behaviours are compiled in the background. Until that has finished, the program of an
-        earlier edit is returned, or None if there is none.
+        Long behaviours are compiled in the background; until that has finished, the program of an
+        earlier edit is returned if there is one. Short behaviours are compiled in the call, and if
+        `compiler` is None, long ones are too.
         """
         key = self._key()
         if self._compiled is not None and self._compiled[0] == key:

@@ -65,12 +65,15 @@ def read_file(path: Path, name: str = "") -> BehaviourFile:
 
 
 def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
-    """Parse the content of a behaviour file. Raises DocumentError.
+    """Parse the content of a behaviour file.
 
     Args:
         data: Content of the file.
-        path: Path of the file, for error messages.
+        path: Path of the file, for error messages and for the name of a behaviour without one.
         name: Name used in error messages instead of the file name.
+
+    Raises:
+        DocumentError: The content is damaged, isn't a behaviour, or was saved by a newer Studio.
     """
     name = name or path.name
     try:

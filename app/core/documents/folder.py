@@ -38,7 +38,8 @@ class FolderEntry:
 def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[FolderEntry, ...]:
     """Return the subfolders of a folder and the files with one of the given extensions.
 
-    Hidden entries are omitted. Raises OSError.
+    Hidden entries and broken links are omitted. At most `MAX_ENTRIES` are returned. Raises OSError if
+    the folder can't be read.
     """
     entries = []
     with os.scandir(folder) as dir_entries:
@@ -60,7 +61,7 @@ def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[Fold
 
 
 def name_problem(name: str) -> str:
-    """Return the reason why a file or folder can't have this name; "" if the name is valid."""
+    """Return the reason why a file or folder can't have this name; "" if it is valid or empty."""
     invalid = INVALID_CHARACTERS.search(name)
     if invalid:
         return _("A name can't contain “{sign}”.").format(sign=invalid[0])

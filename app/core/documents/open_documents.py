@@ -70,11 +70,19 @@ class Documents:
         return self._open_with(lambda document: document.open(path))
 
     def open_example(self, path: Path) -> Document:
-        """Open an example as a new behaviour in a tab. Raises DocumentError."""
+        """Open an example as a new behaviour in a tab.
+
+        A blank current tab is reused. If DocumentError is raised because the file can't be read,
+        nothing has changed.
+        """
         return self._assign_unique_name(self._open_with(lambda document: document.open_example(path)))
 
     def copy(self, path: Path, name: str) -> Document:
-        """Open a file as a new behaviour named ``name`` in a new tab. Raises DocumentError."""
+        """Open a file as a new behaviour in a tab, named ``name`` (made unique).
+
+        A blank current tab is reused. If DocumentError is raised because the file can't be read,
+        nothing has changed.
+        """
         return self._assign_unique_name(self._open_with(lambda document: document.copy(path, name)))
 
     def duplicate(self, document: Document) -> Document:
@@ -152,7 +160,10 @@ class Documents:
         self.revision += 1
 
     def reopen(self) -> Document | None:
-        """Reopen the tab closed last; None if there is none. Raises DocumentError."""
+        """Reopen the tab closed last whose file isn't open already; return None if there is none.
+
+        Raises DocumentError if the file can't be read.
+        """
         while self._closed:
             path = self._closed.pop()
             if self.find_by_path(path) is None:

@@ -34,7 +34,8 @@ def move_selection(
 
     Right moves from a node to an outgoing line and on to its target; left moves against the direction
     of the lines. Up and down move to the next line of the same node, or to the node above or below. The
-    selection is unchanged if there is nothing in that direction, and None in an empty graph.
+    selection is unchanged if there is nothing in that direction. Without a selection, or if the
+    selected object no longer exists, the leftmost node is selected; None in an empty graph.
     """
     if selection is None or not _exists(graph, layout, selection):
         first = min(layout.positions, key=lambda key: (layout.positions[key], key), default=None)

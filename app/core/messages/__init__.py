@@ -1,4 +1,5 @@
-"""Content of messages: images and large JSON. Only visible parts are decoded, in the background.
+"""Content of messages: images, large JSON, queries and annotations.
 
-The codecs are in `nep.messages`.
+Large messages are decoded in the background, and only where a part is visible. The codecs are in
+`nep.messages`.
 """

@@ -153,7 +153,7 @@ def column_name(column: Steps) -> str:
 
 
 def sort_key(value: object) -> tuple[int, float, str] | None:
-    """Return the sort key of a value; None for a value that can't be ordered, such as NaN.
+    """Return the sort key of a value; None for a missing value, null or NaN, which can't be ordered.
 
     Numbers and booleans come first, then strings, then objects and arrays by length.
     """
@@ -171,7 +171,10 @@ def sort_key(value: object) -> tuple[int, float, str] | None:
 
 
 def cell_text(value: object) -> str:
-    """Format a value for CSV: strings unchanged, missing values empty, everything else as JSON."""
+    """Format a value for CSV: missing values and null empty, bytes as hex digits, others as JSON.
+
+    Strings are unchanged, except that those that a spreadsheet would read as a formula are escaped.
+    """
     if value is MISSING or value is None:
         return ""
     if isinstance(value, str):

@@ -35,7 +35,7 @@ class ReadResult:
 def read(message: Message) -> ReadResult:
     """Decode a message for display; large JSON is indexed instead (`app.core.messages.lazy_json`).
 
-    Thread-safe.
+    If that fails, the result contains the reason (`ReadResult.error`). Thread-safe.
     """
     try:
         if message.codec == "json" and message.size_bytes > LARGE_BYTES:

@@ -120,7 +120,7 @@ class RemoteAccess:
                 self._request(saved_hosts)
 
     def changed(self, event: RemoteAccessChanged) -> None:
-        """Apply the master's reply."""
+        """Apply the master's reply: update `hosts`, or raise an alert if the request failed."""
         if not event.message:
             self.hosts = event.hosts
             self._alerts.resolve(ALERT)
@@ -157,7 +157,10 @@ class RemoteAccess:
 
 
 def access_status(access: RemoteAccess) -> tuple[str, str, str | None]:
-    """Return the icon, the text and the status that the status bar shows for remote access."""
+    """Return the icon, the text and the status that the status bar shows for remote access.
+
+    The status is "warn" while other computers can connect to Studio's master, else None.
+    """
     if access.hosts:
         return (
             "wifi",

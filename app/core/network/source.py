@@ -224,7 +224,7 @@ class LiveSource:
         return nep.node(_free_name(view), master=self.address)
 
     def query_graph(self, node: Node) -> GraphView:
-        """Return the current graph. Raises `NepError`."""
+        """Return the current graph. Raises `NepError` if the master doesn't reply within 1 s."""
         return node.graph(timeout_s=1.0)
 
     def subscribe(self, node: Node, topic: str, msg_type: str, sink: NodeSink) -> Subscriber:

@@ -300,7 +300,10 @@ class Topics:
         self.revision += was_listed
 
     def add(self, name: str, batch: Batch, now: float) -> None:
-        """Add messages received on a watched topic."""
+        """Add messages received on a watched topic, and the topic if it is unknown.
+
+        An empty batch is ignored.
+        """
         if not batch.messages:  # a watched topic without messages; it may never have existed
             return
         topic = self._topics.get(name)

@@ -278,7 +278,10 @@ def _are_equal(value: object, other: object) -> bool:
 
 
 def format_value(value: object) -> str:
-    """Format a value for editing: strings unchanged, anything else as JSON."""
+    """Format a value for editing: strings unchanged, anything else as JSON.
+
+    A value that JSON can't represent is shown as shortened text.
+    """
     if isinstance(value, str):
         return value
     try:
@@ -288,11 +291,14 @@ def format_value(value: object) -> str:
 
 
 def parse_value(text: str, kind: str) -> object:
-    """Parse the text of a value. Raises `ValueError` with a message for the user.
+    """Parse the text of a value.
 
     Args:
         text: Text that the user entered.
         kind: Kind of the parameter, see `ReportedParameter`.
+
+    Raises:
+        ValueError: The text isn't a value of this kind. The message is for the user.
     """
     if kind == "str":
         return text

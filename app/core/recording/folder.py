@@ -171,7 +171,8 @@ class RecordingFolder:
 def read_info(file_info: RecordingInfo, opener: RecordingOpener) -> RecordingInfo:
     """Return the facts of a recording with the fields that are read from the file.
 
-    If reading fails, they contain the reason.
+    If reading fails, `problem` contains the reason; if the file is too large to scan, `scan_problem`
+    does.
 
     Args:
         file_info: Facts from the file system.

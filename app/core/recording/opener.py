@@ -27,14 +27,17 @@ class RecordingOpener(Protocol):
         progress: Callable[[int, int], object] | None = None,
         budget: tuple[int, float | None] | None = None,
     ) -> Recording:
-        """Open a recording. Raises `RecordingError`.
+        """Open a recording.
 
         Args:
             path: File of the recording.
             cache_bytes: Size of the cache for decompressed chunks.
             progress: Called with the number of scanned bytes and the total size.
-            budget: Maximum number of bytes and seconds for scanning a file without an index; None for
-                no limit.
+            budget: Maximum number of bytes, and of seconds (None for no limit), for scanning a file
+                without an index; None for no limit at all.
+
+        Raises:
+            RecordingError: The file can't be read. `RecordingTooLargeError` if `budget` is exceeded.
         """
 
     def close(self) -> None:

@@ -1,1 +1,1 @@
-"""Problem reports: stored crash reports, and the zip file that the user can share."""
+"""Problem reports: detected crashes, missing packages, and the zip file that the user can share."""

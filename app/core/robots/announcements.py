@@ -127,7 +127,10 @@ class Announcements:
 
     @property
     def claims(self) -> Mapping[str, Claim]:
-        """Rejected announcements by id."""
+        """Problems with announcements, by topic: rejected ones, and robots with several programs.
+
+        If more robots are announced than Studio shows, the key "robots" has a problem too.
+        """
         claims_by_id = {}
         for topic, announcement in self._topics.items():
             if announcement.watch is None:

@@ -220,7 +220,10 @@ class Fleet:
         return self._settings is None or self._settings.get(RESET_SETTING, True)
 
     def set_resets_at_start(self, *, begins: bool) -> None:
-        """Set and save `resets_at_start`. Raises SettingsError."""
+        """Set and save `resets_at_start`; without settings, do nothing.
+
+        Raises SettingsError if the settings can't be written.
+        """
         if self._settings is not None:
             self._settings.set(RESET_SETTING, begins)
 

@@ -36,7 +36,7 @@ class LastRobots:
         return self._settings.get(COME_BACK, True)
 
     def set_restart_enabled(self, is_enabled: bool) -> None:
-        """Set and save `is_restart_enabled`. Raises SettingsError."""
+        """Set and save `is_restart_enabled`. Raises SettingsError if the settings can't be written."""
         self._settings.set(COME_BACK, is_enabled)
 
     def start(self, launcher: RobotStarter) -> None:

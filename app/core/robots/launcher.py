@@ -344,7 +344,10 @@ class VirtualProcesses:
         return self._result_cache[identity]
 
     def has_ended(self, identity: Identity) -> bool:
-        """Return True if a program has certainly exited. Always False for programs on other computers."""
+        """Return True if a program has certainly exited.
+
+        Always False for programs on other computers or with an unknown process id.
+        """
         if identity.pid is None or identity.host != platform.node():
             return False
         import psutil  # noqa: PLC0415 (slow import, not needed to show the window)

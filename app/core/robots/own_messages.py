@@ -100,8 +100,9 @@ class OwnMessageFilter:
     def is_from_robot(self, link: RobotLink, message: Message) -> bool | None:
         """Return True if the robot's own program sent a message; None while the sender is unknown.
 
-        Programs of RIZE can't be distinguished: the result is True for every subscriber of the robot's
-        commands and for the gateway.
+        As long as the program of a native robot is unknown, the result is True. Programs of RIZE can't
+        be distinguished: the result is True for every subscriber of the robot's commands, for the
+        gateway and for unknown senders.
         """
         if link.identity is None and link.robot.dialect == "native":
             return True
@@ -113,7 +114,7 @@ class OwnMessageFilter:
         return None if node is None or link.identity is None else node == link.identity.node_id
 
     def newest_payload(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
-        """Return the payload of the newest valid message; None if there is none.
+        """Return the payload of the newest message; None if there is none or it isn't a valid mapping.
 
         If the robot's own program publishes the topic, messages of other programs are ignored.
 

@@ -154,7 +154,10 @@ class RobotVoices:
         return bool(self._settings.get(SOUND_SETTING, True))
 
     def set_on(self, *, on: bool) -> None:
-        """Make robots audible or silent, and save the choice. Raises SettingsError."""
+        """Make robots audible or silent, and save the choice.
+
+        Raises SettingsError if the choice can't be saved; it applies to this session nevertheless.
+        """
         try:
             self._settings.set(SOUND_SETTING, on)
         finally:

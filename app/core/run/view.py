@@ -382,7 +382,10 @@ def duration_text(value: float) -> str:
 
 
 def connected_text(names: Sequence[str], coming: Sequence[str] = ()) -> str:
-    """Return the line below "Ready": the names of connected robots, or else of starting robots."""
+    """Return the line below "Ready": the names of connected robots, or else of starting robots.
+
+    If there are neither, the line says that no robot is connected.
+    """
     if not names and coming:
         template = ngettext("{robots} is starting", "{robots} are starting", len(coming))
         return template.format(robots=format_list(coming))

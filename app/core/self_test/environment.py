@@ -47,15 +47,18 @@ class TestEnvironment:
 
 
 def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -> TestEnvironment:
-    """Create the folder for the results, with a home folder in it. Raises UnwritableFolderError.
+    """Create the folder for the results, with a home folder in it.
 
     Result files of an earlier test are removed; other files remain.
 
     Args:
         folder: Folder for the results.
         environ: Environment variables, in which the home folder and an unused master port are set.
-        is_root: True if the user is root. The sandbox of the web engine, which can't be used as root,
-            is then disabled; the test loads only Studio's own page.
+        is_root: True if the user is root. On Linux, the sandbox of the web engine, which can't be used
+            as root, is then disabled; the test loads only Studio's own page.
+
+    Raises:
+        UnwritableFolderError: The folder can't be created or written.
     """
     folder = Path(os.path.abspath(folder))  # noqa: PTH100 - links are not resolved, so that the name stays as given
     try:

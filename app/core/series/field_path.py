@@ -212,7 +212,8 @@ def fields_of(payload: object, max_fields: int = MAX_FIELDS) -> Iterator[Plottab
 def kind_of_value(value: object) -> FieldKind | None:
     """Return the kind of a plottable value, or None if the value can't be plotted.
 
-    Objects, bytes, null, and arrays that contain anything but numbers can't be plotted.
+    Booleans and strings are a "state"; an array of numbers is a "list". Objects, bytes, null, empty
+    arrays, and arrays with anything but numbers among the first 8 elements can't be plotted.
     """
     if isinstance(value, (bool, str)):
         return "state"

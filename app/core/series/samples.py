@@ -298,7 +298,7 @@ class Samples:
     def earliest_change_s(self, revision: int) -> float | None:
         """Return the earliest time at which samples were changed, other than by appending.
 
-        Returns None if there was no such change.
+        Returns None if there was no such change, and -inf if the changes are too old to be known.
 
         Args:
             revision: Value of ``rewritten`` up to which the caller knows the changes.

@@ -105,10 +105,10 @@ def _remove_stale_parts(path: Path) -> None:
 
 
 def create_private_folder(folder: Path) -> None:
-    """Create a folder if necessary, and make it accessible only to its owner. Raises OSError.
+    """Create a folder if necessary, and make it accessible only to its owner.
 
     Folders of other users are not changed. On Windows nothing is changed, because user folders are
-    already private.
+    already private. Raises OSError if the folder can't be created.
     """
     folder.mkdir(mode=_PRIVATE_FOLDER, parents=True, exist_ok=True)
     _restrict_to_owner(folder)

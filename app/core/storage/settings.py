@@ -198,11 +198,14 @@ class Settings:
         return recent_files
 
     def add_recent(self, path: Path, name: str | None = None) -> None:
-        """Add a file at the top of the recent files, or move it there. Raises SettingsError.
+        """Add a file at the top of the recent files, or move it there.
 
         Args:
             path: Path of the file.
-            name: Display name; default: the file name.
+            name: Display name; default: the file name without its extension.
+
+        Raises:
+            SettingsError: The settings can't be written.
         """
         path = path.resolve()
         self._values = self._merged_values()
@@ -210,7 +213,10 @@ class Settings:
         self.set_recent([RecentFile(path, name or path.stem, self._clock()), *others])
 
     def rename_recent(self, old: Path, new: Path) -> None:
-        """Rename a recent file without changing its position. Raises SettingsError."""
+        """Rename a recent file without changing its position.
+
+        Raises SettingsError if the settings can't be written.
+        """
         old, new = old.resolve(), new.resolve()
         self._values = self._merged_values()
         others = [file for file in self.all_recent_files if file.path != new]
@@ -218,7 +224,10 @@ class Settings:
         self.set_recent(renamed)
 
     def set_recent(self, files: Sequence[RecentFile]) -> None:
-        """Set the list of recent files, newest first. Raises SettingsError."""
+        """Set the list of recent files, newest first; at most `MAX_RECENT_FILES` are stored.
+
+        Raises SettingsError if the settings can't be written.
+        """
         recent = [
             {"path": str(file.path), "name": file.name, "opened_s": file.opened_s}
             for file in files[:MAX_RECENT_FILES]

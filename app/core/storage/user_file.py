@@ -34,9 +34,10 @@ class StoredFile(Generic[T]):
 def read_stored(
     path: Path, parse: Callable[[bytes], tuple[T, str]], newer: type[NepError], most_bytes: int
 ) -> StoredFile[T]:
-    """Read a file with data of the user. If the file is damaged, the readable part is used.
+    """Read a file with data of the user; a missing or unreadable file has the value None.
 
-    A damaged file is renamed, for example from "alarms.json" to "alarms.damaged.json".
+    If the file is damaged, its readable part is used, and it is renamed or copied, for example from
+    "alarms.json" to "alarms.damaged.json". A file of a newer Studio isn't changed or used.
 
     Args:
         path: Path of the file.

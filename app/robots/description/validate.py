@@ -49,7 +49,11 @@ def _validator() -> Draft7Validator:
 
 
 def validate(model: object) -> tuple[str, ...]:
-    """Return the problems of a Thing Model or Thing Description, one message each; empty if it is valid."""
+    """Return the problems of a Thing Model or Thing Description; empty if it is valid.
+
+    Each problem is one message; at most 20 are returned. Contradictions are checked only if there is no
+    other problem.
+    """
     if not isinstance(model, Mapping):
         return (_("a description must be a JSON object"),)
     model = dict(model)

@@ -226,7 +226,11 @@ class SensorSpec:
     kind: object = None
 
     def to_json(self, value: object) -> object:
-        """Convert a value to the payload of the sensor's topic. Raises RobotValueError for a wrong type."""
+        """Convert a value to the payload of the sensor's topic; an image is returned unchanged.
+
+        A value that isn't an object is put in the field ``value``. Raises RobotValueError for a wrong
+        type.
+        """
         if self.is_image:
             return value
         if isinstance(self.kind, Mapping):

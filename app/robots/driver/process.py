@@ -39,8 +39,8 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
         arguments: Command-line arguments (default: those of the process).
 
     Returns:
-        Exit code: 0 after a normal end; 1 if the robot can't be connected (its class raised Failed) or its
-        description is invalid.
+        Exit code: 0 after a normal end; 1 if the robot can't be connected (its class raised Failed),
+        its description is invalid, or its node can't be opened, such as for an invalid name.
     """
     parser = argparse.ArgumentParser(
         description=_("Run the driver of a robot: {title}.").format(title=kind.title)

@@ -284,6 +284,8 @@ class Tasks:
     def cancel(self, wanted: Callable[[Task], bool]) -> str | None:
         """Cancel tasks; return None on success, else an error message.
 
+        If no task matches, or if a running one can't be cancelled, nothing is cancelled.
+
         Args:
             wanted: Returns True for a task to cancel.
         """

@@ -273,8 +273,8 @@ class Room:
 
         Args:
             name: Name of the object.
-            x: New position.
-            y: New position.
+            x: New x coordinate in metres.
+            y: New y coordinate in metres.
         """
         thing = self.thing(name)
         match thing:

@@ -21,7 +21,7 @@ def parse_string_pairs(text: str) -> tuple[tuple[str, str], ...]:
 
 
 def decode_data_url(text: str) -> bytes:
-    """Decode a base64 ``data:`` URL."""
+    """Decode a base64 ``data:`` URL; return empty bytes if it is malformed."""
     try:
         return b64decode(text.partition(",")[2].encode("ascii", "replace"))
     except binascii.Error:

@@ -48,9 +48,10 @@ def register_scheme() -> None:
 
 
 def read_content(path: str, folder: Path | None = None) -> tuple[str, bytes] | None:
-    """Return the media type and the content of a file of the page; None if the file doesn't exist.
+    """Return the media type and the content of a file of the page, or None if no such file is served.
 
-    Paths can't leave the editor's folder, except to the bundled fonts under ``/fonts/``.
+    Only files with a known suffix are served. Paths can't leave the editor's folder, except to the bundled
+    fonts under ``/fonts/``. ``/fonts.css`` and ``/qwebchannel.js`` are generated.
 
     Args:
         path: Path in the URL, such as ``/editor.js``.

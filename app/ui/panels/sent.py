@@ -195,7 +195,7 @@ class SentPanel(PanelWidget):
             show_messages(self.context, record.name)
 
     def menu_of(self, key: str) -> Menu | None:
-        """Return the context menu of an entry."""
+        """Return the context menu of an entry, or None if the log no longer contains the entry."""
         record = self.acting.sent.get(int(key))
         if record is None:
             return None

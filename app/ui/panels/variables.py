@@ -64,7 +64,7 @@ class VariableRow:
 
     @property
     def value_text(self) -> str:
-        """Value as short text; "" before the first run."""
+        """Value as short text; "" before the first run. A list starts with its number of items."""
         if self.value is None:
             return ""
         if self.item:
@@ -266,7 +266,7 @@ class VariablesPanel(TablePanel[VariableRow]):
             self.context.run(f"{command}:{row.variable.id}")
 
     def menu_of(self, key: str) -> Menu | None:
-        """Return the context menu of a variable."""
+        """Return the context menu of a variable, or None if the table no longer contains the variable."""
         row = self.model.row_at(self.model.index_of(key))
         if row is None:
             return None

@@ -112,8 +112,9 @@ class RobotDrawing:
     ) -> str | None:
         """Return the part of the drawing at a point in px; None if there is only background.
 
-        Examples are ``head``, ``left_hand``, ``body``, ``Turtle/body`` and the name of an object. Parts that
-        can be touched take precedence over objects, and objects over bodies and over objects behind them.
+        Examples are ``head``, ``left_hand``, ``body``, ``Turtle/body`` and the name of an object, or its
+        kind if it has no name. Parts that can be touched take precedence over objects, and objects over
+        bodies and over objects behind them.
         """
         stage = Stage(area, state.room)
         unit = stage.to_units(point)

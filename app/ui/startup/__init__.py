@@ -1,4 +1,5 @@
-"""Parts of Studio's startup: interpreter settings, single instance, files to open, and Qt's log.
+"""Parts of Studio's startup.
 
-The modules are independent of each other; `app.ui.application` calls them.
+These are interpreter settings, deferred steps, single instance, files to open, file dialogs of the desktop,
+software rendering, the browser's sandbox, and Qt's log. `app.ui.application` calls the modules.
 """

@@ -98,7 +98,10 @@ def is_private(folder: Path) -> bool:
 
 
 def is_own_socket(name: str) -> bool:
-    """Return True if a socket exists in a private folder and belongs to this user."""
+    """Return True if a socket exists in a private folder and belongs to this user.
+
+    On Windows, only this user may open the named pipe, so every name except "" is accepted.
+    """
     if os.name != "posix":
         return bool(name)
     try:

@@ -1,4 +1,4 @@
-"""Formatting of numbers, dates and sensor values for display.
+"""Formatting of numbers, dates, nodes and sensor values for display, and escaping of received names.
 
 Independent of widgets; translations are those of `nep.i18n`.
 """

@@ -1,8 +1,9 @@
 """Theme of Studio: colours, sizes, durations and fonts by the name of their role.
 
 `Theme` loads the design tokens and creates the palette, the style sheet and the values for the block
-editor. No other module defines colours; painters call, for example, ``theme.colour("accent")``. After a
-change, all windows are repainted immediately.
+editor. Colours of the window are defined nowhere else (drawings of robots and marks in images have their
+own); painters call, for example, ``theme.colour("accent")``. After a change, all windows are repainted
+immediately.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Painting of shapes and texts: boxes, lines, single-line text, key caps."""
+"""Painting of shapes and texts: boxes, lines, single-line text, key caps.
+
+The module also contains helpers for tooltips, screen readers and the visibility of widgets.
+"""
 
 from __future__ import annotations
 

@@ -266,7 +266,7 @@ class MemoryTransport:
         self._services = MemoryServices(node, self._joined_hub)
 
     def create_publisher(self, spec: PublisherSpec) -> MemoryPublisher:
-        """Register a publisher."""
+        """Create and register a publisher. See `Transport.create_publisher`."""
         with self._joined_hub(spec.configuration) as hub:
             record = PublisherRecord(
                 spec.id,

@@ -66,7 +66,7 @@ class DirectServices:
         return self._create_server(spec, "Respondent0", ORIGINAL, attach_socket)
 
     def create_server(self, spec: ServerSpec, direct: Direct) -> NanomsgServer:
-        """Create a server and bind its port. Raises `AddressInUseError`."""
+        """Create a server and bind its port. Raises `AddressInUseError` if the port can't be bound."""
 
         def attach_socket(socket: object) -> str:
             listen(socket, f"{direct.ip}:{direct.port}", f"a server of '{spec.service}'")

@@ -48,7 +48,11 @@ class NanomsgTransport(ZeromqTransport):
         super().__init__(node)
 
     def create_server(self, spec: ServerSpec) -> ServerTransport:
-        """Create a server: REP or RESPONDENT for a direct connection, otherwise as in `ZeromqTransport`."""
+        """Create a server: REP or RESPONDENT for a direct connection, otherwise as in `ZeromqTransport`.
+
+        A direct connection with wire "tcp" is also served by `ZeromqTransport`, except for surveys, for
+        which `NepError` is raised.
+        """
         direct = spec.configuration
         if isinstance(direct, Direct) and spec.service.startswith(SURVEY_PREFIX):
             check_direct(direct)

@@ -4,9 +4,10 @@ See docs/ros.md. Modules:
 
 - `library`: loading of rospy
 - `process`: the single ROS node of this process
-- `master`: client for the ROS master
-- `definition`, `type_mapping`: conversion of ROS messages
-- `transport`: implementation of `nep.backends.base`
+- `address`, `master`: address of the ROS master, and client for it
+- `definition`, `type_mapping`, `service_types`: conversion of ROS messages and services
+- `transport`, `subscriber`, `queue_room`, `graph`: implementation of `nep.backends.base`
+- `service_client`, `service_connection`, `service_server`: services
 """
 
 from __future__ import annotations

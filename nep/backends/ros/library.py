@@ -51,7 +51,10 @@ class RosFinder(MetaPathFinder):
         path: Sequence[str] | None,
         target: ModuleType | None = None,  # noqa: ARG002 - signature of the base class
     ) -> importlib.machinery.ModuleSpec | None:
-        """Find a top-level package of ROS. Python finds submodules through their package."""
+        """Find a top-level package of ROS; return None for all other modules.
+
+        Python finds submodules through their package.
+        """
         if path is not None or not (
             name in _MODULE_NAMES or name in self.extra or name.endswith(_PACKAGE_SUFFIXES)
         ):

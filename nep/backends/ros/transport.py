@@ -285,7 +285,12 @@ class RospyTransport:
             self.changed.notify_all()
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
-        """Return the graph of the ROS network. Raises `MasterUnreachable`."""
+        """Return the graph of the ROS network.
+
+        Raises:
+            MasterUnreachable: The ROS master didn't reply in time.
+            NepError: `configuration` is a direct connection.
+        """
         address = _master_address(configuration)
         state = RosMaster(address).system_state(timeout_s)
         # of the same class

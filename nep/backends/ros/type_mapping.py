@@ -184,12 +184,18 @@ def _check_file(encoded: Encoded, kind: str) -> str:
 
 
 def to_ros_body(ros_type: str, codec: str, encoded: Encoded) -> bytes:
-    """Convert encoded data to the body of a ROS message. Raises `EncodeError` and `WireError`.
+    """Convert encoded data to the body of a ROS message.
 
     Args:
         ros_type: Type of the ROS message.
         codec: Name of the codec of `encoded`.
         encoded: Data and extension.
+
+    Raises:
+        EncodeError: The data is a JPEG or PNG file that can't be read, or `ros_type` supports only such
+            files.
+        DecodeError: The data doesn't match the image format in the extension, or `ros_type` can't carry
+            the extension.
     """
     data, extension = encoded.data, encoded.extension
     if codec == "image" and extension:
@@ -268,7 +274,8 @@ def unpacker_for(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> 
         md5sum: MD5 sum of the definition, or "*" if unknown.
 
     Raises:
-        NepError: The types aren't compatible.
+        NepError: The types aren't compatible, their definitions differ, or the definition of `ros_type`
+            is invalid or not installed.
     """
     codec = codec_for(msg_type)
     if md5sum not in {"*", _MD5SUMS.get(ros_type, md5sum)}:

@@ -2,9 +2,11 @@
 
 Modules:
 
-- `names`, `message_types`, `fields`, `type_mapping`: conversion of names and values
-- `participant`: this process in a DDS domain
-- `publisher`, `subscriber`, `graph`, `transport`: implementation of `nep.backends.base`
+- `environment`, `library`: settings from environment variables, loading of the libraries
+- `names`, `message_types`, `fields`, `type_mapping`, `topics`: conversion of names and values
+- `participant`, `matches`: this process in a DDS domain, and its matches with other programs
+- `quality`, `mismatches`: QoS profiles, and alerts for types and QoS that differ
+- `publisher`, `subscriber`, `services`, `graph`, `transport`: implementation of `nep.backends.base`
 """
 
 from nep.backends.base import Backend

@@ -25,7 +25,10 @@ _INVALID_CHARACTERS = re.compile(r"\W", re.ASCII)
 
 
 def dds_topic(topic: str) -> str:
-    """Return the DDS name of a topic: `rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError`."""
+    """Return the DDS name of a topic: `rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError`.
+
+    In nep's parameter topics, a node id that starts with a digit is escaped with "_".
+    """
     match = _PARAMETER_TOPIC.fullmatch(topic)
     if match is not None:
         topic = f"{match[1]}_{match[2]}"

@@ -142,7 +142,10 @@ class Ros2Publisher:
 
     @property
     def subscribers(self) -> int:
-        """Number of matched subscribers. The two readers of a nep subscriber count as one."""
+        """Number of matched subscribers; 0 once closed.
+
+        The two readers of a nep subscriber count as one.
+        """
         with self._participant.changed:
             if self._is_closed:
                 return 0

@@ -2,12 +2,14 @@
 
 Modules:
 
-- `places`: network addresses, and sessions opened at them
+- `library`: loading of zenoh
+- `addresses`: network addresses, and sessions opened at them
 - `rendezvous`: connections between the nodes of one computer
 - `keys`: key expressions
-- `session`: session of one node
-- `roster`: known nodes
-- `library`: loading of zenoh
+- `session`, `roster`: session of one node, and the nodes that it knows
+- `publisher`, `subscriber`, `early_messages`, `inboxes`: messages
+- `services`, `node_services`: services
+- `transport`: implementation of `nep.backends.base`
 """
 
 from nep.backends.base import Backend

@@ -83,10 +83,15 @@ class OpenSession:
 
 
 def validate_address(master: str | None = None) -> str:
-    """Validate a network address and return it. Raises `NepError`.
+    """Validate a network address and return it.
 
     Args:
-        master: Network address; None selects $NEP_ZENOH_CONFIG, or "local" if the variable is not set.
+        master: Network address; None or "" selects $NEP_ZENOH_CONFIG, or "local" if the variable is not
+            set.
+
+    Raises:
+        NepError: The address is invalid.
+        WrongTypeError: `master` isn't a string.
     """
     if master is not None and not isinstance(master, str):
         raise WrongTypeError(

@@ -155,7 +155,7 @@ def client_key(node_id: str, record: SubscriberRecord) -> str:
 
 
 def parse_token(key: str) -> LiveToken | None:
-    """Parse the key of a liveliness token; return None for other keys."""
+    """Parse the key of a liveliness token; return None for other keys and invalid tokens."""
     if not key.startswith(_LIVE_PREFIX):
         return None
     node_id, *chunks = map(_decode_chunk, key[len(_LIVE_PREFIX) :].split("/"))

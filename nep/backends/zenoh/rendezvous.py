@@ -54,7 +54,10 @@ class SessionEntry(NamedTuple):
 
 
 def free_port() -> int:
-    """Return a free loopback port that the original NEP doesn't use. Raises `AddressInUseError`."""
+    """Return a free loopback port that the original NEP doesn't use.
+
+    Raises `AddressInUseError` if no such port is found.
+    """
     for _try in range(_PORT_ATTEMPTS):
         with socket.socket() as probe:
             probe.bind((LOOPBACK, 0))

@@ -159,7 +159,8 @@ class PendingBatch:
     def next_check_s(self, now_ns: int) -> float:
         """Return the time in seconds until the I/O thread must check again.
 
-        0 means that pending messages must be sent now. Call only in the I/O thread.
+        0 means that no message is pending, or that pending messages must be sent now. Call only in the
+        I/O thread.
 
         Args:
             now_ns: Current time in nanoseconds.

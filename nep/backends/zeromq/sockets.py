@@ -108,7 +108,7 @@ def set_receive_timeout(owner: Socket) -> None:
 def bind_free_port(owner: Socket, host: str) -> str:
     """Bind to a free port of `host` that the original NEP doesn't use; return the endpoint.
 
-    Raises `AddressInUseError`.
+    Raises `AddressInUseError` if `host` can't be bound or no such port is found.
     """
     for _port in range(100):
         endpoint = bind(owner, f"{host}:*")
@@ -146,7 +146,10 @@ def connect(owner: Socket, address: str) -> str:
 
 
 def local_address_towards(address: str) -> str | None:
-    """Return the address of this computer from which `address` is reached; None without a route."""
+    """Return the address of this computer from which `address` is reached.
+
+    Returns None if there is no route or the host name can't be resolved.
+    """
     if is_loopback(address):
         return LOOPBACK
     try:
@@ -204,7 +207,11 @@ def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout
 
 
 def to_sendable(data: bytes | memoryview) -> Part:
-    """Return `data`, or a copy if `data` is mutable, so that libzmq can send it without another copy."""
+    """Return `data` in a form that libzmq can send without another copy.
+
+    Mutable or non-contiguous data is copied. Other data is returned unchanged, as a view of bytes, or
+    as the `zmq.Frame` that contains it.
+    """
     if isinstance(data, bytes):
         return data
     if not (data.readonly and data.c_contiguous):

@@ -145,7 +145,10 @@ class MessageParser:
         return self._parse_message(*parse_remaining_parts(rest, is_one_part=is_one_part), is_alone=is_alone)
 
     def parse_batch(self, first: bytes) -> list[Message]:
-        """Return the messages of a batch, given as one part. Raises `WireError`."""
+        """Return the messages of a batch, given as one part. Raises `WireError`.
+
+        Messages that the subscriber must not deliver are left out, such as those before the handshake.
+        """
         topic, header_part, body = split_single_part(first)
         if topic != self._topic:
             raise _topic_error()

@@ -25,7 +25,10 @@ class ServiceNode(ABC):
 
     @abstractmethod
     def _resolve_configuration(self, configuration: object) -> Configuration:
-        """Return the configuration, or the node's default for None. Raises `ValueError`."""
+        """Return the configuration, or the node's default for None.
+
+        Raises `ValueError` if it is neither `Hybrid` nor `Direct`.
+        """
 
     def new_server(
         self,

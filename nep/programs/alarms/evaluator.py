@@ -328,7 +328,7 @@ class AlarmEvaluator:
     # ---- state
 
     def state(self, rule: AlarmRule) -> AlarmState:
-        """Return the current state of a rule's alarm."""
+        """Return the current state of a rule's alarm; "off" or "faulty" if the rule isn't evaluated."""
         now = self._clock()
         with self._lock:
             track = self._tracks.get(rule.id)

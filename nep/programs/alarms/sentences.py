@@ -102,7 +102,10 @@ def limit_text(condition: AlarmCondition, value: Scalar) -> str:
 
 
 def subject_text(condition: AlarmCondition) -> str:
-    """Format the subject of a condition, such as "/distance", "lidar_driver" or "range of /distance"."""
+    """Format the subject of a condition, such as "/distance", "lidar_driver" or "range of /distance".
+
+    Without a name, the subject is "a node" or "a topic".
+    """
     if not condition.name:
         return _("a node") if condition.is_about_node else _("a topic")
     name = quotable(condition.name)
@@ -151,7 +154,10 @@ def event_text(condition: AlarmCondition, value: Scalar) -> str:
 
 
 def current_value_text(condition: AlarmCondition, value: Scalar) -> str:
-    """Format the current value, such as "0.82 now" or "silent for 4 s"; return "" if there is none."""
+    """Format the current value, such as "0.82 now" or "silent for 4 s".
+
+    Returns "" if there is no value, or if the condition has none to show, as when a topic appears.
+    """
     if condition.kind == "silent":
         if not isinstance(value, int | float) or value < 1:
             return ""

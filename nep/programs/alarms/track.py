@@ -84,6 +84,8 @@ class AlarmStateMachine:
     def read(self, payload: object, now: float) -> Transition | None:
         """Process a payload of the alarm's topic; return the transition, or None.
 
+        A missing field, or a value that must be a number and isn't, is recorded in `problem`.
+
         Args:
             payload: Decoded payload.
             now: Monotonic time in seconds.
@@ -168,7 +170,7 @@ class AlarmStateMachine:
         return transition or self.advance(now)
 
     def advance(self, now: float) -> Transition | None:
-        """Process the passing of time; return the transition, or None.
+        """Process the passing of time; return the transition, or None if the alarm's state is unchanged.
 
         Args:
             now: Monotonic time in seconds.
@@ -198,8 +200,8 @@ class AlarmStateMachine:
 def to_scalar(value: object) -> Scalar:
     """Convert a value to a scalar for an event.
 
-    A list or map is represented by its length in brackets, and long text is truncated. Integers beyond 64
-    bits become floats, because few JSON readers accept them.
+    A list or map is represented by its length in brackets, and long text is truncated. Integers beyond
+    64 bits become floats, because few JSON readers accept them. Other values become None.
     """
     if isinstance(value, str):
         return value[:MAX_CHARACTERS]

@@ -24,9 +24,10 @@ _WILDCARDS = frozenset({"*", "**"})
 
 
 def parse_key(key: str | Sequence[str]) -> Key:
-    """Split a key at its dots and return the names. Raises `BadKeyError`.
+    """Split a key at its dots and return the names. A tuple of names is validated and returned unchanged.
 
-    A tuple of names is validated and returned unchanged.
+    Raises `BadKeyError` if the key is neither a string nor a tuple of strings, is empty, or exceeds a
+    limit.
     """
     if isinstance(key, str):
         if len(key) > _MAX_KEY_TEXT_LENGTH:  # splitting it would take long

@@ -17,6 +17,8 @@ _ITEM_BYTES = 8
 def deep_copy(value: object, depth: int = _MAX_DEPTH) -> object:
     """Return a deep copy of a value's lists and maps.
 
+    Tuples become lists, and mutable buffers become bytes. Other objects are not copied.
+
     Args:
         value: Value to copy.
         depth: Maximum number of nested levels.
@@ -65,7 +67,10 @@ def size_of(value: object) -> int:
 
 
 def is_same(value: object, other: object) -> bool:
-    """Return True if two values are equal and of the same type; NaN equals NaN."""
+    """Return True if two values are equal and of the same type; NaN equals NaN.
+
+    Values that can't be compared, such as two arrays, are different unless they are the same object.
+    """
     if value is other:
         return True
     if type(value) is not type(other):

@@ -212,15 +212,18 @@ def parse_direction(name: str) -> Direction:
 def configuration_from_arguments(
     a: str, b: str, *, name: str, direction: str = "both", max_rate_hz: float = 0.0
 ) -> BridgeConfiguration:
-    """Create the configuration for `nep bridge A B`. Raises `NepError`.
+    """Create the configuration for `nep bridge A B`.
 
     Args:
-        a: Side a as BACKEND:TOPIC or BACKEND@MASTER:TOPIC. Without a topic (`ros:`), the topic of the other
-            side is used.
+        a: Side a as BACKEND:TOPIC or BACKEND@MASTER:TOPIC. Without a topic (`ros:`), the topic of the
+            other side is used.
         b: Side b in the same form.
         name: Name of the bridge.
         direction: "a->b", "b->a" or "both".
         max_rate_hz: Maximum number of messages per second; 0 for no limit.
+
+    Raises:
+        NepError: An argument is invalid, neither side has a topic, or both sides are the same network.
     """
     (a_side, a_topic), (b_side, b_topic) = _parse_side_and_topic(a), _parse_side_and_topic(b)
     a_topic, b_topic = a_topic or b_topic, b_topic or a_topic

@@ -84,7 +84,7 @@ _CHECKED = TypeVar("_CHECKED")
 
 
 def read_configuration(path: Path) -> BridgeConfiguration:
-    """Read a bridge file. Raises `NepError`."""
+    """Read a bridge file. Raises `NepError` if the file can't be read or its content is invalid."""
     shown_path = escaped(str(path))
     try:
         with path.open("rb") as file:
@@ -115,12 +115,15 @@ def read_configuration(path: Path) -> BridgeConfiguration:
 
 
 def parse_configuration(text: str, path: str, stem: str) -> BridgeConfiguration:
-    """Parse the text of a bridge file. Raises `NepError`.
+    """Parse the text of a bridge file.
 
     Args:
         text: Content of the file.
         path: Path of the file, for error messages.
         stem: Default name of the bridge.
+
+    Raises:
+        NepError: The text isn't valid TOML, or a key or value is invalid. The message contains the line.
     """
     try:
         table = tomllib.loads(text)

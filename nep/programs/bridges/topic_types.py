@@ -64,9 +64,9 @@ def type_for(
 ) -> str:
     """Return the message type for publishing messages like `message` on a topic without configured type.
 
-    A topic must not have two types, so the topic's existing type is used if only this back end knows that
-    type and the message may be a map, or if the topic is published with the same codec. Otherwise the
-    message's own type is used.
+    A topic must not have two types, so the topic's existing type is used if other nodes use the topic,
+    and either only this back end knows that type and the message may be a map, or another node
+    publishes with the same codec. Otherwise the message's own type is used.
 
     Args:
         message: Message to forward.

@@ -218,12 +218,15 @@ class Bench:
         return [each for each in self.master.received if each.do == do]
 
     def wait_for_request(self, do: str, field: str, id: object) -> RecordedRequest:
-        """Wait for a request of the adapter to the master, and return it. Raises `BrokenRuleError`.
+        """Wait for a request of the adapter to the master, and return it.
 
         Args:
             do: Name of the request.
             field: Field of the request's content that is compared.
             id: Expected value of the field.
+
+        Raises:
+            BrokenRuleError: The request didn't arrive in time.
         """
         self.require(lambda: any(each.fields.get(field) == id for each in self.requests(do)), do)
         return next(each for each in self.requests(do) if each.fields.get(field) == id)
@@ -254,11 +257,14 @@ class Bench:
         raise broken_rule_error(_("no '{what}' was received").format(what="node"))
 
     def wait_for_renewal(self, after: int, timeout_s: float = 5.0) -> RecordedRequest:
-        """Wait for a renewal of the adapter's lease, and return the request. Raises `BrokenRuleError`.
+        """Wait for a renewal of the adapter's lease, and return the request.
 
         Args:
             after: Number of received requests to skip.
             timeout_s: Time limit in seconds, multiplied by the scale.
+
+        Raises:
+            BrokenRuleError: The renewal didn't arrive in time.
         """
         self.require(
             lambda: any(each.do == "renew" for each in self.master.received[after:]), "renew", timeout_s

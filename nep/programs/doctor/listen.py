@@ -28,7 +28,10 @@ _REMEDIES = ("restart", "reset", "start")
 
 
 def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
-    """Subscribe to a topic for up to 1.5 s and return the facts about it; None if no master replies."""
+    """Subscribe to a topic for up to 1.5 s and return the facts about it; None if no master replies.
+
+    If the name is invalid, the facts contain only the reason (`name_problem`).
+    """
     master = master_address(address)
     try:
         check_topic(topic)
@@ -42,7 +45,10 @@ def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
 
 
 def probe_endpoint(endpoint: str) -> ReachFailure:
-    """Try to connect to an endpoint; return the reason why it can't be reached, or "" if it can."""
+    """Try to connect to an endpoint; return the reason why it can't be reached, or "" if it can.
+
+    Returns "" without connecting if the endpoint isn't a TCP address.
+    """
     host, colon, port = endpoint.removeprefix("tcp://").rpartition(":")
     if not endpoint.startswith("tcp://") or not colon:
         return ""

@@ -41,10 +41,10 @@ def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
 
 
 def closest_topic(topic: str, names: Iterable[str]) -> str | None:
-    """Return the published topic that is most similar to `topic`, or None.
+    """Return the published topic that is most similar to `topic`, or None if none is similar.
 
-    The criteria are, in this order: the same name apart from outer slashes and case, a unique name with the
-    same last level, similar spelling.
+    The criteria are, in this order: the same name apart from outer slashes and case, a unique name with
+    the same last level, similar spelling.
 
     Args:
         topic: Name to look for.

@@ -167,9 +167,10 @@ class NativeNetwork:
             subscriber.close()
 
     def data_of(self, message: Message) -> bytes | memoryview | None:
-        """Return the data of a message in a form that original programs can decode, or None.
+        """Return the data of a message in a form that original programs can decode.
 
-        Images are encoded as JPEG or PNG.
+        Images are encoded as JPEG or PNG. Returns None for an image for which that is impossible, and
+        reports an alert.
         """
         if message.codec != "image":
             return message.data

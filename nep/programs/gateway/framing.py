@@ -86,7 +86,10 @@ class FrameFormat:
         return f"{self.topic} ".encode() if self.framing == "prefixed" else b""
 
     def read(self, frame: bytes) -> bytes:
-        """Convert a frame to data of the native codec. Raises `FrameError`."""
+        """Convert a frame to data of the native codec, with NaN and infinity in JSON replaced.
+
+        Raises `FrameError` if the frame is invalid or of another version's format.
+        """
         data = self._strip_prefix(frame)
         if self.codec == "image":
             return _decode_base64(data)

@@ -87,7 +87,13 @@ class SystemProcesses:
         return next((language for prefix, language in _INTERPRETERS.items() if name.startswith(prefix)), None)
 
     def is_connected(self, pid: int, port: int, *, binds: bool) -> bool | None:
-        """Return True if a process has an established connection over a port, None if access is denied."""
+        """Return True if a process has an established connection over a port, None if access is denied.
+
+        Args:
+            pid: Process id. If there is no such process, the result is False.
+            port: Port number.
+            binds: True if the process itself binds the port.
+        """
         try:
             connections = psutil.Process(pid).net_connections(kind="tcp")
         except psutil.NoSuchProcess:

@@ -1,7 +1,7 @@
 """Topics that move robots, determined from descriptions, types and subscribers. Performs no I/O.
 
 All code that publishes on behalf of a person or a program calls `MovingTopics.robots_moved_by`: alarms,
-`nep play`, `nep bridge`, behaviours, and the Publish panel of Studio.
+`nep play`, `nep bridge`, `nep web`, behaviours, and in Studio the Publish panel and replays.
 """
 
 from __future__ import annotations

@@ -38,7 +38,10 @@ def path_with_token(token: str) -> str:
 
 
 def is_local_host(host: str) -> bool:
-    """Return True if a host name refers to this computer: localhost or a loopback address."""
+    """Return True if a host name refers to this computer.
+
+    That is localhost, a name below it such as "app.localhost", or a loopback address.
+    """
     if host == "localhost" or host.endswith(".localhost"):
         return True
     try:

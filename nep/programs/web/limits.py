@@ -1,4 +1,7 @@
-"""Resource limits for one page of `nep web`, checked before memory is allocated."""
+"""Resource limits of `nep web`: number of pages, and limits of each page.
+
+All are checked before memory is allocated.
+"""
 
 MAX_PAGES = 100
 MAX_MESSAGE_BYTES = 8 * 2**20

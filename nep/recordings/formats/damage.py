@@ -15,7 +15,8 @@ def corruption_text(damage: Sequence[CorruptRange], start_ns: int) -> str:
 
     Args:
         damage: Damage to describe.
-        start_ns: Start of the recording in ns since 1970, from which times are counted.
+        start_ns: Start of the recording in ns since 1970, from which times are counted; 0 to count from
+            the first damage.
 
     Returns:
         The text; "" if there is no damage.

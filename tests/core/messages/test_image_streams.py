@@ -129,7 +129,9 @@ def test_only_newest_image_of_a_batch_is_decoded(images: Images, monkeypatch) ->
     assert decoded == [49]
 
 
-def test_stream_ignores_images_of_other_topics_and_images_after_close(images: Images, watched: list[str]) -> None:
+def test_stream_ignores_images_of_other_topics_and_images_after_close(
+    images: Images, watched: list[str]
+) -> None:
     stream = images.stream("/camera")
     assert watched == ["/camera"]
     images.offer([jpeg((1, 2, 3), "/other")])

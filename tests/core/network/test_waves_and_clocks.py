@@ -61,7 +61,9 @@ def graph(revision: int, names: Mapping[str, str], stamp_ns: int) -> GraphView:
     return GraphView(1, revision, nodes, one)
 
 
-def test_10_000_short_lived_topics_and_their_nodes_are_removed_without_alerts(quiet: Session, clocks: Clocks) -> None:
+def test_10_000_short_lived_topics_and_their_nodes_are_removed_without_alerts(
+    quiet: Session, clocks: Clocks
+) -> None:
     post: Callable[[object], None] = quiet._mailbox.post_event
     most = 0
     for wave in range(100):
@@ -82,7 +84,9 @@ def test_10_000_short_lived_topics_and_their_nodes_are_removed_without_alerts(qu
 
 
 @pytest.mark.parametrize("jump_s", [-3600.0, 3600.0, -1e9])
-def test_clock_jump_causes_no_negative_age_no_removed_topic_and_no_alert(quiet: Session, clocks: Clocks, jump_s: float) -> None:
+def test_clock_jump_causes_no_negative_age_no_removed_topic_and_no_alert(
+    quiet: Session, clocks: Clocks, jump_s: float
+) -> None:
     names = {"/steady": "steady"}
     quiet._mailbox.post_event(GraphReceived(graph(2, names, clocks.wall_ns), 0.001))
     quiet.tick()

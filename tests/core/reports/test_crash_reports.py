@@ -96,7 +96,9 @@ def test_crash_report_is_offered_once_also_with_two_windows(reports: CrashReport
     assert [each.is_new for each in other.all()] == [False]
 
 
-def test_files_other_than_crash_reports_in_the_crash_folder_are_kept(reports: CrashReports, tmp_path: Path) -> None:
+def test_files_other_than_crash_reports_in_the_crash_folder_are_kept(
+    reports: CrashReports, tmp_path: Path
+) -> None:
     folder = tmp_path / "crashes"
     folder.mkdir()
     for name in ("crash of mine.txt", "crash 2026-13-99 99.99.99 studio.txt", "note.txt"):

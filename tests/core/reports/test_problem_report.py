@@ -53,7 +53,9 @@ def opened(data: bytes) -> dict[str, str]:
         return {name: archive.read(name).decode("utf-8") for name in archive.namelist()}
 
 
-def test_report_contains_description_versions_settings_findings_logs_and_crash_reports(parts: ReportParts) -> None:
+def test_report_contains_description_versions_settings_findings_logs_and_crash_reports(
+    parts: ReportParts,
+) -> None:
     parts.crashes.add(Crash("robot", "by signal 11", "where it was"))
     found = opened(create_report(parts, "  It stood still.\nThen it fell. ñ "))
     assert found["what-happened.txt"] == "It stood still.\nThen it fell. ñ"

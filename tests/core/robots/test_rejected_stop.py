@@ -65,7 +65,9 @@ def the_link(session: Session, name: str = "Arm") -> RobotLink:
     return link
 
 
-def test_rejected_stop_is_shown_in_run_bar_chips_health_alert_and_console(session: Session, arm: Driver) -> None:
+def test_rejected_stop_is_shown_in_run_bar_chips_health_alert_and_console(
+    session: Session, arm: Driver
+) -> None:
     link = the_link(session)
     assert link.chip_text == "virtual, ready" if link.is_virtual else "ready"
     session.runs.stop()
@@ -172,7 +174,9 @@ def answers(session: Session, robot: WireRobot, count: int = 1) -> None:
         robot._say(command, "succeeded")
 
 
-def test_pending_stop_is_shown_as_stopping_until_the_robot_replies(patient: Session, pepper: WireRobot) -> None:
+def test_pending_stop_is_shown_as_stopping_until_the_robot_replies(
+    patient: Session, pepper: WireRobot
+) -> None:
     link = the_link(patient, "Pepper")
     pepper.silent = {"stop"}
     patient.runs.stop()

@@ -225,7 +225,9 @@ def calls_of(function: Callable[[], object]) -> int:
     return count
 
 
-def test_feedback_flood_is_processed_with_bounded_work_per_tick(session: Session, liar: Liar, tried: Invocation) -> None:
+def test_feedback_flood_is_processed_with_bounded_work_per_tick(
+    session: Session, liar: Liar, tried: Invocation
+) -> None:
     liar.say(tried, "running")
     tick_until(session, lambda: tried.state == "running")
     ended = threading.Event()

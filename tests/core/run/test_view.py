@@ -195,7 +195,9 @@ def test_stop_results_are_formatted() -> None:
         ((PEPPER, RobotStop("Pepper", False, None, can_confirm=False, program="motor box")), "ok"),
     ],
 )
-def test_stop_report_status_is_ok_only_if_every_robot_confirmed(robots: tuple[RobotStop, ...], status: str) -> None:
+def test_stop_report_status_is_ok_only_if_every_robot_confirmed(
+    robots: tuple[RobotStop, ...], status: str
+) -> None:
     assert StopReport(robots, 41.0).status == status
 
 

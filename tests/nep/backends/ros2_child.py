@@ -436,7 +436,9 @@ def test_node_joins_only_its_own_domain(make: Make) -> None:
     assert {each.name for each in here.graph().nodes.values()} == {"here"}
 
 
-def test_invalid_payload_field_is_named_in_log_error_and_alert(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+def test_invalid_payload_field_is_named_in_log_error_and_alert(
+    make: Make, caplog: pytest.LogCaptureFixture
+) -> None:
     node = make("a")
     pub = node.new_pub("t", "geometry_msgs/Twist")
     sub = make("b").new_sub("t", "geometry_msgs/Twist")

@@ -116,7 +116,9 @@ def test_busy_sink_does_not_grow_the_memory_of_its_program(publisher: nep.Publis
         assert rss(busy.process.pid) - before < MAX_COUNT
 
 
-def test_stopped_subscriber_does_not_affect_other_subscribers(publisher: nep.Publisher, master: Master) -> None:
+def test_stopped_subscriber_does_not_affect_other_subscribers(
+    publisher: nep.Publisher, master: Master
+) -> None:
     with (
         running(SUBSCRIBER, master.address, "idle") as stopped,
         running(SUBSCRIBER, master.address, "quick") as quick,

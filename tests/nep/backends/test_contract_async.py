@@ -354,7 +354,9 @@ def test_cancelled_async_spin_releases_its_watchers_and_loses_no_message(make: M
     assert node._work._watchers == ()
 
 
-def test_loop_is_woken_at_most_once_per_two_messages_of_a_burst(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_loop_is_woken_at_most_once_per_two_messages_of_a_burst(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The first message of a burst wakes the loop; the others are read without another wake."""
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")

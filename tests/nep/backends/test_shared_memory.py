@@ -493,7 +493,9 @@ def test_invalid_runtime_folder_is_rejected(monkeypatch: pytest.MonkeyPatch, tmp
 
 
 @pytest.mark.parametrize("part", [b"", b"\0" * 7, struct.pack("<Q", 2**64 - 1), struct.pack("<Q", 1)])
-def test_invalid_reference_is_rejected_and_missing_payload_is_counted_as_lost(node: nep.Node, part: bytes) -> None:
+def test_invalid_reference_is_rejected_and_missing_payload_is_counted_as_lost(
+    node: nep.Node, part: bytes
+) -> None:
     """The reference is rejected or counted as lost, and the next message is received."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     stranger = context.socket(zmq.PUB)

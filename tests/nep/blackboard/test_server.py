@@ -130,7 +130,9 @@ def test_reply_is_bounded_in_entries_and_bytes(ask: Ask, board: nep.Blackboard) 
     assert 1 <= len(answer["entries"]) < 6
 
 
-def test_each_change_of_a_value_is_published_with_its_cause(ask: Ask, board: nep.Blackboard, other: nep.Node) -> None:
+def test_each_change_of_a_value_is_published_with_its_cause(
+    ask: Ask, board: nep.Blackboard, other: nep.Node
+) -> None:
     sub = other.new_sub("/blackboard/changes")
     ask("set", key="a", value=1)
     ask("set", key="a", value=1)

@@ -201,9 +201,7 @@ def test_watch_command_waits_for_a_lost_master(type_in, file, monkeypatch) -> No
         (("BAD",), 1, "line 1 of"),
     ],
 )
-def test_alarm_file_is_validated_before_connecting(
-    type_in, file, words, code: int, said: str
-) -> None:
+def test_alarm_file_is_validated_before_connecting(type_in, file, words, code: int, said: str) -> None:
     made = {
         "FILE": lambda: file({"when": BELOW}),
         "OFF": lambda: file({"on": False, "when": BELOW}),

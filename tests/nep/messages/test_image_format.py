@@ -114,7 +114,9 @@ def test_image_unsupported_by_the_format_raises_encode_error(
         ({"width": True}, "width must be a whole number from 1 to 65535, not True"),
     ],
 )
-def test_image_format_with_invalid_kind_quality_or_width_is_rejected(given: dict[str, Any], sentence: str) -> None:
+def test_image_format_with_invalid_kind_quality_or_width_is_rejected(
+    given: dict[str, Any], sentence: str
+) -> None:
     with pytest.raises(ValueError, match=sentence):
         ImageFormat(**given)
 

@@ -162,7 +162,9 @@ def test_negative_nan_or_non_numeric_timeouts_are_rejected(node: nep.Node, time_
         ({"generation": "C"}, "generation is 'C'; use 'A' or 'B'"),
     ],
 )
-def test_direct_connection_with_invalid_address_wire_or_generation_is_rejected(given: dict[str, Any], sentence: str) -> None:
+def test_direct_connection_with_invalid_address_wire_or_generation_is_rejected(
+    given: dict[str, Any], sentence: str
+) -> None:
     with nep.node("direct") as node, pytest.raises((nep.NepError, ValueError), match=sentence):
         node.direct(**given)
 

@@ -233,7 +233,9 @@ def test_export_file_names_are_unique_and_valid_on_every_system(tmp_path):
     assert all(len(each) < 120 and not set('/\\:*?"<>|') & set(each) for each in names)
 
 
-def test_export_raises_for_unknown_formats_missing_values_images_or_packages(recording, tmp_path, monkeypatch):
+def test_export_raises_for_unknown_formats_missing_values_images_or_packages(
+    recording, tmp_path, monkeypatch
+):
     record(tmp_path / "b.mcap", [[json_message(1)]])
     with (
         Recording(tmp_path / "b.mcap") as plain,

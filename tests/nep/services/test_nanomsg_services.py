@@ -186,7 +186,9 @@ def test_threads_of_timed_out_calls_are_bounded(node: nep.Node, port: int) -> No
     eventually(lambda: not client._transport._threads)
 
 
-def test_nanomsg_services_reject_a_port_in_use_other_codecs_and_closed_nodes(node: nep.Node, port: int) -> None:
+def test_nanomsg_services_reject_a_port_in_use_other_codecs_and_closed_nodes(
+    node: nep.Node, port: int
+) -> None:
     at = node.direct("127.0.0.1", port)
     with node.new_server("/x", lambda request: request, at), pytest.raises(nep.AddressInUseError):
         node.new_server("/x", lambda request: request, at)

@@ -79,7 +79,9 @@ def test_suspended_server_replies_to_pending_calls_after_resuming(client) -> Non
 
 @pytest.mark.parametrize("is_late", [False, True], ids=["before it is unlisted", "after that"])
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="there are no signals that stop")
-def test_server_suspended_during_a_call_is_replaced_by_another_server(master: Master, client, is_late: bool) -> None:
+def test_server_suspended_during_a_call_is_replaced_by_another_server(
+    master: Master, client, is_late: bool
+) -> None:
     with running(SERVER) as program, nep.node("other") as other:
         assert program.line() == "ready"
         waiting = client.call_async("hang", timeout_s=None)
@@ -213,7 +215,9 @@ def test_malformed_or_unmatched_reply_raises_service_timeout(master: Master, cli
         (4, 1, b"", nep.RequestRefusedError),
     ],
 )
-def test_reply_with_undecodable_payload_or_error_raises_a_nep_error(master: Master, client, kind, codec, data, error) -> None:
+def test_reply_with_undecodable_payload_or_error_raises_a_nep_error(
+    master: Master, client, kind, codec, data, error
+) -> None:
     def answer(parts):
         return [[bytes([1, kind, codec, 0, 0, 0, 0, 0]) + parts[0][8:], data]]
 

@@ -191,7 +191,9 @@ def test_killed_server_is_reported_immediately(node: nep.Node, port: int) -> Non
         (struct.pack("<IBBHIQ", 16, 1, 2, 1, 0, 1), nep.DecodeError),
     ],
 )
-def test_malformed_or_unmatched_plain_tcp_reply_raises_a_nep_error(node: nep.Node, port: int, said, error) -> None:
+def test_malformed_or_unmatched_plain_tcp_reply_raises_a_nep_error(
+    node: nep.Node, port: int, said, error
+) -> None:
     with socket.create_server(("127.0.0.1", port)) as listener:
         client = node.new_client("/x", node.direct("127.0.0.1", port, wire="tcp"))
         future = client.call_async({}, timeout_s=1.0 if error is nep.ServiceTimeoutError else LONG_S)

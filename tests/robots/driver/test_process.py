@@ -251,7 +251,9 @@ TYPES = {
     ],
     ids=["works", "types"],
 )
-def test_typed_actions_return_their_results_or_fail_and_stop_still_succeeds(network, tmp_path, functions, given, answers):
+def test_typed_actions_return_their_results_or_fail_and_stop_still_succeeds(
+    network, tmp_path, functions, given, answers
+):
     """The actions are called over the network; a Stop afterwards must be answered in any case."""
     actions = "".join(
         f'{DO}    {head}:\n        """What the test says."""\n        {body}\n'

@@ -144,7 +144,9 @@ def test_f2_renames_a_recording_in_place_and_overwrites_no_file(qtbot, panel, wi
     assert table.field is None
 
 
-def test_delete_moves_a_recording_to_the_trash_and_undo_restores_the_recording(qtbot, panel, window, folder, tmp_path, monkeypatch):
+def test_delete_moves_a_recording_to_the_trash_and_undo_restores_the_recording(
+    qtbot, panel, window, folder, tmp_path, monkeypatch
+):
     place = tmp_path / "bin"
     place.mkdir()
 

@@ -223,7 +223,9 @@ def test_first_mouse_press_in_a_window_shows_no_focus_ring(qtbot, theme: Theme) 
     assert ring.target is None
 
 
-def test_focus_ring_is_hidden_while_its_widget_is_scrolled_out_of_view(qtbot, place: QWidget, theme: Theme) -> None:
+def test_focus_ring_is_hidden_while_its_widget_is_scrolled_out_of_view(
+    qtbot, place: QWidget, theme: Theme
+) -> None:
     ring = FocusRing(theme, place)
     inside = QWidget()
     inside.setFixedSize(300, 2000)

@@ -549,7 +549,9 @@ def test_large_text_clips_no_button_of_the_bars(
     assert window.run_bar.height() >= window.run_bar.sizeHint().height()
 
 
-def test_closing_the_window_closes_its_panels_and_stops_its_timer_once(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_closing_the_window_closes_its_panels_and_stops_its_timer_once(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
     done: list[str] = []
     window.on_shut = lambda: done.append("shut")
     show(qtbot, window)
@@ -578,7 +580,9 @@ def test_no_plain_qt_buttons_are_used(qtbot, window: MainWindow, commands: Comma
     assert window.findChildren(QPushButton) == []
 
 
-def test_all_buttons_of_the_behaviour_layout_have_accessible_names(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_all_buttons_of_the_behaviour_layout_have_accessible_names(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
     show(qtbot, window)
     window.show_layout("behaviour")
     window.tick()

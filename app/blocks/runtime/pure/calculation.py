@@ -1,4 +1,4 @@
-"""Functions of the category "Numbers".
+"""Functions of the category "Numbers and logic".
 
 Angles are in degrees. Functions raise BehaviourError for values that aren't finite numbers (`values.number`).
 """

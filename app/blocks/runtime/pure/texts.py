@@ -1,6 +1,7 @@
 """Functions of the category "Text and answers".
 
-Characters are grapheme clusters (`values.letters`), numbered from 1. All values are converted to text first.
+Characters are grapheme clusters (`values.grapheme_clusters`), numbered from 1. All values are converted to
+text first.
 """
 
 from __future__ import annotations

@@ -262,6 +262,8 @@ class ReplaySending:
     def select(self, recorded: str, name: str | None) -> str:
         """Choose a topic for publishing. Chosen topics are published once they are armed.
 
+        Nothing happens if no recording is open or the recording has no such topic.
+
         Args:
             recorded: Name of the topic in the recording.
             name: Name on the live network; "" for the recorded name, None to deselect the topic.
@@ -290,10 +292,11 @@ class ReplaySending:
     def arm(self) -> str:
         """Arm the chosen topics, which are then published as they are played.
 
-        For each topic that moves robots, the user is asked first (`SessionActing.question`).
+        For each topic that moves robots, the user is asked first (`SessionActing.question`). Topics
+        that are no longer chosen are stopped.
 
         Returns:
-            Reason why publishing isn't possible, or "".
+            Reason why publishing isn't possible, or "", also while the user is being asked.
         """
         opened = self._opened
         if opened is None or not self.routes:
@@ -409,7 +412,7 @@ def _moving_and_latched_topics(recording: Recording) -> tuple[MovingTopics, froz
 
 
 def sent_text(sent: SentTopic) -> str:
-    """Format the message counts of a topic, such as "412 sent, 3 left out, being late"."""
+    """Format the message counts of a topic, such as "412 sent, 3 late messages skipped"."""
     text = ngettext("{count} sent", "{count} sent", sent.count).format(count=sent.count)
     return f"{text}, {late_text(sent.dropped_count)}" if sent.dropped_count else text
 

@@ -266,7 +266,10 @@ class ReplaySource:
                 self.opened.recording.close()
 
     def open(self) -> None:
-        """Read the index of the file and seek to the first message. Raises `RecordingError`."""
+        """Read the index of the file and seek to the first message.
+
+        Raises `RecordingError` if the file can't be read.
+        """
         self.opened = opened = open_recording(self.path, self._report_progress, self._opener)
         self._playback = playback = Playback(opened.recording, clock=self._clock, topics=frozenset())
         playback.seek(opened.recording.start_ns)

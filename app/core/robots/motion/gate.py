@@ -88,8 +88,8 @@ class _Snapshot(NamedTuple):
 class MotionGate:
     """Gate that decides which messages may be published on topics that move robots.
 
-    Use it from the main thread. Only `refusal` and `current_rejection_reason` are thread-safe; they use the
-    state at the last call of `update`.
+    Use it from the main thread. Only `rejection_reason` and `current_rejection_reason` are thread-safe;
+    they use the state at the last call of `update`.
     """
 
     def __init__(self, permission: MotionPermission, robots: GatedRobots) -> None:
@@ -135,7 +135,7 @@ class MotionGate:
         return is_permitted
 
     def update(self) -> None:
-        """Update the robots and permissions that `refusal` uses."""
+        """Update the robots and permissions that `rejection_reason` uses."""
         now = self._robots.moving_topics, self._permission.revision
         if now == self._followed_state:
             return
@@ -166,9 +166,11 @@ class MotionGate:
         )
 
     def current_rejection_reason(self, node: Node, topic: str, msg_type: str = "") -> str:
-        """Check like `refusal`, but query the graph from the master first, which takes at most 0.5 s.
+        """Check like `rejection_reason`, and query the graph for robots that have just joined.
 
-        Thread-safe. Use it for the first message to subscribers that have just connected.
+        The query takes at most 0.5 s; it is skipped if the message is rejected anyway, and ignored if
+        the master doesn't reply. Thread-safe. Use it for the first message to subscribers that have
+        just connected.
         """
         reason = self.rejection_reason(topic, msg_type)
         if reason:

@@ -51,7 +51,10 @@ class RobotStop:
 
     @property
     def problem(self) -> str:
-        """Problem without a full stop, such as "Pepper did not answer"; "" if the robot stopped."""
+        """Problem without a full stop, such as "Pepper didn't reply".
+
+        "" if the robot stopped or can't confirm a Stop.
+        """
         if self.is_confirmed or not self.can_confirm:
             return ""
         if self.program and self.has_failed:

@@ -291,7 +291,7 @@ class SessionActing:
             rate_hz: Messages per second; 0 to send once.
 
         Returns:
-            Reason why this isn't possible, or "".
+            Reason why this isn't possible; "" if it is sent, or will be if the user allows it.
         """
         not_now = self._replay_problem()
         if not_now:
@@ -313,14 +313,15 @@ class SessionActing:
     def ready(self, target: Target, go_on: Callable[[], object]) -> str | None:
         """Prepare sending to a target, asking the user if necessary.
 
+        Sending is armed if it isn't yet.
+
         Args:
             target: Topic or service.
             go_on: Called if the user allows sending.
 
         Returns:
             None if sending is allowed now; otherwise the reason why not, which is "" if the user is
-                being asked or
-            ``go_on`` was already called.
+            being asked or ``go_on`` was already called.
         """
         if not self.arming.is_on:
             problem = self.arm()
@@ -362,7 +363,7 @@ class SessionActing:
     # ---- services
 
     def call(self, service: str, text: str, timeout_s: float) -> str:
-        """Call a service. Sending is switched on for this service if necessary.
+        """Call a service. Sending is armed for this service if necessary.
 
         Args:
             service: Name of the service.
@@ -370,7 +371,7 @@ class SessionActing:
             timeout_s: Timeout in seconds.
 
         Returns:
-            Reason why this isn't possible, or "".
+            Reason why this isn't possible; "" if the call is sent, or will be if the user allows it.
         """
         try:
             request = parse_json_text(text).fill({})
@@ -519,7 +520,10 @@ def _do_nothing() -> None: ...
 
 
 def result_text(result: SendResult) -> str:
-    """Format the result of sending, such as "received by 2" or "412 sent, 3 left out, being late"."""
+    """Format the result of sending, such as "received by 2" or "412 sent, 3 late messages skipped".
+
+    A failure is the reason, after the number of messages that were sent before it.
+    """
     if result.kind == "sent":
         return subscribers_text(result.subscriber_count)
     if result.kind == "began":

@@ -154,7 +154,7 @@ class Outbox:
     # ---- requests
 
     def send(self, order: SendOrder) -> None:
-        """Send a message once."""
+        """Send a message once, in the background; `pop_results` returns the result or the error."""
         turn, asked_s = self._arming.turn, self._clock()
 
         def send_job(node: Node) -> None:
@@ -171,11 +171,14 @@ class Outbox:
         self._submit("", self._guarded_job(order, asked_s, send_job))
 
     def start(self, order: SendOrder, rate_hz: float) -> bool:
-        """Start sending a message repeatedly; return False if the limit `MAX_REPEATED_MESSAGES` is reached.
+        """Start sending a message repeatedly; return False if the limit is reached.
+
+        The limit is `MAX_REPEATED_MESSAGES`. Sending runs in the background; `pop_results` returns its
+        start, its end and errors.
 
         Args:
             order: Message to send.
-            rate_hz: Messages per second.
+            rate_hz: Messages per second, limited to `MIN_HZ` to `MAX_HZ`.
         """
         rate_hz = min(MAX_HZ, max(MIN_HZ, rate_hz))
         turn, asked_s, token = self._arming.turn, self._clock(), object()

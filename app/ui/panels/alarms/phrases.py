@@ -253,6 +253,8 @@ def initial_text(rule: AlarmRule, part: PhrasePart) -> str:
 def with_slot_text(rule: AlarmRule, part: PhrasePart, text: str) -> AlarmRule | None:
     """Return a copy of the rule in which a slot has a new value, or None if the value is invalid.
 
+    None is also returned for slots whose value is selected in a menu.
+
     Args:
         rule: Rule to copy.
         part: Slot to change.

@@ -144,7 +144,7 @@ class GraphCanvas(QWidget):
             stats_of: Returns label, width and losses of a line.
 
         Returns:
-            The number of changed areas.
+            The number of changed areas that are visible; 0 if the zoom is too small for rates and counts.
         """
         scene = self.scene
         if scene is None or not self._waiting:

@@ -370,9 +370,9 @@ class GraphPanel(PanelWidget):
             menu.deleteLater()
 
     def menu_of(self, choice: GraphSelection) -> Menu:
-        """Return the context menu of the selected node or line.
+        """Return the context menu of a node or line.
 
-        The menu of a line with several topics has a submenu for each of them.
+        The menu of a line with several topics has a submenu for each of them, up to `MAX_MENU_TOPICS`.
         """
         menu, scene = Menu(self.theme, self), self.canvas.scene
         graph = scene.graph if scene is not None else NodeGraph()

@@ -217,12 +217,13 @@ class GraphScene:
     def update_stats(
         self, item: NodeItem | LineItem, stats_of: StatsGetter, *, with_words: bool
     ) -> QRectF | None:
-        """Update the rates and counts of one item.
+        """Update the second line of text of a node, or the label, width and losses of a line.
 
         Args:
             item: Item to update.
             stats_of: Returns label, width and losses of a line.
-            with_words: True if small text is legible. The first such call places the label of a line.
+            with_words: True if small text is legible; otherwise nodes aren't updated. The first call with
+                True places the label of a line.
 
         Returns:
             The area to repaint, or None if nothing changed.

@@ -56,7 +56,14 @@ def node_icon(node: DrawnNode) -> str:
 
 
 def node_name(node: DrawnNode, host: str) -> str:
-    """Return the displayed name of a node or collapsed group; `host` is the name of this computer."""
+    """Return the displayed name of a node or collapsed group.
+
+    For a bridge, this is only the first part of its name, without the network at the other end.
+
+    Args:
+        node: Node or group.
+        host: Name of this computer.
+    """
     if node.kind == "group":
         return group_name(node.key, host)
     if node.bridged_network:  # the rest of the name is painted in the bridge's right part
@@ -65,7 +72,7 @@ def node_name(node: DrawnNode, host: str) -> str:
 
 
 def node_detail(node: DrawnNode) -> str:
-    """Return the second line in the box of a node.
+    """Return the second line in the box of a node; "" if nothing is known about the node.
 
     Examples are "Python, 4.1 %", "this window", "gone for 4 s" and "41 nodes".
     """

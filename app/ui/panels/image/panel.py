@@ -129,7 +129,7 @@ class ImagePanel(PanelWidget):
         return [topic.key for topic in all_topics if topic.codec == CODEC and topic.gone_s is None]
 
     def show_topic(self, name: str) -> None:
-        """Switch to another topic."""
+        """Switch to another topic, or to none if the name is empty."""
         if name == self._topic and self._stream is not None:
             return
         self._close_stream()

@@ -42,7 +42,7 @@ MISSING: Final = _Sentinel("missing")
 
 
 def differs(before: object, after: object) -> bool:
-    """Return True if two values differ. NaN equals NaN; 1 and true differ, as in JSON."""
+    """Return True if two values differ. NaN equals NaN; 1 differs from true and from 1.0."""
     if before is after or (before != before and after != after):  # noqa: PLR0124
         return False
     if is_container(before) and is_container(after):
@@ -75,7 +75,8 @@ def child_diffs(
     """Return the first children of a value with their differences.
 
     Removed children follow the present ones, with their old values. All children of an added value count as
-    added, and all children of a removed value as removed.
+    added, and all children of a removed value as removed. If an object became a list or vice versa, or was
+    no container before, all of its children count as added.
 
     Args:
         value: Object or list.
@@ -85,7 +86,8 @@ def child_diffs(
         changes_only: True to omit equal children. Only the first `MAX_CHILDREN` children are compared.
 
     Returns:
-        Key, value, base value and kind of difference of each child, and the total number of children.
+        Key, value, base value (`MISSING` for added and removed children) and kind of difference of each
+        child, and the total number of children, with `changes_only` only of those that differ.
     """
     if mark in {"added", "removed"} or not is_container(base) or _kind(base) != _kind(value):
         child_mark: Mark = "removed" if mark == "removed" else "added"

@@ -108,7 +108,7 @@ class InspectorPanel(PanelWidget):
     # -- display ------------------------------------------------------------------------------------------
 
     def show_topic(self, name: str) -> None:
-        """Switch to another topic."""
+        """Switch to another topic, or to none if the name is empty."""
         if name == self._topic:
             return
         self._close_watch()

@@ -60,7 +60,7 @@ class TreeNode:
 
     @property
     def path(self) -> str:
-        """Field path, such as ``people[0].name``."""
+        """Field path, such as ``people[0].name``; empty for the root."""
         if self.parent is None:
             return ""
         above = self.parent.path

@@ -88,7 +88,10 @@ class TreeView(QTreeView):
         self.setMouseTracking(True)
 
     def highlight_opacity(self, node: TreeNode) -> float:
-        """Return the intensity of a node's highlight: 1 at the time of a change, 0 after the fade."""
+        """Return the intensity of a node's highlight: 1 at the time of a change, 0 after the fade.
+
+        If there is a base message, the highlight doesn't fade: 1 for nodes that differ, 0 for all others.
+        """
         if node.mark:
             return 1.0
         if node.changed_s is None or node.base is not NO_BASE:

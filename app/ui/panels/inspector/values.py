@@ -28,7 +28,7 @@ def is_container(value: object) -> bool:
 
 
 def keys_of(value: object, count: int) -> list[str | int]:
-    """Return the first `count` keys of a container."""
+    """Return the first `count` keys of an object or indexes of a list; empty for all other values."""
     if isinstance(value, Mapping):
         return [key if isinstance(key, str) else str(key) for key in islice(value, count)]
     if is_container(value):
@@ -51,7 +51,8 @@ def size_of(value: object) -> int:
 def value_text(value: object) -> str:
     """Format a value as one line.
 
-    Texts are quoted, objects and lists are shown as their size, and binary data as its first bytes.
+    Texts are quoted and shortened to `MAX_TEXT_LENGTH` characters. Objects and lists are shown as their
+    size, and binary data as its first bytes and its size.
     """
     if value is None:
         return "null"
@@ -95,7 +96,7 @@ def search(value: object, text: str, limit: int = MAX_SEARCHED_VALUES) -> Iterat
 
 
 def clipboard_text(value: object) -> str:
-    """Format a value for the clipboard: text unchanged, others as JSON."""
+    """Format a value for the clipboard: text unchanged, binary data in hexadecimal, and others as JSON."""
     if isinstance(value, str):
         return value
     if isinstance(value, (bytes, bytearray, memoryview)):

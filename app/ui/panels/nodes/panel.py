@@ -1,4 +1,4 @@
-"""Nodes panel: native and original nodes with their publishers and subscribers."""
+"""Nodes panel: nodes of all networks shown, with their publishers, subscribers and parameters."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def rows_of(
 def limits_text(node: NodeEntry) -> str:
     """Describe the limitations of an original program or foreign network, or the purpose of a bridge.
 
-    Return "" for native nodes.
+    Return "" for all other native nodes, and for networks that report statistics.
     """
     kind = find_kind(node.network)
     if kind is not None:
@@ -119,7 +119,10 @@ def limits_text(node: NodeEntry) -> str:
 
 
 def no_parameters_reason(node: NodeEntry) -> str:
-    """Return the reason why a node has no parameters; "" if it has some."""
+    """Return the reason why a node has no parameters.
+
+    Return "" if the node has some, is gone, or is a program of the original NEP.
+    """
     if node.has_parameters or node.is_original or node.gone_s is not None:
         return ""
     kind = find_kind(node.network)

@@ -67,7 +67,7 @@ def parse_look(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
 
 
 def value_text(value: object) -> str:
-    """Format a value for the legend; "" for None."""
+    """Format a number, boolean or text (at most 60 characters) for the legend; "" for any other value."""
     if value is MISSING or value is None:
         return ""
     if isinstance(value, bool):
@@ -82,7 +82,7 @@ def value_text(value: object) -> str:
 
 
 def number_text(value: float) -> str:
-    """Format a number, such as 0.0042, 1.284, 128.4, 12840 or 2.1e+09."""
+    """Format a number, such as 0.0042, 1.284, 128.4, 12840, 2.1e+09, ∞ or NaN."""
     if not isfinite(value):
         return {"inf": "∞", "-inf": f"{MINUS}∞"}.get(str(value), "NaN")
     size = abs(value)

@@ -229,7 +229,10 @@ class RecordingDetails(QWidget):
         self._update_part()
 
     def part(self) -> Part | None:
-        """Return the part to export; None if no topic is selected or a pattern is invalid."""
+        """Return the part to export; None if no topic is selected or a pattern is invalid.
+
+        Until the preview is loaded, this is the full recording.
+        """
         preview = self.strip.look
         if preview is None:
             return FULL_RECORDING

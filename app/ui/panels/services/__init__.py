@@ -1,6 +1,6 @@
 """Services panel: services of the live network, with a form for requests, the reply and earlier calls.
 
-`service_list` contains the list of services, `request_form` the fields of a request, and `answer` the
+`service_list` contains the list of services, `request_form` the fields of a request, and `reply_view` the
 view of a reply.
 """
 

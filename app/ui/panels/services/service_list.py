@@ -53,7 +53,7 @@ def offered_services(view: GraphView | None) -> list[OfferedService]:
 
 
 def count_text(services: Sequence[OfferedService]) -> str:
-    """Format the numbers of services and nodes, such as "6 services of 3 nodes"."""
+    """Format the numbers of services and nodes, such as "6 services of 3 nodes"; "" without services."""
     if not services:
         return ""
     nodes = len({name for each in services for name in each.nodes})

@@ -111,7 +111,8 @@ def age_cell(topic: Topic) -> Cell:
 def loss_cell(topic: Topic) -> Cell:
     """Return the cell with the loss ratio, with a warning icon unless the ratio is zero.
 
-    The cell is empty if the ratio is unknown. If the network reports no statistics at all, the cell
+    If the number of lost messages is known, but not the ratio, the cell contains the number. The cell is
+    empty if neither is known or the topic is gone. If the network reports no statistics at all, the cell
     contains a note that extends over the other columns.
     """
     kind = network_without_stats(topic)

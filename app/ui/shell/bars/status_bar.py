@@ -104,7 +104,10 @@ class StatusFormatter:
         return "circle-dashed", text.format(robot=name, count=count), "off"
 
     def save_state(self) -> StatusEntry:
-        """Return the time of the last save or, for unsaved changes, the state of the backup."""
+        """Return the time of the last save or, for unsaved changes, the state of the backup.
+
+        The entry is empty for a behaviour without changes that wasn't saved yet.
+        """
         document = self._session.document
         if document.dirty and document.journal_error is not None:
             return "circle-x", _("Not saved · no backup"), "error"

@@ -435,7 +435,7 @@ class BehaviourCommands:
 
 
 def unsaved_text(unsaved: Sequence[UnsavedWork]) -> str:
-    """Return a sentence that names the behaviours with unsaved changes."""
+    """Return a sentence about behaviours with unsaved changes; of more than two, only the first is named."""
     if len(unsaved) == 1:
         return _("“{name}” wasn't saved before Studio closed.").format(name=unsaved[0].name)
     if len(unsaved) == 2:

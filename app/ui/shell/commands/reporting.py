@@ -1,4 +1,4 @@
-"""Commands of the Help menu: problem report, log, and the web page of releases."""
+"""Commands of the Help menu: problem report, and the web page of releases."""
 
 from __future__ import annotations
 

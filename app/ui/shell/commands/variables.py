@@ -1,4 +1,4 @@
-"""Commands for variables of the current behaviour: create, rename, delete, watch, find uses."""
+"""Commands for variables of the current behaviour: create, rename, delete, watch, find uses, set values."""
 
 from __future__ import annotations
 

@@ -332,7 +332,7 @@ class Dock(QDockWidget):
         return menu
 
     def focus_target(self) -> QWidget:
-        """Return the widget that gets the focus: the panel's focus proxy or its first tab stop."""
+        """Return the widget that gets the focus: focus proxy, first tab stop, or else the panel itself."""
         about = focus_proxy(self.panel)
         if about is not None and about.isVisible():
             return about

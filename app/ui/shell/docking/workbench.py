@@ -241,11 +241,14 @@ class Workbench(QMainWindow):
     def open_another(self, key: str) -> Dock | None:
         """Open an additional panel of a kind next to an existing one.
 
+        If the first panel of this kind is closed, it is opened at its last position.
+
         Args:
             key: Key of the existing dock.
 
         Returns:
-            The new dock, or None if the maximum number of panels is open.
+            The new dock, or None if the panel isn't available or the maximum number of panels is open, which
+            a toast explains.
         """
         name = parse_key(key)[0]
         free = (

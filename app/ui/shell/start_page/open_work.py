@@ -112,7 +112,7 @@ class OpenRow(PaintedButton):
 
 
 def state_text(work: OpenWork) -> str:
-    """Return the state of an open behaviour as text: running, saved or not saved."""
+    """Return the state of an open behaviour as text: running, not saved, saved or no changes."""
     if work.is_running:
         return _("running")
     if work.is_unsaved:

@@ -1,4 +1,4 @@
-"""Input widgets: fields, segments, combo box, slider and switch.
+"""Input widgets: fields, token fields, JSON editor, segments, combo box, check box, slider and switch.
 
 Used by the forms of robots, by settings and by filters.
 """

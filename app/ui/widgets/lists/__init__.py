@@ -1,1 +1,1 @@
-"""Lists: entries with highlighted matches, fuzzy search, and scroll areas."""
+"""Lists: entries with highlighted matches, fuzzy search, scroll areas, and a list next to details."""

@@ -350,7 +350,7 @@ class ServiceChannel:
                 writer._wait_for_acks(writer._ref, int(min(timeout_s, 3600.0) * 1e9))  # noqa: SLF001
 
     def close(self) -> None:
-        """Close all endpoints. Idempotent."""
+        """Close all endpoints. Idempotent; has no effect in a forked child process."""
         if has_forked():
             return
         with self.participant.changed:

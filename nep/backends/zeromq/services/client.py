@@ -82,7 +82,10 @@ class Connection(Protocol):
         """Send a call."""
 
     def receive(self) -> Sequence[bytes] | None:
-        """Return the parts of the next reply, or None. Raises `WireError`."""
+        """Return the parts of the next reply, or None if no complete reply is available.
+
+        Raises `WireError` if the received data is malformed.
+        """
 
     def close(self) -> None:
         """Close the connection and discard unread replies."""
@@ -291,7 +294,7 @@ class SocketClient:
         self._serve_soon(self)
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Replace the list of servers."""
+        """Replace the list of servers. If no server is left, an existing connection is kept."""
         with self._lock:
             self._originals = {each for each in self._originals if each == self._current}
             servers = {

@@ -225,7 +225,10 @@ class TcpConnection:
             self._io.serve_soon(self)
 
     def receive(self) -> list[bytes] | None:
-        """Return the parts of the next reply, or None. Raises `WireError`."""
+        """Return the parts of the next reply, or None if no complete reply is available.
+
+        Raises `WireError` if the received data is malformed or ends within a reply.
+        """
         if not self.is_open:
             return None
         self._stream.flush()

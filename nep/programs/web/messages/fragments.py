@@ -21,6 +21,8 @@ class FragmentBuffer:
     def add(self, part: Fragment | Png) -> str | None:
         """Add a fragment; return the text of the operation once it is complete, else None.
 
+        If too many fragments are waiting, those of the oldest other operations are discarded.
+
         Raises:
             OperationError: The fragment has no id, contradicts earlier fragments, or makes the text too
                 long. The earlier fragments are then discarded.

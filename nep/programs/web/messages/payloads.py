@@ -103,6 +103,8 @@ def codec_or_type(msg_type: str) -> str:
 def to_ros(message: Message, *, as_pixels: bool = False) -> object:
     """Return the payload of a message in its ROS shape, in which bytes stay `bytes`.
 
+    Payloads of the codecs string, bytes and image are converted; others are returned unchanged.
+
     Args:
         message: Message to convert.
         as_pixels: Convert an image to the pixels of ``sensor_msgs/Image``.
@@ -128,7 +130,8 @@ def to_ros(message: Message, *, as_pixels: bool = False) -> object:
 def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
     """Return a message in ROS 1 serialization.
 
-    The arguments and exceptions are those of `to_ros`.
+    A message whose type has no ROS definition becomes a ``std_msgs/String`` that contains JSON. The
+    arguments and exceptions are those of `to_ros`.
     """
     if message.codec == "image":
         return _image_bytes(message, _RAW_IMAGE_TYPE if as_pixels else _COMPRESSED_IMAGE_TYPE)

@@ -106,7 +106,11 @@ class PageServices:
     # ---- serving
 
     async def advertise(self, operation: AdvertiseService) -> None:
-        """Serve a service on behalf of the page."""
+        """Serve a service on behalf of the page. Has no effect if the page already serves it.
+
+        Raises `OperationError` for a service of rosapi, or if the page already serves `MAX_SERVICES`
+        services.
+        """
         if is_rosapi(operation.service):
             raise OperationError(_("a page can't provide services of rosapi"), operation.id)
         if operation.service in self._servers:
@@ -147,7 +151,10 @@ class PageServices:
         self._context.queue.put(frames)
 
     def respond(self, operation: ServiceResponse) -> None:
-        """Forward a reply of the page to the caller."""
+        """Forward a reply of the page to the caller.
+
+        Raises `OperationError` if no such call is pending.
+        """
         service, future = self._pending.get(operation.id, ("", None))
         if future is None or service != operation.service:
             raise OperationError(

@@ -61,7 +61,10 @@ class RosApi:
         self._motion_denial_reason = motion_refusal
 
     def reply(self, service: str, args: object) -> Mapping[str, object]:
-        """Execute a service of rosapi and return the fields of its reply. Raises `NepError`."""
+        """Execute a service of rosapi and return the fields of its reply.
+
+        Raises `NepError` if the service isn't supported or fails.
+        """
         name = f"/{service.removeprefix('/')}".removeprefix(PREFIX)
         entry = _SERVICES.get(name)
         if entry is None:

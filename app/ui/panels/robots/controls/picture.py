@@ -1,6 +1,6 @@
 """Input control for an image: a file, the newest image of a topic, or an address, with a thumbnail.
 
-Typed addresses are sent unchanged; images are sent in the format of `picture_file.encoded`.
+Typed addresses are sent unchanged; images are sent in the format of `picture_file.encode_image`.
 """
 
 from __future__ import annotations
@@ -162,7 +162,10 @@ class PictureChoice(QWidget):
     # -- value --------------------------------------------------------------------------------------------
 
     def value(self) -> str | None:
-        """Return the encoded image or the typed address; None if there is neither."""
+        """Return the encoded image or the typed address; None if there is neither.
+
+        None is also returned while the next image of a selected topic is awaited.
+        """
         if self._stream is not None:
             self._poll_stream()
             if self._stream.is_awaiting_image:

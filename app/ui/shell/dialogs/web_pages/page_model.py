@@ -94,7 +94,7 @@ class PageTreeModel(QAbstractItemModel):
         """Return the row of the page at an index, or of the page to which the topic at the index belongs.
 
         Returns:
-            None if the index is invalid.
+            None if the index is invalid or the page has been removed.
         """
         if not index.isValid():
             return None
